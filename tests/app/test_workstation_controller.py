@@ -91,7 +91,7 @@ def test_from_the_cockpit_a_falcon_is_examined_and_of_what_is_none_it_is_said(qa
         asked.append((name, held))
         return SimpleNamespace(show=lambda: None)
 
-    monkeypatch.setattr("study_app.gui.devices.diagnosis_dialog.open_diagnosis", diagnosis)
+    monkeypatch.setattr("study_app.gui.devices.open_diagnosis", diagnosis)
     live = LiveSession(
         NewSession(
             source="demo",

@@ -39,7 +39,7 @@ from study_app.analysis.results import min_sample_reason
 from study_app.analysis.statistics.equivalence import STEPS, fewest_participants
 from study_app.analysis.wording import bound_text, listed
 from study_app.protocol.model import Contrast
-from study_app.protocol.participants import STATED
+from study_app.protocol.participants import CONSISTENT, NOISY, STATED
 from study_app.psychophysics.grid import Z_95
 from study_app.store.files import Column, csv_bytes, optional, write_files
 
@@ -469,7 +469,7 @@ def _summary(power: Powers) -> Iterator[str]:
     plan, sizes = power.plan, power.sizes
     place = sizes.index(plan.participants) if plan.participants in sizes else len(sizes) - 1
     planned = "the planned " if plan.participants in sizes else ""
-    main, consistent, noisy = power.kinds
+    main = next(iter(power.kinds))
     lines = []
     for curve in power.curves:
         primary = (
@@ -481,9 +481,9 @@ def _summary(power: Powers) -> Iterator[str]:
             shares = dict(zip(power.kinds, (kind.power[place] for kind in power.among_kinds(curve)), strict=True))
             about = "" if curve.question == "contrast" else f" ({HEADS[curve.question]})"
             lines.append(
-                f"- {_name(curve, power).strip('*')}{about}: {shares[consistent]:.0%} of studies detect the effect if "
-                f"participants are {consistent}, {shares[main]:.0%} if they are {main}, and {shares[noisy]:.0%} if "
-                f"they are {noisy}."
+                f"- {_name(curve, power).strip('*')}{about}: {shares[CONSISTENT]:.0%} of studies detect the effect if "
+                f"participants are {CONSISTENT}, {shares[main]:.0%} if they are {main}, and {shares[NOISY]:.0%} if "
+                f"they are {NOISY}."
             )
     if lines:
         yield from ("", f"## Power with {planned}{sizes[place]} participants", "", *lines)

@@ -2,7 +2,9 @@
 
 from study_app.protocol.participants.groups import ASSIGNMENT, EACH_GROUP, RecordedSessions, next_group, sequences_in
 from study_app.protocol.participants.raters import (
+    CONSISTENT,
     LAPSE_POINTS,
+    NOISY,
     REHEARSED,
     STATED,
     SimulatedParticipants,
@@ -11,8 +13,10 @@ from study_app.protocol.participants.raters import (
 
 __all__ = [
     "ASSIGNMENT",
+    "CONSISTENT",
     "EACH_GROUP",
     "LAPSE_POINTS",
+    "NOISY",
     "REHEARSED",
     "STATED",
     "RecordedSessions",
