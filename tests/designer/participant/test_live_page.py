@@ -288,6 +288,9 @@ def test_a_copied_question_has_the_text_of_its_original_and_the_others_keep_thei
     designer.go_to(*COPY)
     copied = dict(before)["like_honey"]
     assert sorted(statements(tab)) == sorted([*before, ("like_honey_2", copied)])
+    assert tab.view.note == ""  # an unfinished entry
+    designer.go_to(*ITEM)
+    designer.go_to(*COPY)
     assert tab.view.note.endswith("(reads the same as an earlier item), so the text is shown as written.")
     designer.editing.handle_request(SetText((*COPY, "text"), "en", "Another statement"))
     assert dict(statements(tab))["like_honey_2"] == "Another statement"
