@@ -347,7 +347,8 @@ def _figure_tasks(study: Study, results: Results, numbers: Mapping[str, Sequence
 
 def _draw(task: FigureTask) -> Picture | Failure | None:
     failures = Failures()
-    return next(draw_figures([task], failures), next(iter(failures.found), None))
+    picture = next(draw_figures([task], failures), None)
+    return failures.found[0] if failures.found else picture
 
 
 def _proposed(proposals: Sequence[Proposal]) -> Iterator[str]:

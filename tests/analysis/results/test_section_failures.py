@@ -67,7 +67,6 @@ def test_a_test_that_fails_takes_no_other_with_it(opened: Results, monkeypatch: 
         assert results.performance is not None
 
 
-@pytest.mark.nightly
 def test_a_report_with_failures_is_written_and_ends_with_three(
     opened: Results, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -85,7 +84,7 @@ def test_a_report_with_failures_is_written_and_ends_with_three(
         assert one["what"] in done.output
     for title in (
         "Do answers change with the delay?",
-        "Lowest delay",
+        "Shortest delay with a trend",
         "How the study was run",
         "Not available: the computation failed",
     ):
