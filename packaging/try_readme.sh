@@ -16,7 +16,7 @@ suite="$1" mirror="$2" folder="$3"
 shift 3
 chosen=" $* "
 
-libraries="$(cd "$here" && python3 -c 'from study_app.gui.display import display_check; print(display_check.PACKAGES)')"
+libraries="$(cd "$here" && python3 -c 'from study_app.gui import display_check; print(display_check.PACKAGES)')"
 declare -A packages=([bare]="" [libraries]="$libraries" [display]="$libraries xvfb xdotool")
 mapfile -t commands < <(grep '^python3 -m venv' "$here/README.md")
 failed=0

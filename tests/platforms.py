@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from study_app.gui.display.display_check import missing_for_windows
+from study_app.gui.display_check import missing_for_windows
 
 needs_window_system = pytest.mark.skipif(bool(missing_for_windows()), reason=missing_for_windows())
 

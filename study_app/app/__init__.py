@@ -14,7 +14,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from study_app.gui.display import naming_missing_library
+from study_app.gui.display_check import naming_missing_library
 
 
 @contextmanager

@@ -122,7 +122,7 @@ def _write_report(study: Path, to: Path) -> list[str]:
 def _show_results(study: Path) -> int:
     """Open the program on the results and return its exit code; or print how to open it, and return 0."""
     from study_app.errors import DisplayError
-    from study_app.gui.display import check_display, missing_for_windows
+    from study_app.gui.display_check import check_display, missing_for_windows
 
     platform = os.environ.get("QT_QPA_PLATFORM", "").partition(":")[0]
     try:

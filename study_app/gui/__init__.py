@@ -3,10 +3,10 @@
 Windows show frozen values and emit signals; they open no file and compute no statistics. Read ``kit.fields`` (what is
 edited), ``kit.commands`` (actions) and ``theme.themed`` (colours) first, then a folder as an example, such as ``home``.
 
-Reading order: display, key_presses, theme; application, widgets; help, kit, participant, startup_window; devices, lab,
-settings, watch; sessions; home, operator, preflight, results.
+Reading order: display, display_check, key_presses, theme; application, widgets; help, kit, participant,
+startup_window; devices, lab, settings, watch; sessions; home, operator, preflight, results.
 
-Public modules: application, devices, display, help.view, home, kit, lab, operator, participant.forms.questions_page,
-participant.tank.glass, participant.window, preflight.window, results.view, sessions.session_facts, settings.view,
-startup_window, theme, watch.window, widgets.
+Public modules: application, devices, display, display_check, help.view, home, kit, lab, operator,
+participant.forms.questions_page, participant.tank.glass, participant.window, preflight.window, results.view,
+sessions.session_facts, settings.view, startup_window, theme, watch.window, widgets.
 """

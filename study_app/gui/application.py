@@ -8,7 +8,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QApplication
 
-from study_app.gui.display.display_check import check_display
+from study_app.gui.display_check import check_display
 from study_app.gui.key_presses import key_presses
 from study_app.gui.theme.icons import logo
 from study_app.gui.theme.theme import LIGHT

@@ -14,7 +14,7 @@ HEAVY = ("matplotlib", "numba", "pandas", "pyarrow", "pyqtgraph", "scipy", "toml
 PROGRAM = """
 import gc, json, sys, threading
 from pathlib import Path
-from study_app.gui.display import display_check
+from study_app.gui import display_check
 
 def collections():
     return sum(generation["collections"] for generation in gc.get_stats())

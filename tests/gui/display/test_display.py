@@ -9,8 +9,8 @@ from PySide6.QtCore import QTimer
 
 from study_app import app
 from study_app.errors import DisplayError
-from study_app.gui.display.display_check import check_display, missing_library
 from study_app.gui.display.screens import LEAD_NS, STALE_REFRESHES, Frames
+from study_app.gui.display_check import check_display, missing_library
 from tests.platforms import needs_posix, needs_window_system
 
 MS = 1_000_000
