@@ -152,7 +152,7 @@ def test_what_progress_raises_ends_the_report_at_every_step_and_nothing_is_writt
     told: list[tuple[str, float]] = []
     report(small.folder, tmp_path / "whole", progress=lambda what, share: told.append((what, share)))
     shares = [share for _, share in told]
-    assert [what for what, _ in told if what.startswith("drawing")] == ["drawing: liquids", "drawing: effects"]
+    assert [what for what, _ in told if what.startswith("drawing")] == ["drawing"]
     assert shares == sorted(shares)
     assert shares[-1] <= 1
     for step in (0, len(told) // 2):
