@@ -43,10 +43,9 @@ class ForceRules(NamedTuple):
     position may have jumped.
     ``acting_share`` is the share of the time in which the passivity controller may change a force that a study delays,
     before the gain falls: with 0.3, a handle stirred at 9 Hz with 50 ms of delay oscillated above 40 Hz.
-    ``late_wake_j`` is the greatest energy that a wake may return through a delayed force: at a scale of 40 it can
-    return 1.3 J, and a released handle of 30 g oscillated at 8.5 Hz. ``late_swing_mps`` is ``swing_mps`` for such a
-    force: a released handle of 50 g oscillated at 13 Hz with the 1 mJ that are tolerated. With 0.06, the controller
-    withheld 23 % of thesis water delayed by 20 ms from a light hand.
+    ``late_swing_mps`` is ``swing_mps`` for a force that a study delays: a released handle of 50 g oscillated at 13 Hz
+    with the 1 mJ that are tolerated. With 0.06, the controller withheld 23 % of thesis water delayed by 20 ms from a
+    light hand.
     """
 
     version: int
@@ -75,7 +74,6 @@ class ForceRules(NamedTuple):
     trusts_gaps: float = 1.0
     acting_share: float = math.inf
     late_swing_mps: float = math.inf
-    late_wake_j: float = math.inf
 
 
 VERSIONS: Final = {
@@ -107,7 +105,7 @@ VERSIONS[5] = VERSIONS[4]._replace(version=5, swing_mps=0.01)
 VERSIONS[6] = VERSIONS[5]._replace(version=6, acting_share=0.25)
 VERSIONS[7] = VERSIONS[6]._replace(version=7, shaken_reversal_s=0.06, trusts_gaps=0.0)
 VERSIONS[8] = VERSIONS[7]._replace(version=8, known_force_ticks=0, unused_s=0.05, regained_s=0.1)
-VERSIONS[9] = VERSIONS[8]._replace(version=9, late_swing_mps=0.1, late_wake_j=5e-3)
+VERSIONS[9] = VERSIONS[8]._replace(version=9, late_swing_mps=0.1)
 
 FORCE_RULES: Final = 9
 """The version by which this program computes forces. Receipts state it: released numbers never change, new numbers are

@@ -1,6 +1,6 @@
 """Conditions whose delayed force the passivity controller withholds in part, and the table that tells how much.
 
-The table is ``delayed_force.csv`` in this folder, measured by ``validation.stability.force_delay`` on the servo's own
+The table is ``delayed_force.csv`` in this folder, measured by ``evidence.stability.force_delay`` on the servo's own
 tick.
 """
 

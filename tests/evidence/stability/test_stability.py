@@ -85,8 +85,6 @@ CHOPPED = "rate_hz=2000 hand=thrown viscous_nspm=0 quantum_um=20"
         f" force_delay_ms=20 force_jitter_ms=50 {CHOPPED}",
         f"liquid=physical_glycerin mass_kg=0.05 motion=sine speed_mps=0.6 quantum_um=20 jitter=0.2 force_delay_ms=1"
         f" force_jitter_ms=20 force_loss=0.5 rate_hz=2000 release_s=0.7 {LET_GO}",
-        f"liquid=light_oil mass_kg=0.03 motion=circles speed_mps=0.6 quantum_um=60 force_delay_ms=20 plant=arm"
-        f" release_s=0.8 {LET_GO}",
     ],
     ids=[
         "estimator changes with the delay",
@@ -94,7 +92,6 @@ CHOPPED = "rate_hz=2000 hand=thrown viscous_nspm=0 quantum_um=20"
         "late force of a damper",
         "jitter and loss",
         "uneven force on a released handle",
-        "late force on a released handle",
     ],
 )
 def test_cases_of_earlier_sweeps_are_stable(line):

@@ -30,7 +30,6 @@ RELEASED = {
     "trusts_gaps": 1.0,
     "acting_share": math.inf,
     "late_swing_mps": math.inf,
-    "late_wake_j": math.inf,
 }
 
 
@@ -52,7 +51,7 @@ def test_released_versions_keep_their_numbers():
         "unused_s": 0.05,
         "regained_s": 0.1,
     }
-    assert VERSIONS[9]._asdict() == {**VERSIONS[8]._asdict(), "version": 9, "late_swing_mps": 0.1, "late_wake_j": 5e-3}
+    assert VERSIONS[9]._asdict() == {**VERSIONS[8]._asdict(), "version": 9, "late_swing_mps": 0.1}
 
 
 def test_the_present_version_is_the_newest_and_has_its_own_numbers():

@@ -273,13 +273,12 @@ def returnable_j(parameters: Record, liquid: Record, wake_mps: Any, length: int)
     """Return the greatest energy [J, scene] that a wake of ``length`` N gives to a body: max R(u - v) (u - v) v · N T.
 
     For a constant coefficient that power is (4/27) c u³, at v = u/3; R of the other laws grows less, so R(u) u²/4
-    bounds it. A delayed force returns at most ``late_wake_j`` of the rules, at the hand.
+    bounds it.
     """
     u_mps = norm(wake_mps)
     share = 4.0 / 27.0 if liquid.drag.law == LAW_CONSTANT else 0.25
     power_w = float(share * resistance(liquid.drag, u_mps) * u_mps * u_mps)
-    most_j = math.inf if parameters.link.acts == 0 else parameters.rules.late_wake_j * parameters.scale
-    return float(min(power_w * length * parameters.period_s, most_j))
+    return float(power_w * length * parameters.period_s)
 
 
 @part
