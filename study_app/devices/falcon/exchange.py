@@ -89,8 +89,19 @@ def _choose_units(falcon: Any) -> None:
             falcon.units[i] = 0
         return
     limit_growth(falcon)
+    _limit_to_rounding(falcon)
     mechanics.torques(falcon.rates, falcon.force_n, falcon.torque_nm)
     falcon.shortened += mechanics.motor_units(falcon.mechanism, falcon.torque_nm, falcon.units)
+
+
+@kernel
+def _limit_to_rounding(falcon: Any) -> None:
+    """Keep ``force_n`` below the limit by the rounding error, which grows toward the edge of the reach."""
+    most_n = max(falcon.force_limit_n - mechanics.rounding_at(falcon.mechanism, falcon.rates), 0.0)
+    if square(falcon.force_n) > most_n * most_n:
+        shorter = most_n / math.sqrt(square(falcon.force_n))
+        for axis in range(3):
+            falcon.force_n[axis] *= shorter
 
 
 @kernel

@@ -256,13 +256,23 @@ def count_at(mechanism: Any, z_m: float) -> float:
 
 
 def rounding_n(mechanism: Any) -> float:
-    """Return the greatest force error by rounding to motor units within reach [N]: half a unit per motor."""
-    theta, rates, sums = np.zeros(3), np.zeros((3, 3)), []
+    """Return the greatest force error by rounding to motor units at the corners of the safe box within reach [N]."""
+    theta, rates, errors_n = np.zeros(3), np.zeros((3, 3)), []
     for corner_m in itertools.product(*SAFE_BOX_M):
         if inverse(mechanism, np.array(corner_m), theta) == REACHED:
             jacobian(mechanism, theta, np.array(corner_m), rates)
-            sums.append(np.linalg.norm(rates, axis=1).sum())
-    return float(0.5 / mechanism.units_per_nm * max(sums))
+            errors_n.append(rounding_at(mechanism, rates))
+    return max(errors_n)
+
+
+@kernel
+def rounding_at(mechanism: Any, rates: Any) -> float:
+    """Return the greatest force error by rounding in the pose of ``rates`` [N]: half a motor unit per arm."""
+    error_n = 0.0
+    for i in range(3):
+        square = rates[i, 0] * rates[i, 0] + rates[i, 1] * rates[i, 1] + rates[i, 2] * rates[i, 2]
+        error_n += 0.5 / mechanism.units_per_nm * math.sqrt(square)
+    return error_n
 
 
 @kernel

@@ -11,14 +11,15 @@ from typing import Any
 import numba
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 if numba.config.DISABLE_JIT:
     pytest.skip("the exchange is made of C functions", allow_module_level=True)
 
 from study_app.devices.falcon.constants import ERROR_IO, ERROR_NO_DEVICE, ERROR_OVERFLOW, ERROR_TIMEOUT
-from study_app.devices.falcon.exchange import COUNTERS, limit_growth
+from study_app.devices.falcon.exchange import COUNTERS, limit_growth, set_motor_units
+from study_app.devices.falcon.mechanics import GEOMETRIES, REACHED, SAFE_BOX_M, inverse, new_mechanism
 from study_app.haptics.kernels.c_functions import READ_LOST, READ_NEW, READ_NOTHING_NEW
 from tests.devices.falcon.support.scripted_bridge import (
     CENTRE_M,
@@ -28,6 +29,7 @@ from tests.devices.falcon.support.scripted_bridge import (
     OUT_M,
     PUSH_N,
     SOMEWHERE_M,
+    UNITS_PER_NM,
     Ticks,
     counts_at,
     force_of,
@@ -274,6 +276,26 @@ def test_limited_growth_never_makes_a_force_longer() -> None:
         assert np.linalg.norm(falcon.force_n) <= np.linalg.norm(asked_n) * (1 + 1e-12)
         shortened += np.linalg.norm(falcon.force_n - asked_n) > 1e-9
     assert shortened > 1_000
+
+
+@pytest.mark.parametrize("geometry", GEOMETRIES.values(), ids=list(GEOMETRIES))
+@given(
+    position_m=st.tuples(*(st.floats(low, high) for low, high in SAFE_BOX_M)),
+    direction=st.tuples(*[st.floats(-1, 1)] * 3),
+)
+@example(position_m=(SAFE_BOX_M[0][1], 0.0, SAFE_BOX_M[2][0]), direction=(1.0, 0.3, 0.2))
+def test_rounding_to_motor_units_never_exceeds_the_force_limit(geometry, position_m, direction) -> None:
+    length = np.linalg.norm(direction)
+    assume(length > 0.1)
+    falcon = Ticks().falcon
+    falcon.mechanism = new_mechanism(geometry, units_per_nm=UNITS_PER_NM)
+    falcon.position_m = position_m
+    assume(inverse(falcon.mechanism, falcon.position_m, falcon.theta) == REACHED)
+    falcon.homed, falcon.share, falcon.tick_s, falcon.slew_n_per_s = 1, 1.0, 1e-3, 1e6
+    falcon.force_limit_n = 8.0
+    falcon.force_n = 8.0 / length * np.array(direction)
+    set_motor_units(falcon)
+    assert np.linalg.norm(falcon.sent_n) <= 8.0 + 1e-9
 
 
 EVENTS = ["good", "good", "good", "lost", "cut", "twice", "io", "unhomed", "away", "garbage"]

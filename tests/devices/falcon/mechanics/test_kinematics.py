@@ -21,7 +21,7 @@ from study_app.devices.falcon.mechanics import (
     jacobian,
     motor_units,
     new_mechanism,
-    rounding_n,
+    rounding_at,
     torques,
 )
 from study_app.errors import DeviceError
@@ -175,8 +175,9 @@ class TestForces:
         assume(np.abs(torque_nm).max() * UNITS_PER_NM < MOST_TORQUE)
         units = np.zeros(3, np.int64)
         motor_units(mechanism, torque_nm, units)
-        sent_n = -units / UNITS_PER_NM @ jacobian_at(mechanism, position_m)
-        assert np.linalg.norm(sent_n) <= np.linalg.norm(force_n) + rounding_n(mechanism) + 1e-9
+        rates = jacobian_at(mechanism, position_m)
+        sent_n = -units / UNITS_PER_NM @ rates
+        assert np.linalg.norm(sent_n) <= np.linalg.norm(force_n) + rounding_at(mechanism, rates) + 1e-9
 
     @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
     def test_a_torque_that_is_no_number_gives_none_at_all(self, mechanism, bad):
