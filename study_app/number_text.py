@@ -18,10 +18,8 @@ _SPELLINGS: Final = str.maketrans(
 _CONVENTIONS: Final = tuple(
     (
         decimal,
-        re.compile(
-            rf"(?P<sign>[-+]?) ?(?P<whole>(?:\d+|[1-9]\d{{0,2}}(?:{re.escape(group)}\d{{3}})+)?)"
-            rf"(?P<part>(?:{re.escape(decimal)}\d*)?)(?P<power>(?:[eE][-+]?\d+)?)"
-        ),
+        rf"(?P<sign>[-+]?) ?(?P<whole>(?:\d+|[1-9]\d{{0,2}}(?:{re.escape(group)}\d{{3}})+)?)"
+        rf"(?P<part>(?:{re.escape(decimal)}\d*)?)(?P<power>(?:[eE][-+]?\d+)?)",
     )
     for decimal in (".", ",", "\u066b")
     for group in (" ", "'", ".", ",")
@@ -48,7 +46,7 @@ def readings_of(text: str, decimal_sign: str = ".") -> tuple[int | float, ...]:
     plain = "".join(str(unicodedata.decimal(letter, letter)) for letter in text.strip().translate(_SPELLINGS))
     numbers: dict[float, int | float] = {}
     for decimal, convention in _CONVENTIONS:
-        if (match := convention.fullmatch(plain)) is None or not re.search(r"\d", match["whole"] + match["part"]):
+        if (match := re.fullmatch(convention, plain)) is None or not re.search(r"\d", match["whole"] + match["part"]):
             continue
         whole, part = re.sub(r"\D", "", match["whole"]), match["part"].replace(decimal, ".")
         value = float(f"{match['sign']}{whole}{part}{match['power']}")

@@ -12,7 +12,8 @@ Public modules: delay_session.
 import gc
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 from study_app.gui.display_check import naming_missing_library
 
@@ -30,17 +31,19 @@ def _without_collections() -> Iterator[None]:
             gc.enable()
 
 
-with naming_missing_library(), _without_collections():
-    from study_app.app.session.live_session import BUG, CANCELLED, LiveSession, resume, run
+if TYPE_CHECKING:
+    from study_app.app.main_controller import run_home_window
+    from study_app.app.session.live_session import resume, run
+
+_MODULES = {"run_home_window": "main_controller", "run": "session.live_session", "resume": "session.live_session"}
 
 
 def __getattr__(name: str) -> Any:
-    """Load the main window on first access, since sessions started by a command do not need it."""
-    if name != "run_home_window":
+    """Load the main window or the session on first access: neither needs the other to open."""
+    if name not in _MODULES:
         raise AttributeError(name)
     with naming_missing_library(), _without_collections():
-        from study_app.app.main_controller import run_home_window  # noqa: PLC0415
-    return run_home_window
+        return getattr(import_module(f"{__name__}.{_MODULES[name]}"), name)
 
 
-__all__ = ["BUG", "CANCELLED", "LiveSession", "resume", "run", "run_home_window"]
+__all__ = ["resume", "run", "run_home_window"]

@@ -177,8 +177,11 @@ class CrashTrace:
                 self._path.unlink()
 
 
+CANCELLED = 130  # exit codes
+BUG = 1
 _HEARTBEAT_MS = 100  # the longest delay before Python handles a signal
 BY_SIGNAL_S = 2.0  # the longest wait for threads when a signal ends the program; the force is zero before
+OPENING_PATIENCE_S = 20.0  # the longest wait for a device that is being opened
 _HANG_UP = 1  # the number of SIGHUP, for a log-off on any system
 
 

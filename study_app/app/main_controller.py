@@ -13,8 +13,15 @@ from PySide6.QtCore import QEventLoop, QObject, QTimer, Signal
 from PySide6.QtGui import QGuiApplication, QKeySequence, QShortcut
 
 from study_app.app.compilation import Compilation
-from study_app.app.failures import BY_SIGNAL_S, Patience, UncaughtExceptions, ending_on_signals, guard_painting
-from study_app.app.session.live_session import BUG, OPENING_PATIENCE_S, LiveSession
+from study_app.app.failures import (
+    BUG,
+    BY_SIGNAL_S,
+    OPENING_PATIENCE_S,
+    Patience,
+    UncaughtExceptions,
+    ending_on_signals,
+    guard_painting,
+)
 from study_app.app.timing import collecting_in_this_thread
 from study_app.devices.registry import descriptor_of
 from study_app.errors import DeviceError, StoreError, StudyError
@@ -35,6 +42,7 @@ from study_app.workspace import Workspace, chosen_workspace, offered_workspace, 
 
 if TYPE_CHECKING:
     from study_app.app.lab_controller import LabController
+    from study_app.app.session.live_session import LiveSession
     from study_app.app.session.playing import Playing
     from study_app.app.session.preflight_controller import ComputerCheck
     from study_app.designer.controller import DesignerController
@@ -127,7 +135,7 @@ class WorkstationController(QObject):
 
 
 def load_modules() -> None:
-    """Load the modules of lab, designer and compiler, and those that the first page needs."""
+    """Load the modules of session, lab, designer and compiler, and those that the first page needs."""
     import study_app.app.lab_controller  # noqa: PLC0415
     import study_app.app.session.playing  # noqa: PLC0415
     import study_app.gui.watch.window  # noqa: PLC0415
@@ -269,7 +277,7 @@ class MainController(QObject):
         return made
 
     def preload(self) -> None:
-        """Load the modules of lab and designer in the background, so that the first visit rarely waits."""
+        """Load the modules of session, lab and designer in the background, so that the first visit rarely waits."""
         self._loading.run(load_modules)
 
     def compile_when_loaded(self) -> None:
@@ -471,6 +479,9 @@ class MainController(QObject):
     def _start_session(self, chosen: NewSession) -> None:
         if self.live is not None:
             return
+        self._loading.wait()  # two threads that import modules of the same cycle may see them partially initialised
+        from study_app.app.session.live_session import LiveSession  # noqa: PLC0415 - only for a session
+
         self.devices.end_diagnosis()  # the diagnosis would hold the device
         self.machine.remember_operator(chosen.operator)
         self.live = LiveSession(chosen, self.window.theme, asks=True, compilation=self.compilation)

@@ -40,7 +40,7 @@ def commands(context: click.Context) -> None:
     forcedelay, thickness, demo). RESULTS is a study folder, or its name in the workspace. SESSION is a ses-NN folder,
     or a name listed by the sessions command.
     """
-    from study_app.store.diagnostics import start_log
+    from study_app.program_log import start_log
 
     start_log()
     if context.invoked_subcommand is None:

@@ -102,7 +102,7 @@ def doctor(name: str, faults: tuple[str, ...], to: Path | None, device_options: 
     for line in report_lines(diagnosis):
         click.echo(line)
     if to is not None:
-        from study_app.store.diagnostics import write_support
+        from study_app.store.support import write_support
 
         write_support(to, "\n".join(report_lines(diagnosis)).strip() + "\n")
         click.echo(f"Written: {to}")

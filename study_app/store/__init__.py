@@ -5,10 +5,10 @@
 ``session_progress`` computes how far it is, ``verification`` proves that no file was changed, and ``blinded`` controls
 the conditions.
 
-Reading order: files; journals, workstation; receipt, session_progress; blinded, diagnostics, integrity; exclusions,
+Reading order: files; journals, workstation; receipt, session_progress; blinded, integrity, support; exclusions,
 recordings; merged, recorder; tables, versions; withdrawals; sessions, sites; unblinding, upgrade, verification.
 
-Public modules: blinded, diagnostics, exclusions, files, integrity, journals.journal, journals.journal_events, merged,
-receipt, recordings, session_progress, sessions, sites, tables, unblinding, upgrade, verification, versions,
+Public modules: blinded, exclusions, files, integrity, journals.journal, journals.journal_events, merged, receipt,
+recordings, session_progress, sessions, sites, support, tables, unblinding, upgrade, verification, versions,
 withdrawals, workstation.
 """

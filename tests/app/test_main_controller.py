@@ -142,7 +142,7 @@ def test_a_device_that_cannot_be_opened_is_tried_again_or_examined(
 def test_what_opens_a_device_ends_a_diagnosis_that_is_under_way(
     visit: MainController, monkeypatch: Any, asked: str
 ) -> None:
-    monkeypatch.setattr(main_controller, "LiveSession", Held)
+    monkeypatch.setattr("study_app.app.session.live_session.LiveSession", Held)
     monkeypatch.setattr("study_app.gui.devices.view.open_diagnosis", lambda window, *_device: QDialog(window))
     monkeypatch.setattr("study_app.app.lab_controller.LabController._open_device", lambda *_device: None)
     visit.window.place("lab")
@@ -200,7 +200,7 @@ def test_keys_lead_from_every_place_to_home_and_to_a_new_study(visit: MainContro
 
 def test_results_show_what_was_run_last(visit: MainController, monkeypatch: Any) -> None:
     shown: list[Path] = []
-    monkeypatch.setattr(main_controller, "LiveSession", Held)
+    monkeypatch.setattr("study_app.app.session.live_session.LiveSession", Held)
     monkeypatch.setattr(visit, "results_place", SimpleNamespace(choose_study=shown.append))
     visit.window.place("home").session_asked.emit(CHOSEN)
     assert (shown, visit.live) == ([CHOSEN.results], None)

@@ -12,10 +12,9 @@ from PySide6.QtCore import QEvent, QObject, Signal
 from PySide6.QtWidgets import QApplication, QDialog, QLabel
 
 from study_app.analysis import worker_messages as of
-from study_app.app import main_controller
 from study_app.app.compilation import Compilation
+from study_app.app.failures import BUG
 from study_app.app.main_controller import MainController, WorkstationController
-from study_app.app.session.live_session import BUG
 from study_app.devices.descriptor import NONE, READY, Backend
 from study_app.errors import DeviceNotFound
 from study_app.gui.devices.view import DevicesPlace
@@ -335,7 +334,7 @@ STAY: dict[str, Any] = {
 
 
 def test_the_stay(visit: MainController, monkeypatch: Any) -> None:
-    monkeypatch.setattr(main_controller, "LiveSession", Live)
+    monkeypatch.setattr("study_app.app.session.live_session.LiveSession", Live)
     monkeypatch.setattr(ResultsPlace, "read_studies", lambda self: Live.done.append(f"look at {self.view.chosen}"))
     monkeypatch.setattr(DevicesPlace, "look_for_devices", lambda _self: Live.done.append("look for devices"))
     lines, before = list[str](), list[str]()

@@ -24,12 +24,11 @@ import pytest
 from click.testing import CliRunner
 
 import study_app
-from study_app import api
+from study_app import api, program_log
 from study_app.cli import commands
 from study_app.errors import StudyError
 from study_app.session.simulated.answers_only import rehearse_answers
-from study_app.store import exclusions, workstation
-from study_app.store.diagnostics import program_log, support
+from study_app.store import exclusions, support, workstation
 from study_app.store.files import atomic, csv_files, output_files
 from study_app.store.files.atomic import temporary_path
 from study_app.store.files.folders import StudyFolder

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from study_app import program_log
 from study_app.errors import AnalysisError, DeviceError, StoreError
-from study_app.store.diagnostics import program_log
 from study_app.store.files.atomic import copy_folder, create_folder, write_file
 from study_app.store.files.output_files import write_files
 from study_app.store.verification.whole_study import verify_study

@@ -11,9 +11,9 @@ from click.testing import CliRunner
 
 from study_app import cli
 from study_app.errors import DeviceLost, StoreError, StudyError
+from study_app.program_log import DEVICE_FAILED, last_error, log_file, read_log, start_log
 from study_app.store import workstation
-from study_app.store.diagnostics.program_log import DEVICE_FAILED, last_error, log_file, read_log, start_log
-from study_app.store.diagnostics.support import write_support
+from study_app.store.support import write_support
 from study_app.store.workstation import DeviceBench, MachineSettings
 from study_app.workspace import WORKSPACE_VARIABLE
 

@@ -39,6 +39,7 @@ from study_app.gui.operator import (
 )
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.gui.widgets import Background
+from study_app.program_log import DEVICE_FAILED
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders import PageStep, Schedule, expected_duration_s, orders_of
 from study_app.protocol.randomization import stream
@@ -64,7 +65,6 @@ from study_app.session.transitions.events import (
     broken,
 )
 from study_app.store.blinded import open_events, session_protocol
-from study_app.store.diagnostics import DEVICE_FAILED
 from study_app.store.files import StudyFolder
 from study_app.store.journals import journal_events
 from study_app.store.journals.journal_events import start_of

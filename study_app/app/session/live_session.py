@@ -21,7 +21,7 @@ from PySide6.QtGui import QScreen
 from PySide6.QtWidgets import QApplication, QWidget
 
 from study_app.app.compilation import Compilation
-from study_app.app.failures import BY_SIGNAL_S, CrashTrace, ending_on_signals
+from study_app.app.failures import BUG, BY_SIGNAL_S, CANCELLED, OPENING_PATIENCE_S, CrashTrace, ending_on_signals
 from study_app.app.timing import collecting_in_this_thread, unfreeze_garbage
 from study_app.devices import DEFAULT_DEVICE
 from study_app.devices.registry import check_connected, descriptor_of
@@ -77,9 +77,6 @@ def load_windows() -> None:
     study_app.store.receipt.versions()
 
 
-CANCELLED = 130
-BUG = 1
-OPENING_PATIENCE_S = 20.0
 NOT_EXAMINED = ("There is nothing to diagnose", "Diagnostics are not available for this device.")
 
 

@@ -19,8 +19,8 @@ from typing import Final
 from PySide6.QtCore import QEvent, QObject, QTimer, Signal
 from PySide6.QtWidgets import QApplication
 
-from study_app.app.failures import Patience
-from study_app.app.session.live_session import BUG, LiveSession
+from study_app.app.failures import BUG, Patience
+from study_app.app.session.live_session import LiveSession
 from study_app.designer import header as shown
 from study_app.designer.controller import DesignerController
 from study_app.designer.header import Notice, PlayDevices

@@ -18,7 +18,7 @@ from study_app.gui.widgets.boxes import STRETCH, hbox, vbox
 from study_app.gui.widgets.cards import Icon, Rule
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import label, set_ink
-from study_app.store.diagnostics import NAME, write_support
+from study_app.store.support import NAME, write_support
 from study_app.store.workstation import MachineSettings
 from study_app.workers.server import Crashed, Refused
 

@@ -7,8 +7,7 @@ left out: trained, control, experimental, left_hand, stroke.
 import re
 from typing import Final
 
-_STEMS: Final = re.compile(
-    r"""
+_STEMS: Final = r"""
     expert|novic|beginner|amateur|professional|experienc|inexperienc|layp|laym
     |patient|healthy|diabet|parkinson|alzheimer|dementia|autis|adhd|dyslex|amput|prosthe|disab|impair|handicap|neuropath
     |arthrit|schizo|pregnan|smoker|nonsmoker|synaesthe|synesthe|obes|overweight
@@ -25,24 +24,21 @@ _STEMS: Final = re.compile(
 
     |debutant|inexperiment|malade|homme|femme|garcon|jeune|enfant|gaucher|droitier|etudiant|musicien|infirmier|medecin
     |aveugle|sourd|malvoyant|fumeur
-    """,
-    re.VERBOSE,
-)
-_WORDS: Final = re.compile(
-    r"""
+    """
+_WORDS: Final = r"""
     naive|skilled|unskilled|lay|males?|females?|m[ae]n|wom[ae]n|boys?|girls?|sex|gender|nonbinary|ages?|aged|older|years
     |kids?|doctors?|engineers?|singers?|drivers?|workers?|chefs?|native|nonnative|blind|sighted|deaf|hearing|lefties
     |leek|leken|mannen|jongens?|rokers?|doof|doven|blinden|arts|artsen
     |laien?|mann|alte|alter|jung|arzt|senioren
     |experimentes?|sains?|filles?|agee?s?|aine?s?|eleves?|sexe
     |.*handed|.*handers?|.*handige?n?
-    """,
-    re.VERBOSE,
-)
+    """
 
 
 def suggests_attribute(name: str) -> bool:
     """Return whether a group's name suggests an attribute that participants already have."""
     name_parts = re.findall(r"[a-z]+", name.casefold())
     whole = name.casefold() in ("old", "oud", "alt", "vieux")
-    return whole or any(_STEMS.match(word) or _WORDS.fullmatch(word) for word in name_parts)
+    return whole or any(
+        re.match(_STEMS, word, re.VERBOSE) or re.fullmatch(_WORDS, word, re.VERBOSE) for word in name_parts
+    )

@@ -35,14 +35,13 @@ _OWN = re.compile(
     r"subject-[A-Za-z0-9]+_session-\d\d_task-[a-z0-9]+_description-[a-z]+_data\.csv|"
     r"trial-\d{3,}(_attempt-\d+)?(_interval-\d+)?(_frames)?\.\w+"
 )
-_SYSTEM = re.compile(
+_SYSTEM = (
     r"desktop\.ini|(?:eh)?thumbs(?:_vista)?\.db(?::.*)?|folder\.jpg|icon\r|~\$.*|~syncthing~.*|~wr[a-z]\d+\.tmp|"
     r".*\(.*conflicted copy.*\).*|.*(?-i:-(?:DESKTOP|LAPTOP)-[A-Z0-9]{4,12})(?:-\d+)?\..*|@eaDir|__MACOSX|"
     r"\$RECYCLE\.BIN|System Volume Information|lost\+found|"
     r"(?:journal|receipt|checksums|rebuilt|crash|subject-.*_data|trial-\d{3,}(?:_attempt-\d+)?(?:_interval-\d+)?(?:_frames)?)"
     r"(?:\.(?:jsonl|json|sha256|txt|csv|parquet)(?:~|\.bak)|(?:[ (\[~-]|_conflict|\.sync-conflict-).*"
-    r"\.(?:jsonl|json|sha256|txt|csv|parquet))",
-    re.IGNORECASE,
+    r"\.(?:jsonl|json|sha256|txt|csv|parquet))"
 )
 """Files of Windows, macOS, Office and programs that share files, and copies of a session's own files, such as "journal
 (1).jsonl" or "receipt-HOST.json"; hidden files besides."""
@@ -153,7 +152,7 @@ def is_system_file(name: Path) -> bool:
     """Return whether a relative path belongs to the operating system or to a file-sharing program."""
     if _OWN.fullmatch(name.name) and len(name.parts) <= 2:
         return False
-    return _is_hidden(name) or any(_SYSTEM.fullmatch(part) for part in name.parts)
+    return _is_hidden(name) or any(re.fullmatch(_SYSTEM, part, re.IGNORECASE) for part in name.parts)
 
 
 def sha256(path: Path) -> str:

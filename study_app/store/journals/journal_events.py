@@ -202,7 +202,7 @@ def _journal_name(kind: type) -> str:
 
 
 @dataclass_transform(frozen_default=True, kw_only_default=True)
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False, eq=False)
 class Event:
     """A line of a journal; ``n``, ``at`` and ``previous`` are set when it is written (see `journal`)."""
 
@@ -219,13 +219,21 @@ class Event:
     def __init_subclass__(cls, *, group: bool = False) -> None:
         declared = [
             declaration
-            for declaration in dataclasses.fields(dataclass(frozen=True, kw_only=True)(cls))
+            for declaration in dataclasses.fields(dataclass(frozen=True, kw_only=True, repr=False, eq=False)(cls))
             if declaration.name not in (*_OF_ALL, "others")
         ]
         cls.declared = tuple(declaration.name for declaration in declared)
         cls.required = tuple(declaration.name for declaration in declared if declaration.default is dataclasses.MISSING)
         if not group:
             EVENTS[_journal_name(cls)] = cls
+
+    def __eq__(self, other: object) -> bool:  # common to all, since generated methods delay the start of the program
+        return type(other) is type(self) and vars(other) == vars(self)
+
+    __hash__: ClassVar[None]  # type: ignore[assignment] # its mapping has none
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({', '.join(f'{name}={value!r}' for name, value in vars(self).items())})"
 
     @property
     def event(self) -> str:

@@ -19,8 +19,8 @@ from study_app.app.session import bridge as bridge_module
 from study_app.errors import DeviceNotFound, ServoFault, VideoError
 from study_app.gui.operator.session_panels import Strip
 from study_app.haptics.model.layout import LIMITER_FADE, LIMITER_NORM, SAMPLE, records
+from study_app.program_log import DEVICE_FAILED
 from study_app.session.transitions.events import Continue, ForceStopped
-from study_app.store.diagnostics.program_log import DEVICE_FAILED
 from tests.app.world import World
 from tests.golden import compare, masked
 from tests.golden_values import changed, value_lines

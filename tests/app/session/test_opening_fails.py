@@ -12,8 +12,9 @@ import pytest
 from PySide6.QtCore import QEvent, QTimer
 from PySide6.QtWidgets import QApplication
 
+from study_app.app.failures import BUG
 from study_app.app.session import live_session
-from study_app.app.session.live_session import BUG, LiveSession
+from study_app.app.session.live_session import LiveSession
 from study_app.errors import SessionError, StoreError
 from study_app.gui.display.screens import Frames
 from study_app.gui.operator.window import OperatorWindow

@@ -14,9 +14,9 @@ from PySide6.QtCore import QObject, Qt, QTimer
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QAbstractButton
 
+from study_app.app.failures import BUG
 from study_app.app.session import playing
 from study_app.app.session.bridge import SessionBridge
-from study_app.app.session.live_session import BUG
 from study_app.designer.document.document import template
 from study_app.designer.participant.playable import StepPosition
 from study_app.errors import DeviceLost

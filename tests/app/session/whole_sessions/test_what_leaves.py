@@ -20,13 +20,13 @@ from PySide6.QtTest import QTest
 from study_app.cli import commands
 from study_app.gui.operator.window import OperatorWindow
 from study_app.gui.participant.window import ParticipantWindow
+from study_app.program_log import log_file, start_log
 from study_app.session.pages import EndPage, QuestionnairePage, TaskPage
 from study_app.store import workstation
-from study_app.store.diagnostics.program_log import log_file, start_log
-from study_app.store.diagnostics.support import write_support
 from study_app.store.exclusions import exclude, include
 from study_app.store.files.folders import StudyFolder
 from study_app.store.sessions.open_session import SessionStore
+from study_app.store.support import write_support
 from study_app.store.unblinding import unblind
 from study_app.store.verification.whole_study import verify_study
 from study_app.store.withdrawals import Tombstone, add_tombstone

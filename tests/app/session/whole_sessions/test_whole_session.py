@@ -160,7 +160,7 @@ def test_cancelling_the_opening_creates_nothing(short_demo, results):
         window(OpeningWindow).cancel.click()
 
     QTimer.singleShot(0, lambda: QTimer.singleShot(0, cancel))
-    assert app.run(short_demo, participant="P001", windowed=True, results=results) == app.CANCELLED
+    assert app.run(short_demo, participant="P001", windowed=True, results=results) == failures.CANCELLED
     assert not results.exists()
     assert not [thread for thread in threading.enumerate() if thread.name in {"background", "servo"}]
 
@@ -170,7 +170,7 @@ def test_a_mistake_in_the_program_is_an_exit_code_and_a_trace(short_demo, result
         raise RuntimeError("not thought of")
 
     monkeypatch.setattr(live_session, "open_rig", fails)
-    assert app.run(short_demo, participant="P001", windowed=True, results=results) == app.BUG
+    assert app.run(short_demo, participant="P001", windowed=True, results=results) == failures.BUG
     assert "not thought of" in capsys.readouterr().err
     assert not results.exists()
 

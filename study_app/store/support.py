@@ -12,8 +12,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
 
+from study_app.program_log import last_error, read_log, source_place
 from study_app.store import receipt, workstation
-from study_app.store.diagnostics.program_log import last_error, read_log, source_place
 from study_app.store.files.atomic import write_file
 from study_app.workspace import workspace
 
