@@ -1,6 +1,7 @@
 """Compilation in the background: a session that begins meanwhile waits for it, and shows how far it is."""
 
 import threading
+from collections.abc import Sequence
 from typing import Any
 
 import pytest
@@ -11,14 +12,19 @@ from study_app.workers.server import Crashed
 
 
 class Client:
-    """A worker process that gives one answer at a time."""
+    """A worker process that gives one answer at a time, once the one before it is in ``reported``."""
 
-    def __init__(self, *answers: object) -> None:
-        self.left = list(answers)
+    def __init__(self, *answers: object, reported: Sequence[float] | None = None) -> None:
+        self.left, self.given = list(answers), list[object]()
+        self.reported = reported
         self.closed = False
 
     def answers(self) -> list[tuple[int, object]]:
-        return [(1, self.left.pop(0))] if self.left else []
+        waits = self.reported is not None and self.given and self.given[-1] not in self.reported
+        if waits or not self.left:
+            return []
+        self.given.append(self.left.pop(0))
+        return [(1, self.given[-1])]
 
     def close(self) -> None:
         self.closed = True
@@ -35,15 +41,15 @@ def begun(monkeypatch: pytest.MonkeyPatch, client: Client | None) -> Compilation
 def test_a_session_waits_until_the_process_ends_and_sees_its_progress(
     qtbot: Any, monkeypatch: pytest.MonkeyPatch, last: object
 ) -> None:
-    client = Client(0.25, 0.75, last)
-    background = begun(monkeypatch, client)
     shares: list[float] = []
+    client = Client(0.25, 0.75, last, reported=shares)
+    background = begun(monkeypatch, client)
     session = threading.Thread(target=background.wait, args=(shares.append, lambda: False))
     session.start()
     qtbot.waitUntil(lambda: not session.is_alive(), timeout=10_000)
+    assert sorted(set(shares) - {0.0}) == [0.25, 0.75]
     assert shares == sorted(shares)
     assert background.share == 0.75
-    assert 0.75 in shares
     assert client.closed
 
 
