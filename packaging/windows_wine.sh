@@ -209,7 +209,7 @@ has_event() {
 }
 
 # begin_session: click "Start" below the checks, which may take a while.
-begin_session() { click 1263 859 && sleep 5 && has_event page_shown; }
+begin_session() { click 1320 859 && sleep 5 && has_event page_shown; }
 
 click() { xdotool mousemove "$1" "$2" click 1; }
 
