@@ -97,8 +97,10 @@ def compare(
 
 def check_kept(kept: Path, lines: Iterable[str]) -> None:
     """Compare lines, with their numbers, with a file that people change: no option writes it."""
-    found = map(as_on_linux, lines) if sys.platform == "win32" else lines
-    assert list(found) == kept.read_text(encoding="utf-8").splitlines()
+    found, expected = list(lines), kept.read_text(encoding="utf-8").splitlines()
+    if sys.platform == "win32":  # both, since the backslashes of other texts become slashes, too
+        found, expected = [[as_on_linux(line) for line in each] for each in (found, expected)]
+    assert found == expected
 
 
 def _alike(expected: str, found: str, rel: float, abs_: float) -> bool:

@@ -3,6 +3,9 @@
 from pathlib import Path
 
 import pytest
+
+pytest.importorskip("grimp", reason="the import linter is not installed")
+
 from grimp import ImportGraph
 
 from tests.public_modules import PublicModules, public_modules

@@ -85,6 +85,7 @@ def test_a_session_that_another_program_began_meanwhile_is_not_taken_over(
     assert (take_over_folder(tmp_path), is_open(tmp_path)) == (None, False)
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="a killed program of Windows is gone at once")
 def test_a_killed_program_that_nobody_has_waited_for_is_gone(tmp_path: Path) -> None:
     with subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE) as program:
         other(tmp_path, pid=program.pid, began=process_start_s(program.pid))
