@@ -232,6 +232,9 @@ def test_a_mistake_in_measuring_does_not_leave_the_window_waiting(
         asked.window.again_asked.emit()
     assert isinstance(failed.args[0], ValueError)
     assert not asked.measuring.busy
+    for thread in threading.enumerate():
+        if thread.name == "background":
+            thread.join(10)  # it reports its exception within this test
 
 
 @pytest.mark.parametrize(
