@@ -3,6 +3,7 @@
 People change the files in ``places``; no option regenerates them.
 """
 
+import sys
 from dataclasses import replace
 from datetime import date
 from pathlib import Path
@@ -25,7 +26,7 @@ from study_app.session.start import NewSession
 from study_app.store.exclusions import Exclusion
 from study_app.store.workstation import load_settings
 from study_app.workers.server import Crashed, Refused
-from tests.golden import check_kept, what_comes
+from tests.golden import as_on_linux, check_kept, what_comes
 from tests.golden_values import changed, value_lines
 
 KEPT = Path(__file__).parent / "places"
@@ -150,7 +151,8 @@ def test_results(qtbot: Any) -> None:
             case _:
                 asks[name](*given)
         after = [f"busy: {place.is_busy} {place._listening.isActive()}", *value_lines(place.view, "view")]
-        lines += [f"== {name} {given}"[:80], *done, *changed(before, after)]
+        asked = f"== {name} {given}"
+        lines += [(as_on_linux(asked) if sys.platform == "win32" else asked)[:80], *done, *changed(before, after)]
         before = after
     check_kept(KEPT / "results.txt", what_comes(lines))
 
