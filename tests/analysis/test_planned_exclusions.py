@@ -45,12 +45,16 @@ def with_rules(study: Study, *rules: dict[str, Any]) -> Study:
 
 def test_each_rule_of_answers_counts_what_a_person_can_count() -> None:
     study = load_study(SAMPLE.path)
-    first, second, *_ = study.people
+    first, second, uncounted, *_ = study.people
     responses, answered = study.responses.copy(), study.answered.copy()
     own = responses["participant"] == first
     responses.loc[own, "response"] = 4
     hurried = answered["participant"] == second
     answered.loc[hurried, "first_choice_s"] = answered.loc[hurried, "onset_s"] + 0.3
+    for table in (responses, answered):
+        table.loc[table["participant"] == uncounted, "counted"] = False
+    responses.loc[responses["participant"] == uncounted, "response"] = 4
+    answered.loc[answered["participant"] == uncounted, "first_choice_s"] = answered["onset_s"] + 0.1
     study = replace(study, responses=responses, answered=answered)
     constant, fast = {"rule": "constant_answers", "limit": 95.0}, {"rule": "fast_answers", "limit": 0.5}
     results = evaluate(study, recordings=False)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from study_app.analysis.planning.power_curves import interval, power_markdown, powers
+from study_app.analysis.planning.power_curves import _detectable, interval, power_markdown, powers
 from study_app.analysis.planning.simulated_studies import (
     BATCH,
     FULL,
@@ -228,3 +228,17 @@ def test_a_protocol_that_compares_nothing_is_refused() -> None:
 def test_sizes_that_make_no_sense_are_refused(sizes: str) -> None:
     result = CliRunner().invoke(commands, ["power", "rek2024", "--sizes", sizes])
     assert result.exit_code == 2
+
+
+@pytest.mark.parametrize(
+    ("found", "effect"),
+    [
+        ([0.2, 0.7, 0.9], 1.5),
+        ([0.2, 0.85, 0.6], 12 / 13),
+        ([0.1, 0.3, 0.8], 2.0),
+        ([0.8, 0.9, 0.95], 0.0),
+        ([0.1, 0.2, 0.79], None),
+    ],
+)
+def test_the_detectable_effect_is_where_80_percent_of_studies_find_it(found: list[float], effect: float | None) -> None:
+    assert _detectable(np.array(found), np.array([0.0, 1.0, 2.0])) == (effect and pytest.approx(effect))
