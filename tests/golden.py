@@ -99,7 +99,7 @@ def check_kept(kept: Path, lines: Iterable[str]) -> None:
     """Compare lines, with their numbers, with a file that people change: no option writes it."""
     found, expected = list(lines), kept.read_text(encoding="utf-8").splitlines()
     if sys.platform == "win32":  # both, since the backslashes of other texts become slashes, too
-        found, expected = [[as_on_linux(line) for line in each] for each in (found, expected)]
+        found, expected = [[as_on_linux(line) for line in side] for side in (found, expected)]
     assert found == expected
 
 
