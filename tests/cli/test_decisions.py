@@ -11,10 +11,13 @@ from click.testing import CliRunner
 
 from study_app.cli import commands
 from study_app.store.blinded.blinding import read_key
+from study_app.store.exclusions import Exclusion
 from study_app.store.files.folders import StudyFolder
 from study_app.store.files.output_files import Output, write_output
 from study_app.store.integrity.checksums import checked_line
 from study_app.store.receipt import read
+from study_app.store.unblinding import Unblinded
+from study_app.store.verification.reproduction import Reproduced
 from study_app.store.withdrawals import Withdrawn, proof_of_withdrawal, tombstones
 from tests.cli.test_transcripts import make_labs
 from tests.studies import once
@@ -102,6 +105,41 @@ def test_decisions_about_a_session_are_recorded_at_its_site(labs: Path) -> None:
     assert run("include", pooled, *trial, *WHO, "again")[1] == opened
     reveals = [json.loads(line) for line in (north / "blinding" / "reveals.jsonl").read_bytes().splitlines()]
     assert [(reveal["by"], reveal["reason"]) for reveal in reveals] == [("AK", "closed")]
+
+
+def test_unblinding_names_what_each_code_stands_for_and_what_it_left(
+    labs: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    codes = {"liquids": {"K": "water/oil"}, "delays": {"M": "0.3/up", "R": "/down", "T": "honey"}}
+    row = Exclusion(
+        participant="A-P002", session=3, trial=5, rule_or_person="catch", reason="2 of 3 wrong", excluded_at="noon"
+    )
+    done = {"A-": Unblinded(codes, ("trials.csv is open",), (row,)), "C-": Unblinded({"delays": {"V": "tar"}}, (), ())}
+    monkeypatch.setattr("study_app.store.unblinding.unblind_folder", lambda *_, **__: done)
+    assert run("unblind", labs / "A", *WHO, "closed", code=3) == (
+        [
+            "liquids  A-K  standard water", "delays  A-M  standard 0.3", "delays  A-R  all levels",
+            "delays  A-T  honey", "excluded  participant A-P002, session 3, trial 5: 2 of 3 wrong", "delays  C-V  tar",
+        ],
+        ["warning: trials.csv is open"],
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("differences", "closing", "code"),
+    [
+        ([], "reproduced: the order of trials and statements matches the receipt", 0),
+        (["block a: trial 7 was water"], "orders or levels differ", 3),
+    ],
+)
+def test_reproducing_lists_differences_then_followed_levels(
+    labs: Path, monkeypatch: pytest.MonkeyPatch, differences: list[str], closing: str, code: int
+) -> None:
+    followed = ["block b: 4 of 5 levels are consistent with the answers"]
+    done = Reproduced(differences, followed)
+    monkeypatch.setattr("study_app.store.verification.reproduce_session", lambda _session: done)
+    session = StudyFolder(labs / "A").session("P001", 1).path
+    assert run("reproduce", session, code=code)[0] == [*differences, *followed, closing]
 
 
 def test_a_withdrawal_names_what_it_erased_and_what_it_left(

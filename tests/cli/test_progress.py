@@ -5,8 +5,12 @@ import subprocess
 import sys
 import textwrap
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
+from click.testing import CliRunner
+
+from study_app.cli import commands
 
 PROGRAM = textwrap.dedent(
     """
@@ -54,3 +58,20 @@ def test_a_terminal_shows_what_is_done_and_standard_output_stays_clean() -> None
     assert done.stdout == "result\n"
     assert "counting [2]" in shown
     assert "warning" in shown
+
+
+def test_validation_prints_each_finished_part_and_its_progress_every_20_s(monkeypatch: pytest.MonkeyPatch) -> None:
+    clock = SimpleNamespace(now_s=0.0, perf_counter=lambda: clock.now_s)
+
+    def validated(known, studies, seeds, _executor, progress, say):  # type: ignore[no-untyped-def]
+        told = (known[0][1].name, studies, seeds)
+        for clock.now_s, tell in ((1, progress), (3, progress), (5, say), (6, say), (20.9, progress), (21, progress)):
+            tell(str(told))
+        return []
+
+    monkeypatch.setattr("study_app.cli.evidence.time", clock)
+    monkeypatch.setattr("study_app.evidence.thresholds.validate_known_values", validated)
+    words = ["validate", "viscosityjnd", "--studies", "11", "--seed", "3", "--seed", "5", "--workers", "1"]
+    ran = CliRunner().invoke(commands, words, catch_exceptions=False)
+    assert ran.stderr.splitlines() == [f"{at_s} s: ('viscosityjnd', 11, (3, 5))" for at_s in (1, 5, 6, 21)]
+    assert ran.stdout.startswith("11 studies for each protocol and seed (3, 5), in 21 s, ")
