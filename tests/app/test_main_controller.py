@@ -12,7 +12,7 @@ import pytest
 from PySide6.QtCore import QObject, Qt, Signal
 from PySide6.QtWidgets import QDialog
 
-from study_app.app import main_controller
+from study_app.app import compilation, main_controller
 from study_app.app.compilation import Compilation
 from study_app.app.main_controller import MainController
 from study_app.app.session import live_session
@@ -112,6 +112,17 @@ def test_a_window_that_is_closed_at_once_loads_nothing_more(
     visit.end()
     qtbot.wait(main_controller.LOOK_AFTER_MS + 200)
     assert not loaded
+
+
+def test_the_force_model_is_compiled_once_the_modules_are_loaded(
+    visit: MainController, monkeypatch: Any, qtbot: Any
+) -> None:
+    done: list[str] = []
+    monkeypatch.setattr(main_controller, "load_modules", lambda: done.append("loaded"))
+    monkeypatch.setattr(compilation, "start_compilation", lambda: done.append("compiles"))
+    visit.compile_when_loaded()
+    visit.preload()
+    qtbot.waitUntil(lambda: done == ["loaded", "compiles"])
 
 
 def test_a_device_that_cannot_be_opened_is_tried_again_or_examined(

@@ -121,18 +121,27 @@ def allocate_elsewhere() -> list[list[int]]:
     return kept
 
 
+@pytest.mark.parametrize("before", [True, False])
+def test_the_interpreter_collects_again_afterwards_if_it_did_before(qtbot: Any, *, before: bool) -> None:
+    (gc.enable if before else gc.disable)()
+    try:
+        with collecting_in_this_thread():
+            assert not gc.isenabled()
+        assert gc.isenabled() == before
+    finally:
+        gc.disable()
+
+
 @pytest.mark.slow
 @pytest.mark.usefixtures("automatic_collection")
 def test_no_other_thread_frees_what_belongs_to_windows_open_or_closed(qtbot: Any) -> None:
     open_, closed = [], []
     with collecting_in_this_thread():
-        assert not gc.isenabled()
         Cycle(open_)
         kept = allocate_elsewhere()
         assert open_ == []
         qtbot.waitUntil(lambda: bool(open_))
         Cycle(closed)
-    assert gc.isenabled()
     allocate_elsewhere()
     assert open_ == closed == [threading.get_ident()]
     assert len(kept) == 20_000

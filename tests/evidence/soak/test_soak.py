@@ -167,6 +167,24 @@ def test_the_command_prints_and_writes_the_report(run_soak):
     assert table["findings"] == []
 
 
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_the_command_with_the_report_so_far(run_soak, monkeypatch, number):
+    def interrupted(*given, progress, **named):
+        def tell(line):
+            progress(line)
+            if line.startswith(" 10 %"):
+                signal.raise_signal(number)
+
+        return soak_servo(*given, progress=tell, **named)
+
+    monkeypatch.setattr("study_app.evidence.soak.soak_servo", interrupted)
+    before = signal.getsignal(number)
+    code, said, _ = run_soak("--hours", str(SHORT_H), "--virtual")
+    assert code == 128 + number
+    assert "passed: no faults found in the 1" in said
+    assert signal.getsignal(number) == before
+
+
 @pytest.mark.nightly
 @pytest.mark.timeout(900)  # a new process, perhaps with everything to compile, on a busy machine
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
