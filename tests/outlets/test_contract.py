@@ -169,6 +169,17 @@ def test_a_serial_port_that_is_missing_on_windows_is_said_in_its_words(monkeypat
     assert str(refused.value) == "serial:COM9 cannot be opened: The system cannot find the file specified"
 
 
+def test_each_byte_has_left_the_serial_port_before_the_next(monkeypatch: pytest.MonkeyPatch) -> None:
+    serial = pytest.importorskip("serial", reason="pyserial is not installed")
+    monkeypatch.setattr(serial, "Serial", mock.Mock())
+    sink = open_sink("serial:COM9@57600", time.perf_counter_ns)
+    assert serial.Serial.call_args.args == ("COM9", 57600)
+    sink.send(marker(event="responses"))
+    sink.close()
+    sent = [step for byte in (0, 31, 0) for step in (mock.call.write(bytes([byte])), mock.call.flush())]
+    assert serial.Serial.return_value.mock_calls[: len(sent)] == sent
+
+
 @pytest.mark.parametrize(
     ("module", "address", "extra"), [("serial", "serial:/dev/ttyUSB0", "triggers"), ("pylsl", "lsl", "lsl")]
 )

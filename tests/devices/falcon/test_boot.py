@@ -163,6 +163,14 @@ def test_a_bridge_that_is_taken_or_gone_between_attempts_ends_them(fault: str, k
     assert getattr(caught.value, "kind", "") == kind
 
 
+@pytest.mark.parametrize(("turned_on", "runs"), [((True,), True), ((False,), False), ((False, True), False)])
+def test_only_a_loss_of_power_loses_the_program(turned_on: tuple[bool, ...], *, runs: bool) -> None:
+    emulator = Emulator(running=True)
+    for on in turned_on:
+        emulator.power(on)
+    assert (emulator.powered, emulator.running) == (turned_on[-1], runs)
+
+
 def test_asking_whether_it_runs_does_not_undo_its_homing() -> None:
     emulator, transport = falcon(running=True)
     configure(transport)

@@ -16,7 +16,7 @@ import pytest
 
 from study_app.devices.driver import examine
 from study_app.devices.emulators.inverse3_service import Service
-from study_app.devices.inverse3.service import force_scale, probe
+from study_app.devices.inverse3.service import force_scale, probe, shortened
 from tests.compiled import needs_servo
 from tests.strangers import CLOSE, HTTP_OK, STRANGERS, Parts, dripped, flooded, http_answer, sent, serving
 
@@ -145,6 +145,11 @@ def answers(kind: Kind, head: bytes, connection: socket.socket) -> Parts:
         if not connection.recv(1 << 16):
             return
         yield from kind.asked(number) if kind.asked else [frame(message_of())]
+
+
+def test_data_in_a_message_are_cut_at_80_characters() -> None:
+    assert shortened([1, None]) == "[1, None]"
+    assert len(shortened(["x" * 40] * 6)) == 80  # of 6 texts, each shortened to 30 characters
 
 
 @pytest.fixture(scope="module")

@@ -5,6 +5,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Callable
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -12,9 +13,17 @@ import libusb_package
 import pytest
 import usb.core
 
-from study_app.devices.falcon import constants
+from study_app.devices.falcon import constants, transport
 from study_app.devices.falcon.failures import FURTHER_KINDS, KINDS, FalconNotFound, UsbFailure, usb_failure
-from study_app.devices.falcon.transport import FtdiTransport, PyUsbTransport, libusb_calls, open_transport
+from study_app.devices.falcon.transport import (
+    PACKETS,
+    FtdiTransport,
+    PyUsbTransport,
+    end_torque,
+    libusb_calls,
+    open_transport,
+)
+from study_app.errors import DeviceError
 from tests.devices.falcon.support.bridges import Backend, D2xx, both
 from tests.golden import compare
 from tests.platforms import needs_posix
@@ -193,6 +202,34 @@ def test_libusb_finds_none_and_its_function_is_the_one_that_compiled_code_calls(
     function = ctypes.CDLL(str(libusb_package.get_library_path())).libusb_bulk_transfer
     address = ctypes.cast(function, ctypes.c_void_p).value
     assert libusb_calls(backend.lib, ctypes.c_void_p(0x1234)) == (0x1234, address)
+
+
+@pytest.mark.parametrize("accepts", [True, False])
+def test_the_guard_sends_zero_torque_to_its_bridge_and_closes_it(
+    monkeypatch: pytest.MonkeyPatch, *, accepts: bool
+) -> None:
+    calls: list[object] = []
+
+    class Bridge:
+        def write(self, packet: bytes, _timeout_s: float) -> None:
+            calls.append(packet)
+            if not accepts:
+                raise DeviceError("gone")
+
+        def pause(self, _lasting_s: float) -> None: ...
+
+        def close(self) -> None:
+            calls.append("closed")
+
+    monkeypatch.setattr(transport, "open_transport", lambda name: calls.append(name) or Bridge())
+    with nullcontext() if accepts else pytest.raises(DeviceError, match="does not accept packets"):
+        end_torque("A7")
+    assert calls == ["A7", *[constants.quiet_packet(constants.FLAG_HOMING)] * PACKETS, "closed"]
+
+
+@pytest.mark.parametrize(("serials", "name"), [(("A", "B"), "B"), ((None,), "")])
+def test_the_name_of_a_bridge_opens_it_again(serials: tuple[str | None, ...], name: str) -> None:
+    assert PyUsbTransport(Backend(*serials), serial=name or None).name == name
 
 
 def test_every_failure_is_one_line_that_says_what_to_do() -> None:
