@@ -1,5 +1,7 @@
 """What a fit leaves behind, and the command from a file to a preset."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from click.testing import CliRunner
@@ -59,6 +61,30 @@ def test_the_preset_is_the_fitted_scene(scene, tmp_path):
     for command in ("check", "scene"):
         told = CliRunner().invoke(commands, [command, str(file)], catch_exceptions=False)
         assert (told.exit_code, f"{liquid.id}: effects named" in told.output) == (0, True)
+
+
+@pytest.mark.slow
+def test_each_interval_is_beside_its_own_number_in_the_preset(fitted):
+    found, path = fitted
+    body = found.parameters[0]
+    density = replace(body, name="liquid.density_kg_m3", table="liquid", field="density_kg_m3")
+    intervals = {"drag_coefficient": (0.41, 0.43), "scaling": (380.0, 421.0), density.name: (990.0, 1013.0)}
+    told = replace(
+        found,
+        parameters=(*found.parameters, density),
+        values=found.values | {density.name: 1000.0},
+        intervals=intervals,
+    )
+    noted, table = {}, ""
+    for line in preset.preset_file_text(told, path).splitlines():
+        key, _, interval = line.partition("# 95 %: ")
+        table = line.strip("[]") if line.startswith("[") else table
+        noted |= {f"{table}.{key.split()[0]}": interval} if interval else {}
+    assert noted == {
+        "scene.body.drag_coefficient": "0.41 … 0.43",
+        "liquids.tank.wake.scaling": "380 … 421",
+        "liquids.tank.density_kg_m3": "990 … 1013",
+    }
 
 
 @pytest.mark.slow
