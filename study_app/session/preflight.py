@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from study_app.devices.registry import descriptor_of
 from study_app.haptics.model.device_dynamics import ASSUMED_TICKS, UNKNOWN, Dynamics
-from study_app.haptics.model.slope_limits import refusal_reason
+from study_app.haptics.model.slope_limits import delayed_force_fault, refusal_reason
 from study_app.haptics.runtime.grants import NO_THREAD, Grant
 from study_app.number_text import counted
 from study_app.outlets.session_outlets import OutletStatus
@@ -171,7 +171,14 @@ def preflight_checks(facts: Measurements, protocol: Protocol) -> tuple[Check, ..
     """Return the results of the pre-flight for a session of ``protocol`` with the measured ``facts``."""
     return tuple(
         check
-        for of in (_servo_checks, _level_check, _screen_and_disk_checks, _outlet_checks, _cost_checks)
+        for of in (
+            _servo_checks,
+            _delayed_force_check,
+            _level_check,
+            _screen_and_disk_checks,
+            _outlet_checks,
+            _cost_checks,
+        )
         for check in of(facts, protocol)
     )
 
@@ -233,6 +240,17 @@ def _servo_checks(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
     advice = "; ".join(f"{it[0].upper()}{it[1:]}" for it in grant.advice)
     verdict: _Verdict = "ok" if grant.level in {"real-time", "none"} else "warning"
     yield Check("Priority", verdict, grant.level, about=f"{grant.how}{memory}", advice=f"{advice}." if advice else "")
+
+
+def _delayed_force_check(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
+    """Yield the check whether rate and handle permit the delayed forces of the study, if it has any."""
+    if not protocol.has_imperfect_link:
+        return
+    rate_hz, mass_kg = protocol.device.rate_hz, facts.dynamics.mass_kg
+    advice = delayed_force_fault(rate_hz, mass_kg) or ""
+    about = f"the study delays forces at {rate_hz:g} Hz, with a handle of {1000 * mass_kg:.0f} g"
+    value = "not permitted" if advice else "permitted"
+    yield Check("Delayed force", "failure" if advice else "ok", value, about=about, advice=advice)
 
 
 def _level_check(facts: Measurements, protocol: Protocol) -> Iterator[Check]:

@@ -43,7 +43,7 @@ DELAYS = DAMPERS.replace("damping_nspm = 16", "damping_nspm = 30").replace(
 
 def studies() -> dict[str, Protocol]:
     """Return the small study and variants of it, and studies of dampers."""
-    small_one = small.protocol()
+    small_one, delays = small.protocol(), parse(DELAYS.encode(), "delays.toml")
     blocks = small.TABLES["blocks"] | {"feeling": small.TABLES["blocks"]["feeling"] | {"order": "williams"}}
     with_rate = {
         f"{hz:g} Hz": small_one.model_copy(update={"device": small_one.device.model_copy(update={"rate_hz": hz})})
@@ -55,7 +55,8 @@ def studies() -> dict[str, Protocol]:
         "single-blind": single,
         "dealt": Protocol.model_validate(small.TABLES | {"blocks": blocks}),
         "dampers": parse(DAMPERS.encode(), "dampers.toml"),
-        "delays": parse(DELAYS.encode(), "delays.toml"),
+        "delays": delays,
+        "fast delays": delays.model_copy(update={"device": delays.device.model_copy(update={"rate_hz": 1001.0})}),
     }
 
 
@@ -145,6 +146,11 @@ FACTS: tuple[tuple[str, dict[str, Any], str], ...] = (
     *((name, {"delay_ticks": ticks, "dynamics": Dynamics(delay_s=1e-3 * ticks)}, f"{'ok' if ticks == 1 else 'failure'} "
        f"Levels: up to {highest} N·s/m; with a delay of {ticks} tick")
       for name, highest in (("dampers", "25.6"), ("delays", "30")) for ticks in (1, 2, 3, 4)),
+    *(("delays", {"dynamics": Dynamics(mass_kg=mass_kg)},
+       f"{told}; the study delays forces at 1000 Hz, with a handle of {grams} g")
+      for mass_kg, grams, told in (
+        (0.0994, 99, "failure Delayed force: not permitted"), (0.1, 100, "ok Delayed force: permitted"))),
+    ("fast delays", timing(1001.0), "failure Delayed force: not permitted; the study delays forces at 1001 Hz, with"),
 )  # fmt: skip
 
 

@@ -31,6 +31,7 @@ from study_app.evidence.stability.stability_cases import (
     of_physical2,
     scenes,
 )
+from study_app.haptics.model.slope_limits import FASTEST_DELAYED_HZ, refusal_reason
 from study_app.haptics.runtime.closed_loop import BURST_PERIOD_S
 
 _SCALES: Final = (1.0, 3.0, 10.0, 20.0, 40.0)
@@ -69,6 +70,8 @@ _LINKS: Final[Mapping[str, tuple[Any, ...]]] = {
     "force_loss": (0.0, 0.0, 0.1, 0.5),
 }
 """How a study delays forces; a link that does nothing is one of 48."""
+_DELAYED_HZ: Final = tuple(hz for hz in _RATES_HZ if refusal_reason(hz) is None and hz <= FASTEST_DELAYED_HZ)
+"""Rates at which a session may delay forces; it needs a handle of `LEAST_DELAYED_KG`, the lightest of `_DRAWN`."""
 _OUTLIERS: Final[Mapping[str, tuple[Any, ...]]] = {"outliers": (0.002, 0.02), "outlier_mm": (0.5, 2.0, 5.0, 20.0)}
 _JUMPS: Final[Mapping[str, tuple[Any, ...]]] = {"burst_ms": (4.0, 8.0, 20.0, 40.0), "jump_mm": (0.5, 2.0, 5.0, 20.0)}
 DELAYS: Final[Mapping[str, tuple[Any, ...]]] = {"slows_to": (2, 3, 4), "swaps": (1,)}
@@ -168,7 +171,8 @@ def groups(seed: str = "stability", count: int | None = None) -> tuple[Group, ..
     listed.append(Group(f"{driven}, let go in mid-stroke", evenly_chosen(tuple(driven_free), count)))
     listed += _of_liquids("non-Newtonian liquids", materials, seed, light, count)
     listed += _of_liquids("liquids of physical2", of_physical2, seed, light, count)
-    listed.append(_half_damper("late forces", min(_LATE_CASES, count or _LATE_CASES), seed, {**light, **_LINKS}))
+    late = min(_LATE_CASES, count or _LATE_CASES)
+    listed.append(_half_damper("late forces", late, seed, {**_DRAWN, **_LINKS}, _DELAYED_HZ))
     devices = min(_DEVICE_CASES, count or _DEVICE_CASES)
     by_device = _half_damper("velocity measured by the device", devices, seed, {**light, **_MEASURED})
     fewer = min(_KALMAN_CASES, count or _KALMAN_CASES)
@@ -197,9 +201,11 @@ def _of_liquids(
     yield Group(f"{name}, let go in mid-stroke", evenly_chosen(free, count))
 
 
-def _half_damper(name: str, count: int, seed: str, choices: Mapping[str, tuple[Any, ...]]) -> Group:
+def _half_damper(
+    name: str, count: int, seed: str, choices: Mapping[str, tuple[Any, ...]], rates_hz: Iterable[float] = _RATES_HZ
+) -> Group:
     """Return loops that are held, thrown and released; half of them present the strongest damper."""
-    whole = tuple(_grid(GRIPS, PLANTS, names=lambda: (*liquids(), *[DAMPER] * len(liquids()))))
+    whole = tuple(_grid(GRIPS, PLANTS, rates_hz, names=lambda: (*liquids(), *[DAMPER] * len(liquids()))))
     return Group(name, tuple(_drawn(f"{seed} {name}", evenly_chosen(whole, count), choices)))
 
 
