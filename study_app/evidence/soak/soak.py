@@ -44,7 +44,7 @@ _SLOWEST_MPS: Final = 0.02
 _FASTEST_MPS: Final = 1.0
 
 
-class _RestlessHand(ScriptedDevice):
+class _RandomHand(ScriptedDevice):
     """A hand that draws its next motion from its own random stream."""
 
     def __init__(self, random: Random, *, force_limit_n: float = 8.0) -> None:
@@ -170,7 +170,7 @@ class Soak:
         self.ticks = round(hours * 3600 * self._rate_hz)
         self._draw = Random(seed).random  # noqa: S311 - simulated faults, not secrets
         clock = VirtualClock() if virtual else SystemClock()
-        hand = _RestlessHand(Random(seed + 1))  # noqa: S311
+        hand = _RandomHand(Random(seed + 1))  # noqa: S311
         self.hand = hand
         self.device = FaultyDevice(hand, clock, seed)
         self._longest_wake = max(elements_needed(scene) for scene in self._scenes.values())

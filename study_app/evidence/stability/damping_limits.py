@@ -23,37 +23,37 @@ FREE_HANDLE_KG: Final = 0.1
 _FRICTION_NSPM: Final = 0.5
 
 _UNALTERED_NSPM: Final = 53.0
-"""What is felt as it is at 1 kHz, up to one tick of delay, with "ewma" and "kalman": light oil has a secant of 55 N·s/m
-where it reaches 8 N at scale 10; this takes 4 % of that one force, and with "ewma" is 75 % of what a free handle of
-0.1 kg is stable with."""
+"""Damping that is not limited at 1 kHz and up to one tick of delay, with "ewma" and "kalman". Light oil has a secant of
+55 N·s/m where it reaches 8 N at a scale of 10: the limit removes 4 % of this force only. With "ewma", it is 75 % of the
+greatest stable damping of a free handle of 0.1 kg."""
 _UNALTERED_SHARE: Final = 0.75
-"""Of the boundary that a limit takes there at most, if the filter is another."""
+"""Greatest share of the stable damping under these conditions with another filter."""
 _UNALTERED_INERTIA_SHARE: Final = 0.85
-"""Of this limit, for added mass and history: those of honey are felt as they are, too."""
+"""Share of this limit for added mass and history, so that those of honey are not limited either."""
 _INERTIA_SHARE: Final = 0.3
-"""Of a drag limit, for added mass and history elsewhere."""
+"""Share of a drag limit for added mass and history under other conditions."""
 _SHARE: Final = 0.5
-"""Of the boundary that a limit takes elsewhere: a quadratic law has twice the slope of its secant."""
+"""Share of the stable damping under other conditions: the slope of a quadratic law is twice its secant."""
 _FAST_SHARE: Final = 0.4
-"""The same beyond 1 kHz, where a count of the encoder is a greater speed and the slew limit a steeper force."""
+"""The same above 1 kHz, where an encoder count is a greater speed and the slew limit permits a steeper force."""
 _FAST_NSPM: Final = 40.0
-"""The most there."""
+"""Greatest limit above 1 kHz [N·s/m]."""
 _FAST_KALMAN_NSPM: Final = 22.0
-"""The same with "kalman", which passes on more of a hand that lets go while a wake breaks."""
+"""The same with "kalman", which lets more of a release pass while a wake breaks."""
 _KALMAN_SHARE: Final = 0.64
-"""Of the limits above, with "kalman", up to 1 kHz, but where liquids are felt as they are: at 1, a held one in tar was
-restless at 250 Hz, and one let go swung at 500 Hz, the delay one tick longer than believed; at 0.8, one let go in gear
-oil at scale 40 was restless with 3 ticks of delay."""
+"""Share of the limits above with "kalman", up to 1 kHz, except where forces are not limited. With 1 and a delay one
+tick longer than assumed, a held handle was noisy in tar at 250 Hz, and a released one oscillated at 500 Hz; with 0.8, a
+released handle was noisy in gear oil at a scale of 40 with 3 ticks of delay."""
 _COUNT_N: Final = 0.25
-"""The most that one count of a Falcon's encoder may be felt as [N]."""
+"""The greatest force that one count of a Falcon's encoder may cause [N]."""
 _COUNT_M: Final = 38e-6
 NOMINAL_S: Final = 1e-3
 
 _SWING_MPS: Final = 0.04
-"""A handle that swings slower than this is at rest where the encoder has counts: they alone keep it moving."""
+"""A handle that oscillates more slowly than this counts as at rest if the encoder has counts: they alone move it."""
 
 _THROWN_MPS = 0.02
-_TIRED = 0.05
+_DECAYED = 0.05
 _LASTS_S = 3.0
 _STEP = 1.01
 
@@ -186,4 +186,4 @@ def _comes_to_rest(
     trace = empty_trace(round(_LASTS_S / period_s))
     bench.run(trace, 0, math.inf)
     speeds_mps = np.linalg.norm(trace.velocity_mps[-len(trace) // 10 :], axis=1)
-    return bool(not bench.loop.broken and speeds_mps.max() < (_SWING_MPS if counts else _TIRED * _THROWN_MPS))
+    return bool(not bench.loop.broken and speeds_mps.max() < (_SWING_MPS if counts else _DECAYED * _THROWN_MPS))

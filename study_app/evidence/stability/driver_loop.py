@@ -33,8 +33,8 @@ from study_app.evidence.stability.verdict import (
     not_finite,
     reasons_of,
     swing,
-    undecided,
     windows,
+    with_count_error,
     worst_of,
 )
 from study_app.haptics.kernels import Driver
@@ -103,8 +103,8 @@ def judge_driven(case: Case) -> Verdict:
             if balance_j >= permitted_j:
                 balance_j, permitted_j = -float(np.mean(given_j)), -_BEYOND_SCRIPTED_J - float(np.mean(scripted_j))
     swing_mps = swing(trace, case)
-    controls = [*others, *_undecided_traces(case, trace, dynamics)]
-    restlessness = worst_of(
+    controls = [*others, *_traces_with_count_error(case, trace, dynamics)]
+    fast_force = worst_of(
         [
             compare_fast(trace.sent_n[:ends], [control.sent_n[:ends] for control in controls], case.rate_hz, begins)
             for begins, ends in (np.searchsorted(trace.t_s, window_s) for window_s in windows(case))
@@ -114,7 +114,7 @@ def judge_driven(case: Case) -> Verdict:
         limit=np.linalg.norm(trace.sent_n, axis=1).max() > FORCE_LIMIT_N + _MOTOR_STEP_N,
         energy=lacks or balance_j < permitted_j,
         oscillation=swing_mps > SWING_MPS,
-        restlessness=restlessness,
+        fast_force=fast_force,
     )
     return Verdict(
         case=case,
@@ -123,8 +123,8 @@ def judge_driven(case: Case) -> Verdict:
         balance_j=balance_j,
         permitted_j=permitted_j,
         swing_mps=swing_mps,
-        fast_n=restlessness.fast_n,
-        played_n=restlessness.control_n,
+        fast_n=fast_force.fast_n,
+        played_n=fast_force.control_n,
         acted=acted(trace),
     )
 
@@ -154,7 +154,7 @@ def _scripted_traces(case: Case, dynamics: Dynamics) -> list[Any]:
     return [_trace(case, device, device, dynamics) for device in devices]
 
 
-def _undecided_traces(case: Case, trace: Any, dynamics: Dynamics) -> list[Any]:
+def _traces_with_count_error(case: Case, trace: Any, dynamics: Dynamics) -> list[Any]:
     """Return the traces of the same motion without feedback, one per encoder count, with that count undecided."""
     calm, traces = calm_motion(trace), []
     calm.fresh[:] = calm.measured[:] = 1
@@ -162,7 +162,7 @@ def _undecided_traces(case: Case, trace: Any, dynamics: Dynamics) -> list[Any]:
         count_um = count_m * 1e6
         answer, bench = calm.copy(), Bench(dataclasses.replace(case, quantum_um=count_um), dynamics=dynamics)
         bench.begin()
-        bench.play(answer, undecided(calm.position_m, count_um))
+        bench.play(answer, with_count_error(calm.position_m, count_um))
         traces.append(answer)
     return traces
 

@@ -5,8 +5,8 @@
 - *energy*: the passivity at the handle (force that acts · true step, at most what the liquid can give back) fell below
   -1 mJ and the work of the steps under way, (1 + delay) · strongest force · longest step; or below -10 mJ, if that is
   lower, where the loop is mistaken about the device's delay;
-- *oscillation*: the handle, at rest or let go, goes on swinging above 12 Hz at more than 40 mm/s and does not tire over
-  0.4 s, or does so above 40 Hz while it is being moved;
+- *oscillation*: the handle, at rest or let go, oscillates above 12 Hz at more than 40 mm/s without decaying over 0.4 s,
+  or does so above 40 Hz while it is being moved;
 - *sustained force*: above 40 Hz the force exceeds that of the same motion played without feedback by more than 0.05 N
   RMS in each of four successive intervals of 0.1 s, and by at least 0.8 times as much in the last as in the first; and
   it stays above 0.05 N RMS, without decaying by the same factor, once the encoder becomes exact, which distinguishes an
@@ -16,17 +16,18 @@
 A case with any reason but noise is **unstable**; one with noise alone is **noisy**: its force buzzes for a moment, but
 neither supplies energy nor persists.
 
-Where a study delays the force, the handle works at the bounds of the controller: an encoder count and the noise count
-for the energy, the swing may reach 100 mm/s, and the force a fifth more than that of the motion without feedback.
+Where a study delays the force, the controller works at its limits: the energy may be lower by the work of the strongest
+force over an encoder count and the noise, the oscillation may reach 100 mm/s, and the force may exceed that of the
+motion without feedback by a fifth.
 
-"The same motion without feedback" is the most restless of three: the hand's own as long as it holds the handle, the
-motors off; the handle's, without what is faster than 40 Hz; and the latter with the encoder's last count undecided, as
-where a handle rests between two counts. The last two begin from the same state of the liquid, and samples are lost and
-repeated in the same ticks. A start, a stop and a release excite every frequency: what follows within 0.2 s is left out
-here; the oscillation is what must not outlive it. 0.1 s are left aside because a wake that breaks turns the force from
-one tick to the next, by the model's own definition, and when a hand that swings back makes it break hangs on
-micrometres: what happens once is no restlessness. A hand that shakes a handle makes it break at every reversal, with
-the motors off, too: hence the first of the three, also for a hand that lets go later.
+"The same motion without feedback" is the one of three with the strongest force above 40 Hz: the hand's own motion with
+the motors off, for as long as it holds the handle; the handle's motion without its part above 40 Hz; and the latter
+with an error of up to half an encoder count, as of a handle that rests between two counts. The last two begin from the
+same state of the liquid, and samples are lost and repeated in the same ticks. A start, a stop and a release excite
+every frequency, so the first 0.2 s after them are excluded: an oscillation lasts longer. The strongest 0.1 s are
+excluded because a wake that breaks changes the force from one tick to the next, as the model defines it, and a few
+micrometres decide whether it breaks when a hand reverses. A hand that shakes a handle makes the wake break at every
+reversal, with the motors off, too; so the first of the three also applies to a hand that lets go later.
 """
 
 import itertools
@@ -71,12 +72,12 @@ SWING_MPS: Final = 0.04
 _LATE_SWING_MPS: Final = 0.1
 """The same of a force that a study delays: 1 mJ, which the controller tolerates, moves 0.2 kg at this speed."""
 _LATE_SHARE: Final = 0.2
-"""Such a force is restless beyond this share of the one without feedback: jitter and loss make steps of its size."""
-_ONCE_S: Final = 0.1
+"""Permitted excess of such a force, as a share of the one without feedback: jitter and loss make steps of its size."""
+_INTERVAL_S: Final = 0.1
 _SUSTAINED: Final = 4
-"""Number of successive intervals of `_ONCE_S` in which a sustained force exceeds its limit."""
-_TIRED: Final = 0.8
-_RESTLESS_N: Final = 0.05
+"""Number of successive intervals of `_INTERVAL_S` in which a sustained force exceeds its limit."""
+_DECAY: Final = 0.8
+_PERMITTED_EXCESS_N: Final = 0.05
 _SPREAD_S: Final = math.sqrt(math.log(2.0)) / (2.0 * math.pi * _FAST_HZ)  # a Gaussian mean that halves 40 Hz's power
 
 
@@ -104,7 +105,7 @@ class Verdict:
         return NOISY if self.reasons == (_NOISE,) else UNSTABLE
 
 
-class Restlessness(NamedTuple):
+class FastForce(NamedTuple):
     """The force above 40 Hz [N RMS], that of the control, and whether the excess is beyond its limit and sustained."""
 
     fast_n: float
@@ -128,10 +129,10 @@ def not_finite(case: Case, trace: Any, *, safe: bool) -> Verdict:
     )
 
 
-def reasons_of(*, limit: bool, energy: bool, oscillation: bool, restlessness: Restlessness) -> tuple[str, ...]:
+def reasons_of(*, limit: bool, energy: bool, oscillation: bool, fast_force: FastForce) -> tuple[str, ...]:
     """Return the names of the reasons that apply to a finite trace."""
-    noise = restlessness.excessive and not restlessness.sustained
-    applies = (False, limit, energy, oscillation, restlessness.sustained, noise)
+    noise = fast_force.excessive and not fast_force.sustained
+    applies = (False, limit, energy, oscillation, fast_force.sustained, noise)
     return tuple(itertools.compress(REASONS, applies))
 
 
@@ -159,15 +160,15 @@ def judge(case: Case, *, safe: bool, limits: DampingLimits | None = None) -> Ver
     if case.misjudged:
         permitted_j = min(permitted_j, -MISJUDGED_ALLOWANCE_J)
     swing_mps = swing(trace, case)
-    restlessness = _restlessness(case, trace, before, limits, late_share=_LATE_SHARE if linked else 0.0)
-    if restlessness.sustained:
+    fast_force = _fast_force_excess(case, trace, before, limits, late_share=_LATE_SHARE if linked else 0.0)
+    if fast_force.sustained:
         lasts = any(_outlasts_noise(case, trace, *each) for each in zip(windows(case), before, strict=True))
-        restlessness = restlessness._replace(sustained=lasts)
+        fast_force = fast_force._replace(sustained=lasts)
     reasons = reasons_of(
         limit=safe and np.linalg.norm(trace.sent_n, axis=1).max() > FORCE_LIMIT_N * (1.0 + 1e-9),
         energy=balance_j < permitted_j,
         oscillation=swing_mps > (_LATE_SWING_MPS if linked else SWING_MPS),
-        restlessness=restlessness,
+        fast_force=fast_force,
     )
     return Verdict(
         case=case,
@@ -176,8 +177,8 @@ def judge(case: Case, *, safe: bool, limits: DampingLimits | None = None) -> Ver
         balance_j=balance_j,
         permitted_j=permitted_j,
         swing_mps=swing_mps,
-        fast_n=restlessness.fast_n,
-        played_n=restlessness.control_n,
+        fast_n=fast_force.fast_n,
+        played_n=fast_force.control_n,
         acted=acted(trace),
     )
 
@@ -212,12 +213,12 @@ def _swing_between(trace: Any, case: Case, corner_hz: float, times_s: Any) -> fl
     swings = [
         fast_part(trace.velocity_mps, case.rate_hz, corner_hz, first, last) for first, last in itertools.pairwise(rows)
     ]
-    return min(swings) if swings[-1] > _TIRED * swings[0] else 0.0
+    return min(swings) if swings[-1] > _DECAY * swings[0] else 0.0
 
 
-def _restlessness(
+def _fast_force_excess(
     case: Case, trace: Any, before: list[tuple[int, Bench]], limits: DampingLimits | None, *, late_share: float
-) -> Restlessness:
+) -> FastForce:
     """Compare the force's fast part with that of the same motion without feedback, where they differ most."""
     calm = calm_motion(trace)
     passive = _passive(case, bool(before[0][1].loop.safe), limits)
@@ -225,7 +226,7 @@ def _restlessness(
     for window_s, (first, bench) in zip(windows(case), before, strict=True):
         begins, ends = np.searchsorted(trace.t_s, window_s)
         played = [passive] if passive is not None and len(passive) >= ends else []
-        for places_m in (calm.position_m, undecided(calm.position_m, case.quantum_um)):
+        for places_m in (calm.position_m, with_count_error(calm.position_m, case.quantum_um)):
             again, answer = bench.copy(), calm.copy()
             answer.sent_n[:first] = 0.0
             again.play(answer[first:ends], places_m[first:ends])
@@ -241,10 +242,10 @@ def _outlasts_noise(case: Case, trace: Any, window_s: tuple[float, float], begun
     middle = bench.run(again, begun[0], 0.5 * sum(window_s))
     bench.handle.quantum_m = bench.loop.noise_m = bench.loop.outliers = 0.0
     ends = bench.run(again, middle, window_s[1])
-    interval = round(_ONCE_S * case.rate_hz)
+    interval = round(_INTERVAL_S * case.rate_hz)
     rows = range(middle + interval, ends + 1, interval)
     parts_n = [fast_part(again.sent_n, case.rate_hz, _FAST_HZ, *each) for each in itertools.pairwise(rows)]
-    return not parts_n or (min(parts_n) > _RESTLESS_N and parts_n[-1] >= _TIRED * parts_n[0])
+    return not parts_n or (min(parts_n) > _PERMITTED_EXCESS_N and parts_n[-1] >= _DECAY * parts_n[0])
 
 
 def calm_motion(trace: Any) -> Any:
@@ -255,14 +256,14 @@ def calm_motion(trace: Any) -> Any:
     return calm
 
 
-def undecided(position_m: Any, count_um: float) -> Any:
+def with_count_error(position_m: Any, count_um: float) -> Any:
     """Return positions (rows, 3) [m] with an error of up to half an encoder count, as between two counts."""
     return position_m + count_um * 1e-6 * (np.random.default_rng(1).random(position_m.shape) - 0.5)
 
 
 def compare_fast(
     force_n: Any, controls_n: Sequence[Any], rate_hz: float, first: int, *, late_share: float = 0.0
-) -> Restlessness:
+) -> FastForce:
     """Compare the fast part of a force (rows, 3) [N] with the greatest of its controls, from row ``first`` onwards.
 
     The permitted excess is 0.05 N, or ``late_share`` of the control if that is more. Controls may have fewer rows.
@@ -274,14 +275,14 @@ def compare_fast(
         )
         return fast_n, max(calm_n)
 
-    fast_n, control_n = measure(first, len(force_n), _ONCE_S)
-    rows = range(first, len(force_n) + 1, round(_ONCE_S * rate_hz))
+    fast_n, control_n = measure(first, len(force_n), _INTERVAL_S)
+    rows = range(first, len(force_n) + 1, round(_INTERVAL_S * rate_hz))
     pairs_n = np.array([measure(*interval) for interval in itertools.pairwise(rows)]).reshape(-1, 2)
-    permitted_n = np.maximum(_RESTLESS_N, late_share * pairs_n[:, 1])
-    return Restlessness(
+    permitted_n = np.maximum(_PERMITTED_EXCESS_N, late_share * pairs_n[:, 1])
+    return FastForce(
         fast_n=fast_n,
         control_n=control_n,
-        excessive=fast_n - control_n > max(_RESTLESS_N, late_share * control_n),
+        excessive=fast_n - control_n > max(_PERMITTED_EXCESS_N, late_share * control_n),
         sustained=_is_sustained(pairs_n[:, 0] - pairs_n[:, 1], permitted_n),
     )
 
@@ -291,12 +292,12 @@ def _is_sustained(excesses_n: Any, permitted_n: Any) -> bool:
     beyond = excesses_n > permitted_n
     last = len(beyond) - _SUSTAINED + 1
     return any(
-        beyond[k : k + _SUSTAINED].all() and excesses_n[k + _SUSTAINED - 1] >= _TIRED * excesses_n[k]
+        beyond[k : k + _SUSTAINED].all() and excesses_n[k + _SUSTAINED - 1] >= _DECAY * excesses_n[k]
         for k in range(last)
     )
 
 
-def worst_of(compared: Sequence[Restlessness]) -> Restlessness:
+def worst_of(compared: Sequence[FastForce]) -> FastForce:
     """Return the greatest excess; it is sustained if any is."""
     worst = max(compared, key=lambda each: each.fast_n - each.control_n)
     return worst._replace(sustained=any(each.sustained for each in compared))
