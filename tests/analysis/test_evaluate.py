@@ -2,29 +2,32 @@
 
 import json
 import random
-from dataclasses import replace
+from dataclasses import astuple, fields, replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from scipy.stats import binom
 
 from study_app.analysis import results
 from study_app.analysis.data.blocks import Block, Decided, Item, Setting
 from study_app.analysis.data.study_tables import load_study
-from study_app.analysis.evaluate import evaluate
+from study_app.analysis.evaluate import _delivery_check, evaluate
 from study_app.analysis.findings.delays import ContrastsWithControl
 from study_app.analysis.findings.finding import MANY, corrected_tests, of_tables
 from study_app.analysis.findings.recognition import LiquidRecognition
 from study_app.analysis.findings.statement_tests import DelayTrend, Pairs, SettingsDiffer, pairs_of
 from study_app.analysis.report.write_report import as_json_types
-from study_app.analysis.results import BlockResult, Results
+from study_app.analysis.results import BlockResult, Delivered, Results
 from study_app.analysis.statistics.outcome import DRAWS, false_discovery, holm
 from study_app.analysis.statistics.rank_tests import friedman, paired
 from study_app.protocol.load import parse
 from study_app.protocol.source.files import source_bytes
 from tests.analysis.conftest import Answer, make_results, twelve
 from tests.analysis.conftest import Results as Folder
+from tests.analysis.made_up import delays as of_delays
+from tests.analysis.made_up import everybody, study
 
 pytestmark = pytest.mark.slow
 
@@ -148,6 +151,28 @@ def test_equal_answers_are_no_variation_and_no_evidence(rek: Folder, level: int)
     assert {one.found.verdict for one in ContrastsWithControl.of(delays)} == {"equivalent"}  # none of seventeen moved
     assert LiquidRecognition.of(liquids) is not None
     assert LiquidRecognition.of(liquids).found.undecided == 51
+
+
+def test_trials_judged_and_valid_and_errors_of_the_delay_are_counted_by_setting_or_over_all_while_sealed() -> None:
+    """The last trial of D1 is excluded; one of its others was not judged, and one of the judged is not valid."""
+    made = study(of_delays([40, 10.5]), list(everybody(of_delays([40, 10.5]), 6, lambda *_: 4)))
+    trials = made.trials.sort_values("code", kind="stable").assign(
+        valid=pd.array([True, None, False, True, True, True, None, True, False, None, None, True], "boolean"),
+        delay_error_mean_ms=[1.0, -4.0, None, 2.0, 3.0, 90.0, None, 0.5, 0.25, 6.0, None, 1.25],
+        counted=np.arange(12) != 5,
+    )
+
+    def delivered(settings: tuple[Setting, ...]) -> list[tuple[object, ...]]:
+        opened = replace(made, trials=trials, blocks=(replace(made.blocks[0], settings=settings),))
+        return [astuple(row) for row in _delivery_check(opened)]
+
+    names = "block code delay_ms trials measured judged valid error_mean_ms error_worst_ms achieved_ms"
+    assert [field.name for field in fields(Delivered)] == names.split()
+    assert delivered(made.blocks[0].settings) == [
+        ("b", "D2", 10.5, 6, 4, 3, 2, 2.0, 6.0, 12.5), ("b", "D1", 40.0, 5, 4, 4, 3, 0.5, -4.0, 40.5),
+    ]  # fmt: skip
+    sealed = Setting(code="D1"), Setting(code="D2")
+    assert delivered(sealed) == [("b", None, None, 11, 8, 7, 5, 1.25, 6.0, None)]
 
 
 def test_missing_answers_drop_the_participant_and_are_never_neutral(rek: Folder) -> None:

@@ -75,3 +75,30 @@ def test_validation_prints_each_finished_part_and_its_progress_every_20_s(monkey
     ran = CliRunner().invoke(commands, words, catch_exceptions=False)
     assert ran.stderr.splitlines() == [f"{at_s} s: ('viscosityjnd', 11, (3, 5))" for at_s in (1, 5, 6, 21)]
     assert ran.stdout.startswith("11 studies for each protocol and seed (3, 5), in 21 s, ")
+
+
+def test_validating_the_report_prints_the_studies_every_20_s_and_each_continued_rate(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    clock = SimpleNamespace(now_s=0.0, perf_counter=lambda: clock.now_s)
+    batches = (3, False), (21, True), (22, True), (40, False), (43, False)
+
+    def measured(simulation, studies, _executor, *, seed, progress):  # type: ignore[no-untyped-def]
+        for number, (clock.now_s, continued) in enumerate(batches, start=1):
+            if continued:
+                progress(f"{simulation}, {studies} studies, seed {seed}")
+            yield 10 * number, ()
+
+    monkeypatch.setattr("study_app.cli.evidence.time", clock)
+    monkeypatch.setattr("study_app.session.simulated.rehearsal.condition_features", lambda _, *, seed: f"felt {seed}")
+    monkeypatch.setattr(
+        "study_app.analysis.planning.simulated_studies.plan", lambda of, felt: f"{of.study.name} {felt}"
+    )
+    monkeypatch.setattr("study_app.evidence.report_rates.measure_report_rates", measured)
+    words = ["validate-report", "--studies", "17", "--seed", "3", "--workers", "1"]
+    ran = CliRunner().invoke(commands, words, catch_exceptions=False)
+    continued = "rek2024 felt 3, 17 studies, seed 3"
+    told = [(0, "rehearsing every condition"), (21, continued), (21, "20 studies"), (22, continued), (43, "50 studies")]
+    assert ran.stderr.splitlines() == [f"{at_s} s: {text}" for at_s, text in told]
+    assert ran.stdout.startswith("50 studies in 43 s\n")
+    assert "no rate was computed" in ran.stdout

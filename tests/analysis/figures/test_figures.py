@@ -1,6 +1,10 @@
+import base64
+import math
+import struct
 from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -9,12 +13,14 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 from study_app import figure_style as style
+from study_app.analysis import html_page, page_layout
 from study_app.analysis.data.blocks import Block
 from study_app.analysis.data.study_tables import Study, load_study
 from study_app.analysis.figures import answer_figures
-from study_app.analysis.page_layout import Look, study_marks
+from study_app.analysis.page_layout import SMALL, Look, Picture, study_marks
 from study_app.analysis.report import study_figures
 from study_app.errors import AnalysisError
+from tests.analysis import made_up
 from tests.analysis.conftest import HIDDEN, Results, twelve
 
 pytestmark = pytest.mark.slow
@@ -111,6 +117,47 @@ def shown(figure: Figure) -> list[Text]:
     return [text for text in figure.findobj(Text) if text.get_text().strip() and text.get_visible()]
 
 
+@pytest.mark.parametrize("beside", [False, True])
+def test_a_png_is_shown_at_two_fifths_of_its_width_with_its_caption(beside: bool) -> None:
+    png = b"\x89PNG\r\n\x1a\n" + struct.pack(">I4sII", 13, b"IHDR", 500, 300)
+    shown = html_page.picture(Picture(block="b", name="f", caption="Is <it> so?", files={"png": png}), beside=beside)
+    caption = "" if beside else '<figcaption class="soft">Is &lt;it&gt; so?</figcaption>'
+    assert shown == (
+        '<figure><img width="200" alt="Is &lt;it&gt; so?" src="data:image/png;base64,'
+        f'{base64.b64encode(png).decode()}">{caption}</figure>'
+    )
+
+
+def test_an_svg_has_the_colours_of_the_page_and_its_size() -> None:
+    """A figure of 210 pt has 1.9 pixels for a point and fills half of the width beside an answer."""
+    svg = (
+        '<?xml version="1.0"?><svg width="210pt" height="90pt" viewBox="0 0 210 90" id="a"><metadata>M</metadata>'
+        f'<g fill="{style.ACCENT}" stroke="#FFFFFF"/><text fill="{style.TEXT}">t</text>'
+        f'<text fill="#ffffff">{style.TEXT}</text></svg>'
+    )
+    one = Picture(block="b", name="f", caption='A "b"', files={"svg": svg.encode()})
+    assert html_page.picture(one, beside=True) == (
+        '<figure><svg role="img" aria-label="A &#34;b&#34;" style="width: 399px; --share: 50%; --least: '
+        f'{math.ceil(11 / SMALL * 210)}px" viewBox="0 0 210 90" id="a">'
+        '<g fill="var(--accent)" stroke="var(--paper)"/><text fill="var(--text)">t</text>'
+        f'<text fill="#ffffff">{style.TEXT}</text></svg></figure>'
+    )
+
+
+def test_a_picture_has_its_own_title_participants_and_files(monkeypatch: pytest.MonkeyPatch) -> None:
+    made = replace(made_up.study(made_up.liquids(1), [(who, 1, "L1", (4, 4)) for who in "ABC"]), name="oils")
+    monkeypatch.setattr(style, "file_bytes", lambda *given: given)
+
+    def draw(look: Look) -> Any:
+        return SimpleNamespace(figure=look)
+
+    for counts, told in ((None, ("three participants",)), (["n = 2"], ["n = 2"])):
+        drawn = page_layout.picture_of(made, "b", "file", "Title", "Caption.", draw, ("svg", "pdf"), counts, "1")
+        look = Look("Title", study_marks(made), told, style.fonts())
+        files: Any = {form: (look, form, "oils: Title") for form in ("svg", "pdf")}
+        assert drawn == Picture(block="b", name="file", caption="Caption.", files=files, title="Title", numbers="1")
+
+
 def test_measures_of_reaches_have_a_scale_each() -> None:
     values = np.array([[0.8, 0.9, 1.0], [0.85, np.nan, 1.1]])
     look = Look("Motion", [], ["n = 2"], style.FALLBACK_FONTS)
@@ -121,8 +168,6 @@ def test_measures_of_reaches_have_a_scale_each() -> None:
     gids = {str(line.get_gid()): line for line in first.lines}
     assert np.asarray(gids["item1-participant1"].get_ydata()).tolist() == [0.8, 0.9, 1.0]
     assert np.asarray(gids["item1-median"].get_ydata()).tolist() == pytest.approx([0.825, 0.9, 1.05])
-    low, high = first.get_ylim()
-    assert low < 0.8
-    assert high > 1.1
+    assert first.get_ylim() == pytest.approx((0.8 - 0.08 * 0.3, 1.1 + 0.08 * 0.3))
     assert [tick.get_text() for tick in second.get_yticklabels()] == ["1"]
     assert second.get_ylim() == (0.5, 1.5)

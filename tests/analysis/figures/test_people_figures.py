@@ -1,6 +1,7 @@
 """Figures of people: every number is a point, means stand beside them, and no text covers another."""
 
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from itertools import combinations
 from typing import Any
 
@@ -11,9 +12,10 @@ from matplotlib.lines import Line2D
 from matplotlib.text import Text
 
 from study_app import figure_style as style
-from study_app.analysis.figures import answer_figures
+from study_app.analysis.figures import answer_figures, people_figures
 from study_app.analysis.figures.people_figures import Column, Mean, Panel, draw_people, mean_of, numbers_of_panels
 from study_app.analysis.page_layout import POINT, Look
+from study_app.protocol.participants import EACH_GROUP
 from tests.analysis.made_up import liquids, study
 
 pytestmark = pytest.mark.slow
@@ -116,6 +118,37 @@ def test_groups_are_side_by_side_with_the_mean_of_their_own_participants(log: bo
     xs = {person: points[f"person-{person}"].get_xdata() for person in MEMBERS}
     for column in (0, 1):
         assert max(xs[person][column] for person in "AB") < min(xs[person][column] for person in "CDE")
+
+
+@pytest.mark.parametrize(
+    ("split", "means", "legend"), [("", 0, {*GROUPS}), (EACH_GROUP, 4, {*GROUPS}), ("novices", 4, set())]
+)
+def test_a_picture_has_its_titles_at_their_places_and_the_groups_of_its_own_participants(
+    split: str, means: int, legend: set[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A third group has nobody in the panels."""
+    made = study(liquids(1), [(person, 1, "L1", (4, 4)) for person in "ABCDEF"])
+    people = made.participants.assign(group=[*MEMBERS.values(), "others"])
+    made = replace(made, participants=people, split=split)
+    monkeypatch.setattr(people_figures, "picture_of", lambda *given: given)
+    values = {"Thin": RATIOS, "Thick": dict(list(RATIOS.items())[:4])}
+    panels = [Panel(columns=tuple(Column(name=name, values=own) for name, own in values.items()), level=0.9)]
+    shown: Any = people_figures.people_picture(
+        made, "b", "file", "Title", "Caption.", panels, ("svg",), above="Points", below="Liquid"
+    )
+    of_study, *words, draw, forms, counts, numbers = shown
+    assert of_study is made
+    assert (*words[:3], forms, counts) == ("b", "file", "Title", ("svg",), ("n = 5",))
+    told = " Diamonds show group means with 90 % confidence intervals (Student's t)."
+    assert words[3] == f"Caption.{told if split else ''}"
+    assert [line.split("	")[:2] for line in numbers.splitlines()[1:6]] == [[*member] for member in MEMBERS.items()]
+    figure = draw(LOOK).figure
+    figure.canvas.draw()
+    (axes,) = figure.axes
+    assert sum(line.get_gid() == "mean" for line in axes.lines) == means
+    texts = {text.get_text(): text.get_window_extent() for text in figure.texts}
+    assert texts["Points"].y0 > axes.bbox.y1 > axes.bbox.y0 > texts["Liquid"].y1
+    assert {*GROUPS, "others"} & {*texts} == legend
 
 
 def test_numbers_of_groups_name_the_group_of_each_participant_and_mean() -> None:

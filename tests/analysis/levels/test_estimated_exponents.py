@@ -1,13 +1,15 @@
 """Exponents of magnitude estimation: slopes of mean ln answers on ln levels, in report, table and R."""
 
 import math
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
 from scipy import stats
 
-from study_app.analysis.levels.exponents import estimated_exponents, weber_exponents
+from study_app.analysis.levels.exponents import Exponents, estimated_exponents, weber_exponents
 from study_app.analysis.levels.thresholds import ThresholdEstimate
 from tests.analysis.levels.level_studies import block
 
@@ -66,3 +68,11 @@ def test_planted_exponents_are_found_for_fractions_and_for_differences(weber: bo
     assert (group.participant, group.n, group.exponent) == (None, 3, pytest.approx(0.6))
     low, high = stats.ttest_1samp([1.0, 0.0, 0.8], 0.0).confidence_interval(0.95)
     assert (group.low, group.high) == pytest.approx((low, high))
+
+
+@pytest.mark.parametrize(
+    ("summary", "heading"), [("geometric mean", "Exponent of the power law"), ("share", "Weber exponent")]
+)
+def test_the_heading_names_the_law_of_the_exponents(summary: str, heading: str) -> None:
+    found: Any = SimpleNamespace(summary=summary, statistics={})
+    assert Exponents(found).heading() == heading

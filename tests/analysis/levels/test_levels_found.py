@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from study_app.analysis.data.blocks import LevelBlock, Setting
-from study_app.analysis.levels import thresholds
+from study_app.analysis.levels import conduct, thresholds
 from study_app.analysis.levels.answers import Answers
 from study_app.analysis.levels.evaluate import level_results
 from study_app.protocol.trials.designs import Rated
@@ -109,6 +109,28 @@ def test_answers_to_levels_are_counted_by_hand() -> None:
                 middle = np.exp(np.log(values).mean()) if result.block == "estimation" else values.mean()
                 assert row.value == pytest.approx(middle), row
             assert row.low is None or row.low <= row.value <= row.high, row
+
+
+@pytest.mark.parametrize("most", [0.2, None])
+def test_incorrect_answers_to_catch_trials_are_counted_by_session(most: float | None) -> None:
+    """Other blocks, other trials and trials without an answer do not count."""
+    given = {("P001", 1): "xx+", ("P001", 2): "+x++", ("P002", 1): "x"}
+    found = [
+        (*visit, block, catch, {"x": False, "+": True}.get(mark))
+        for visit, marks in given.items()
+        for block, catch, answers in (
+            ("b", True, f"{marks}-"),
+            ("b", False, "xxx"),
+            ("b", None, "x"),
+            ("c", True, "xx"),
+        )
+        for mark in answers
+    ]
+    frame = pd.DataFrame(found, columns=["participant", "session", "block", "catch", "right"])
+    opened = frame.astype(dict.fromkeys(("catch", "right"), "boolean"))
+    counted = [] if most is None else [("P001", 1, 3, 2, most), ("P001", 2, 4, 1, most), ("P002", 1, 1, 1, most)]
+    rows = conduct._catch_answers(replace(BLOCKS["forced choice"], wrong_most=most), opened)
+    assert [tuple(row.values()) for row in rows] == counted
 
 
 def test_the_mean_of_reversals_is_that_of_the_tracks_in_the_coordinate_of_the_stimulus(

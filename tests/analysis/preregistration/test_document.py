@@ -5,7 +5,13 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from study_app.analysis.planning.preregistration import FILE, commitment, preregistration, read_commitment
+from study_app.analysis.planning.preregistration import (
+    FILE,
+    _of_intervals,
+    commitment,
+    preregistration,
+    read_commitment,
+)
 from study_app.analysis.planning.threshold_studies import BATCH, threshold_markdown
 from study_app.cli import commands
 from study_app.protocol.load import load, parse
@@ -65,6 +71,16 @@ def test_a_study_of_thresholds_states_levels_sample_size_and_catch_rule() -> Non
     assert "the trial is repeated, for up to 3 presentations in total" in text
     assert "Hartung–Knapp 95 % interval if there are at least 3 participants" in text
     assert "Power was not computed" not in preregistration(load("thickness"), "0" * 64)
+
+
+@pytest.mark.parametrize(
+    ("standards", "at"), [("[1]", "1 Pa·s"), ("[1, 2]", "1 and 2 Pa·s"), ("[1, 4, 2]", "1, 4 and 2 Pa·s")]
+)
+def test_the_exponent_is_asked_for_with_two_standards_or_more(standards: str, at: str) -> None:
+    protocol = study(("standards = [1, 2]", f"standards = {standards}"))
+    asked = list(_of_intervals(protocol, protocol.blocks["viscosity"]))
+    assert asked[0].startswith(f"Block “Viscosity”: what is the Weber fraction for viscosity at {at}? ")
+    assert ["proportional to the standard" in question for question in asked[1:]] == [True] * (at != "1 Pa·s")
 
 
 def test_a_study_of_ratings_states_d_a_and_how_precise_it_is_expected_to_be() -> None:

@@ -6,11 +6,13 @@ import shutil
 from collections import Counter
 from pathlib import Path
 
+import pandas as pd
 import pytest
 
 from study_app.analysis.data.study_tables import Study, load_study
 from study_app.analysis.evaluate import evaluate
 from study_app.analysis.export.tables import wide_table
+from study_app.analysis.questions import counts_of_missing
 from study_app.analysis.report.write_report import report
 from study_app.protocol.load import load
 from study_app.protocol.warnings.study_warnings import warnings
@@ -39,6 +41,19 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def study(folder: Path) -> Study:
     return load_study(folder)
+
+
+def test_only_the_scale_of_an_answer_has_ends(study: Study) -> None:
+    asked = {question.id: question for question in study.others.questions}
+    ends = {"age": None, "since": None, "comment": None, "thickness": (1, 5), "pleasant": (0, 100), "effort": (0, 100)}
+    assert {name: asked[name].scale_ends for name in ends} == ends
+    assert asked["age"].bounds == (16, 99)
+
+
+def test_answers_that_are_given_missing_and_off_the_scale_are_counted() -> None:
+    frame = pd.DataFrame({"participant": [*"AABBACCC"], "response": [*"7152", *[None] * 4]})
+    given = counts_of_missing(frame.assign(cannot_judge=[False] * 4 + [True] + [False] * 3))
+    assert given == {"n": 4, "participants": 2, "cannot_judge": 1, "missing": 3}
 
 
 def test_order_is_reproduced_where_answers_hid_questions(tmp_path: Path) -> None:
@@ -144,12 +159,18 @@ def test_blocks_that_share_a_title_are_told_apart(tmp_path: Path) -> None:
     report(folder, tmp_path / "report", failed=pytest.fail)
     content = json.loads((tmp_path / "report" / "report.json").read_bytes())
     (score,) = (score for score in content["results"]["scores"] if score["where"] == "load")
-    means = {group["name"]: format(group["numbers"]["mean"], "#.3g") for group in score["groups"]}
-    assert list(means) == ["After Stir (stir)", "After Stir (again)"]
+    of_groups = {group["name"]: group["numbers"]["mean"] for group in score["groups"]}
+    assert list(of_groups) == ["After Stir (stir)", "After Stir (again)"]
+    means = {name: format(mean, "#.3g") for name, mean in of_groups.items()}
     page = (tmp_path / "report" / "report.html").read_text(encoding="utf-8").replace("\u00a0", " ")
     for name, mean in means.items():
         assert re.search(rf"score was [^.]*{re.escape(mean)}\b.* {re.escape(name.replace('After', 'after'))}", page)
-    assert "The mean difference (after Stir (stir) − after Stir (again)) was" in page
+    (difference,) = re.findall(r"difference \(after Stir \(stir\) − after Stir \(again\)\) was (\S+) \[", page)
+    first, second = of_groups.values()
+    assert float(difference.replace("−", "-")) == pytest.approx(first - second, rel=5e-3)
+    asked = [f"question-{question['where']}-{question['item']}.png" for question in content["results"]["questions"]]
+    assert len(asked) == 8, "two after each trial and those of the NASA-TLX"
+    assert sorted(asked) == sorted(path.name for path in (tmp_path / "report").glob("question-*.png"))
 
 
 @pytest.mark.parametrize("order", ["balanced", "random"])

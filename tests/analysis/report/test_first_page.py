@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 from scipy.stats import binom
 
-from study_app.analysis.data.blocks import Block, Decided, Item, LevelBlock, Setting
+from study_app.analysis.data.blocks import AFTER, Block, Decided, Item, LevelBlock, Setting
 from study_app.analysis.evaluate import evaluate, evaluate_block
 from study_app.analysis.figures.summary_figures import Numbers
 from study_app.analysis.findings.delays import ContrastsWithControl, DetectionThreshold, Lowest, LowestDelay
@@ -237,6 +237,37 @@ def test_a_form_has_a_card_only_if_it_says_more_than_a_hypothesis(blocks: str, p
     assert len(made) == n
     if blocks == "ab" and made:
         assert "after a (60 ms of visual delay) and 30.0 [" in made[0].sentences[0]
+
+
+@pytest.mark.parametrize(
+    ("numbers", "words"),
+    [
+        (
+            Numbers("Age", None, False, (("", {"P1": 20.0, "P2": 31.0, "P3": 24.0}),)),
+            "The mean of “Age” was 25.0 (SD 5.57, range 20 to 31, n = 3).",
+        ),
+        (Numbers("Age", None, False, (("", {"P1": 20.0}),)), "The mean of “Age” was 20.0 (range 20 to 20, n = 1)."),
+        (
+            Numbers("SUS", None, True, (("", {"P1": 2.0, "P2": 6.0}),)),
+            "The mean SUS score was 4.00 [−21.4, 29.4] (95 % confidence interval, n = 2).",
+        ),
+        (
+            Numbers("Warm", (1.0, 7.0), False, (("Water", {"P1": 2.0, "P2": 6.0, "P3": 4.0}), ("Oil", {"P1": 1.0}))),
+            "The mean of “Warm” was 4.00 [−0.97, 8.97] for water and 1.00 for oil on a scale from 1 to 7 (95 % "
+            "confidence intervals, n = 3).",
+        ),
+        (
+            Numbers("Raw", (1.0, 7.0), True, ((f"{AFTER}Oil", {"P1": 2.0, "P2": 6.0}), ("Wax", {"P2": 3, "P1": 1}))),
+            "The mean Raw score was 4.00 [−21.4, 29.4] after Oil and 2.00 [−10.7, 14.7] for wax on a scale from 1 to 7 "
+            "(95 % confidence intervals, n = 2). The mean difference (after Oil − wax) was 2.00 [−10.7, 14.7].",
+        ),
+    ],
+)  # fmt: skip
+def test_numbers_are_told_with_the_mean_of_each_setting_and_the_mean_difference_of_two(
+    numbers: Numbers, words: str
+) -> None:
+    """Student's t(1) is 12.706 and t(2) 4.303; the standard errors are 2 or 1, and 2 / √3."""
+    assert pages._number_words(numbers) == words
 
 
 def test_all_limits_are_shown_by_subject() -> None:

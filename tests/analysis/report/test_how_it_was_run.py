@@ -141,9 +141,6 @@ def groups() -> Iterator[str]:
 
 def methods_of_a_study() -> Iterator[str]:
     base = replace(LIQUIDS, title="Oils", estimator="kalman")
-    people = base.participants.assign(protocol_version=["1.2", "1.1", "1.1"], protocol_hash=["h", "i", "k"])
-    for shown in (base.participants, people, people.assign(counted=[False, True, True])):
-        yield methods.version_words(replace(base, participants=shown))
     scene = {"scale": 4.0, "body": {"diameter_m": 0.068}}
     device = replace(base, protocol={"device": {"rate_hz": 2000.0, "force_limit_n": 3.5}, "scene": scene})
     used = base.participants.assign(device=["falcon:2", "mouse", None])
@@ -339,3 +336,19 @@ PARTS = (
 def test_each_sentence_and_table_has_its_own_values() -> None:
     lines = (line for part in PARTS for line in (f"== {part.__name__}", *part()))
     check_kept(Path(__file__).with_name("how_it_was_run.txt"), lines)
+
+
+@pytest.mark.parametrize(
+    ("versions", "files", "counted", "words"),
+    [
+        (["1.1"] * 3, "hhh", [True] * 3, "version 1.1"),
+        (["1.2", "1.1", "1.1"], "hik", [False, True, True], "version 1.1, from 2 different files"),
+        (["1.2", "1.1", "1.1"], "hii", [True] * 3, "versions 1.1 and 1.2, pooled"),
+        (["1.2", "1.1", "1.1"], "hik", [True] * 3, "versions 1.1 and 1.2, pooled, from 3 different files"),
+    ],
+)
+def test_versions_are_those_of_the_included_sessions(
+    versions: list[str], files: str, counted: list[bool], words: str
+) -> None:
+    people = LIQUIDS.participants.assign(protocol_version=versions, protocol_hash=[*files], counted=counted)
+    assert methods.version_words(replace(LIQUIDS, participants=people)) == words

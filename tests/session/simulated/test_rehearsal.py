@@ -140,6 +140,30 @@ def test_a_setting_begins_with_large_steps_and_ends_after_it_was_crossed_in_smal
     assert made == steps
 
 
+@pytest.mark.parametrize("own", [None, np.int64(-3)])
+@pytest.mark.parametrize(("interval", "felt"), [(None, ("now",)), (1, ("now",)), (2, ("first", "now"))])
+def test_a_setting_is_adjusted_by_an_own_observer_or_from_what_is_sensed_now_and_in_its_own_trial(
+    own: Any, interval: int | None, felt: tuple[str, ...]
+) -> None:
+    page: Any = SimpleNamespace(trial=7, interval=interval and SimpleNamespace(number=interval))
+    asked = list[Any]()
+    session: Any = SimpleNamespace(
+        _features_of={6: ("other",), 7: ("first",)},
+        _answer=lambda question: asked.append(question) or own,
+        _comparison_of=lambda trial: SimpleNamespace(sensed=lambda features: f"{trial} {features}"),
+        _reference_magnitude=lambda trial, sensed: f"{trial} reference, {sensed}",
+    )
+    setting: Any = SimpleNamespace(
+        senses=SimpleNamespace(features=lambda: "now"), observer=SimpleNamespace(steps=lambda *magnitudes: magnitudes)
+    )
+    steps: Any = RehearsedSession._steps
+    simulated = "7 now", "7 reference, 7 now"
+    assert steps(session, page, setting) == (simulated if own is None else -3)
+    assert [(question.page, question.felt) for question in asked] == [(page, felt)]
+    session._answer = None
+    assert steps(session, page, setting) == simulated
+
+
 def test_a_page_is_read_word_by_word_and_some_answers_are_changed_from_a_neighbouring_one() -> None:
     page = TextPage(id="a", kind="break", title="Two words", paragraphs=("three more words", "one"), button="long text")
     assert reading_s(page) == pytest.approx(1.0 + 6 * 0.12)
