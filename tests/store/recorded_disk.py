@@ -83,7 +83,8 @@ class Disk:
     def _changing(self, name: str, whole: Callable[..., None]) -> Callable[..., None]:
         def change(path: Any, *words: Any, dir_fd: int | None = None, **given: Any) -> None:
             folder = Path.cwd() if dir_fd is None else _path_of(dir_fd)
-            self.call(name, folder / path)
+            if os.path.lexists(folder / path) != (name == "mkdir"):  # else it changes nothing
+                self.call(name, folder / path)
             whole(path, *words, dir_fd=dir_fd, **given)
 
         return change
