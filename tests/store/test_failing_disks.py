@@ -490,10 +490,11 @@ def early_changes(calls: list[Call]) -> Iterator[str]:
             if not removes and any(flushed.is_relative_to(gone) for _, flushed in unflushed):
                 yield f"{call.path.name} takes its place before its content is flushed"
             unflushed = {pair: name for pair, name in unflushed.items() if not pair[0].is_relative_to(gone)}
-        if not (is_hidden(call.path) or removes or call.name == "mkdir"):
+        if not (is_hidden(call.path) or call.name == "mkdir"):
+            unordered = ("mkdir", "unlink", "rmdir") if removes else ("mkdir",)
             for (changed, _), name in unflushed.items():
-                if changed != call.path and name != "mkdir" and not is_hidden(changed):
-                    yield f"{call.path.name} is written before {changed.name} is flushed"
+                if changed != call.path and name not in unordered and not is_hidden(changed):
+                    yield f"{call.path.name} is {'removed' if removes else 'written'} before {changed.name} is flushed"
         flushed = call.path if call.name in ("write", "truncate") else call.path.parent
         unflushed[call.path, flushed] = call.name
     yield from (f"{path.name} is not flushed at the end" for path, _ in unflushed if not is_hidden(path))
