@@ -8,6 +8,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 from matplotlib.figure import Figure
 from matplotlib.text import Text
@@ -19,6 +20,8 @@ from study_app.analysis.data.study_tables import Study, load_study
 from study_app.analysis.figures import answer_figures
 from study_app.analysis.page_layout import SMALL, Look, Picture, study_marks
 from study_app.analysis.report import study_figures
+from study_app.analysis.statistics.outcome import Interval
+from study_app.analysis.statistics.thresholds import Threshold
 from study_app.errors import AnalysisError
 from tests.analysis import made_up
 from tests.analysis.conftest import HIDDEN, Results, twelve
@@ -115,6 +118,59 @@ def test_of_many_participants_some_are_drawn_and_the_median_is_of_all() -> None:
 
 def shown(figure: Figure) -> list[Text]:
     return [text for text in figure.findobj(Text) if text.get_text().strip() and text.get_visible()]
+
+
+def test_the_threshold_has_its_curve_interval_and_shares_at_their_places() -> None:
+    """The curve rises from 10 % to 70 % and passes 40 % at the threshold; nobody was asked at 40 ms."""
+    threshold = Threshold(
+        test="t", n=2, dropped=0, statistic_name="s", effect_name="e", effect=70.0, levels=(30, 40, 60, 130),
+        yes=(1, 0, 4, 6), asked=(4, 0, 5, 8), width=20.0, guess=0.1, lapse=0.3,
+        interval=Interval(low=55.0, high=90.0, level=0.95, method="b"),
+    )  # fmt: skip
+    people = {"A": {30.0: 0.0, 130.0: 1.0}, "B": {60.0: 0.5}}
+    look = Look("Threshold", [], ["n = 2"], style.FALLBACK_FONTS)
+    figure = answer_figures.draw_threshold(threshold, people, 60.0, look).figure
+    check_texts(figure)
+    (axes,) = figure.axes
+    assert (axes.get_xlim(), axes.get_ylim()) == (pytest.approx((26.0, 134.0)), (-0.08, 1.08))
+    points = {str(line.get_gid()): np.array(line.get_xydata()) for line in axes.lines}
+    assert points["interval"].tolist() == [pytest.approx([55, 0.4]), pytest.approx([90, 0.4])]
+    assert points["threshold"].tolist() == [pytest.approx([70, 0.4])]
+    assert points["shares"].tolist() == [[30, 0.25], [60, 0.8], [130, 0.75]]
+    assert points["lowest"][:, 0].tolist() == [60, 60]
+    xs, ys = points["curve"].T
+    assert (xs[0], xs[-1], np.interp(70, xs, ys)) == (30, 130, pytest.approx(0.4, abs=1e-3))
+    for person, shares in people.items():
+        away = points[f"person-{person}"] - np.array([*shares.items()])
+        assert (np.abs(away) <= [10 / 4, 0.06]).all(), "delays are 10 ms apart or more"
+    assert "70 ms [55, 90]" in {text.get_text() for text in axes.texts}
+    assert replace(threshold, guess=None).half_way is replace(threshold, lapse=None).half_way is None
+
+
+@pytest.mark.parametrize(
+    ("counts", "missing", "room", "sides"),
+    [
+        ((6, 4, 2), (0, 0), 300.0, (90.0, 60.0, 30.0, 0.0)),
+        ((1, 1, 1), (1, 0), 300.0, (32.0, 26.0, 27.0, 17.0)),
+        ((1, 1, 1), (0, 1), 300.0, (32.0, 26.0, 27.0, 17.0)),
+        ((20, 10, 12), (0, 0), 134.0, (60.0, 30.0, 36.0, 0.0)),
+        ((20, 10, 12), (1, 0), 151.0, (60.0, 30.0, 36.0, 17.0)),
+    ],
+)
+def test_an_answer_is_as_wide_as_fits_and_each_side_has_room_for_its_label(
+    counts: tuple[int, int, int], missing: tuple[int, int], room: float, sides: tuple[float, ...]
+) -> None:
+    """An answer has at most 15 pt, and 3 pt in the narrow panels, which have a gap of 8 pt."""
+    against, agree, neutral = counts
+    unanswered, excluded = missing
+    n = sum(counts)
+    row = {f"count_{level}": 0 for level in range(1, 8)} | {"count_2": against, "count_6": agree, "count_4": neutral}
+    row |= {"n": n, "presented": n + unanswered, "presented_excluded": excluded}
+    fewer = dict.fromkeys(row, 0)
+    widths = answer_figures._widths([pd.DataFrame([fewer, row]), pd.DataFrame([fewer])], room)
+    found = (widths.left, widths.right, widths.neutral, widths.n)
+    assert found == pytest.approx(sides, rel=0.01)
+    assert widths.total <= room
 
 
 @pytest.mark.parametrize("beside", [False, True])

@@ -46,7 +46,7 @@ def test_choices_modulus_trials_and_a_single_level_have_no_exponent() -> None:
     assert list(estimated_exponents(asked, frame[frame["level"] == 2.0])) == []
 
 
-STANDARDS = (4.0, 8.0, 16.0, 32.0)
+STANDARDS = (0.4, 0.8, 16.0, 32.0)
 
 
 def observers(*exponents: float, weber: bool = True) -> list[ThresholdEstimate]:

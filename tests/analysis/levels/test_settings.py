@@ -9,9 +9,13 @@ from typing import Any
 import pandas as pd
 import pytest
 
+from study_app import figure_style as style
 from study_app.analysis.data.blocks import LevelBlock
-from study_app.analysis.levels.answers import settings
+from study_app.analysis.figures.level_figures import _draw_settings
+from study_app.analysis.levels.answers import SettingEstimate, Settings, settings
+from study_app.analysis.page_layout import Look
 from study_app.analysis.report.write_report import report
+from study_app.analysis.results import LevelsResult
 from study_app.protocol.trials.designs import Adjusted
 from study_app.protocol.trials.methods import default_method
 from study_app.protocol.trials.stimuli import Stimulus
@@ -44,6 +48,46 @@ def test_settings_that_do_not_count_and_trials_without_one_are_left_out() -> Non
     table["setting"] = table["setting"].astype("Float64").where(table["setting"].notna())
     _, a = settings(block(), table)
     assert a.levels == (5.0, 7.0)
+
+
+@pytest.mark.parametrize(
+    ("standards", "error", "names", "ends"),
+    [
+        ((20.0, 40.0), 1.0, ["A", "standard 20 N·s/m", "A", "standard 40 N·s/m"], (2.0, 40.0)),
+        ((20.0, 20.0), 1.0, ["A", "A"], (2.0, 20.0)),
+        ((20.0, 40.0), None, ["A", "standard 20 N·s/m", "A", "standard 40 N·s/m"], (2.0, 14.0)),
+        ((None, 40.0), None, ["A", "A", "standard 40 N·s/m"], (2.0, 14.0)),
+    ],
+)
+def test_settings_are_drawn_with_their_mean_interval_and_the_standard_they_are_compared_with(
+    standards: tuple[float | None, float], error: float | None, names: list[str], ends: tuple[float, float]
+) -> None:
+    places = ((5.0, 9.0), 7.0, 6.0, 14.0), ((2.0, 8.0, 4.0), 4.7, None, None)
+    own = [
+        SettingEstimate(
+            participant="A", standard=standard, n=len(levels), pse=pse, low=low, high=high, jnd=None,
+            constant_error=error, hysteresis=None, levels=levels, started_high=(True, False, False)[: len(levels)],
+        )
+        for standard, (levels, pse, low, high) in zip(standards, places, strict=True)
+    ]  # fmt: skip
+    result = LevelsResult(
+        block="set", title="Set", design="adjustment", revealed=True, times=(), summary="mean", counts="",
+        quantity="damping", unit="N·s/m", level_kind="value", statistics={Settings.key: tuple(own)},
+    )  # fmt: skip
+    figure = _draw_settings(result, Look("Set", [], ["n = 1"], style.FALLBACK_FONTS)).figure
+    texts = [text.get_text() for text in figure.texts]
+    assert [text for text in texts if text == "A" or text.startswith("standard")] == names
+    margin = 0.08 * (ends[1] - ends[0])
+    for axes, estimate in zip(figure.axes, own, strict=True):
+        assert axes.get_ylim() == pytest.approx((ends[0] - margin, ends[1] + margin))
+        assert axes.get_xlim() == pytest.approx((0.4, estimate.n + 0.6))
+        compared = [] if error is None else [estimate.standard]
+        assert [line.get_ydata()[0] for line in axes.lines] == [estimate.pse, *compared]
+        bands = [(patch.get_y(), patch.get_y() + patch.get_height()) for patch in axes.patches]
+        assert bands == ([] if estimate.low is None else [(estimate.low, estimate.high)])
+        filled, hollow = (marks.get_offsets().tolist() for marks in axes.collections[-2:])
+        assert filled == [[1.0, estimate.levels[0]]]
+        assert hollow == [[float(at), level] for at, level in enumerate(estimate.levels[1:], start=2)]
 
 
 @pytest.fixture(scope="module")

@@ -13,7 +13,7 @@ from scipy.stats import binom
 
 from study_app.analysis.data.blocks import AFTER, Block, Decided, Item, LevelBlock, Setting
 from study_app.analysis.evaluate import evaluate, evaluate_block
-from study_app.analysis.figures.summary_figures import Numbers
+from study_app.analysis.figures.summary_figures import Numbers, place_of
 from study_app.analysis.findings.delays import ContrastsWithControl, DetectionThreshold, Lowest, LowestDelay
 from study_app.analysis.findings.finding import of_tables
 from study_app.analysis.findings.recognition import LiquidRecognition, RecognitionResult, recognised
@@ -23,7 +23,7 @@ from study_app.analysis.report import first_page as pages
 from study_app.analysis.report import sections
 from study_app.analysis.report.first_page import Card, Presented, first_page, presented_in
 from study_app.analysis.report.sections import CLAIMS, answers, empty_studies
-from study_app.analysis.results import Results
+from study_app.analysis.results import Results, lead_phrase
 from study_app.analysis.statistics.recognition_tests import recognition
 from study_app.protocol.trials.designs import default_design
 from tests.analysis.made_up import DECIDED, ITEMS, delays, everybody, liquids, study
@@ -268,6 +268,20 @@ def test_numbers_are_told_with_the_mean_of_each_setting_and_the_mean_difference_
 ) -> None:
     """Student's t(1) is 12.706 and t(2) 4.303; the standard errors are 2 or 1, and 2 / √3."""
     assert pages._number_words(numbers) == words
+
+
+@pytest.mark.parametrize(
+    ("places", "place"),
+    [((None, None, 8.0), 8.0), ((None, 0.0, 8.0), 0.0), (("oil", 0.5, 8.0), "oil"), ((None, None, None), None)],
+)
+def test_an_estimate_is_for_its_comparison_its_level_or_its_standard(places: tuple[Any, ...], place: Any) -> None:
+    assert place_of(SimpleNamespace(**dict(zip(("comparison", "level", "standard"), places, strict=True)))) == place
+
+
+@pytest.mark.parametrize(("revealed", "words"), [(True, "Block (liquids)"), (False, "Block")])
+def test_sentences_on_a_block_name_its_conditions_once_they_are_known(revealed: bool, words: str) -> None:
+    (block,) = ordered(2).blocks
+    assert lead_phrase(replace(block, revealed=revealed)) == words
 
 
 def test_all_limits_are_shown_by_subject() -> None:

@@ -352,3 +352,35 @@ def test_versions_are_those_of_the_included_sessions(
 ) -> None:
     people = LIQUIDS.participants.assign(protocol_version=versions, protocol_hash=[*files], counted=counted)
     assert methods.version_words(replace(LIQUIDS, participants=people)) == words
+
+
+@pytest.mark.parametrize(
+    ("found", "trends", "blocks", "words"),
+    [
+        (["DelayTrend", "Effects"], "ranks", "cb", "Means were not tested."),
+        (["DelayTrend"], "slopes", "bc", "Means were used for the hypotheses and the trend tests."),
+        (["ContrastsWithControl"], "slopes", "c", "Means were used for the equivalence tests."),
+        (["MeanTests"], "slopes", "", "Means were used for the exploratory tests of means."),
+    ],
+)
+def test_methods_name_what_means_were_used_for(
+    found: list[str], trends: str, blocks: str, words: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("Effects", "ContrastsWithControl", "DelayTrend", "MeanTests"):
+        monkeypatch.setattr(
+            methods, name, SimpleNamespace(**dict.fromkeys(("of", "tested"), lambda _, n=name: n in found))
+        )
+    contrasts = [SimpleNamespace(contrast=SimpleNamespace(blocks=[*blocks]))] if blocks else []
+    given: Any = SimpleNamespace(contrasts=contrasts, decided=SimpleNamespace(trends=trends))
+    *shown, used = methods._means(given, [result_of(LIQUIDS)])
+    assert [line.startswith("Mean differences from the first condition") for line in shown] == [True] * (
+        "Effects" in found
+    )
+    assert used == words
+
+
+@pytest.mark.parametrize(("settings", "are"), [({}, "are"), (LIQUIDS.settings, "were")])
+def test_conditions_are_codes_or_were_until_the_key_was_opened(settings: dict[Any, Any], are: str) -> None:
+    shown = replace(LIQUIDS, settings=settings)
+    (told,) = (line for line in methods._design(shown, results(shown)) if line.startswith("Conditions"))
+    assert told == f"Conditions {are} identified only by codes{' until the key was opened' if settings else ''}."
