@@ -15,7 +15,7 @@ from scipy.stats import t as student
 from scipy.stats import ttest_ind, ttest_rel
 
 from study_app.analysis import contrasts
-from study_app.analysis.contrasts import answer, contrast_section
+from study_app.analysis.contrasts import _direction_words, answer, contrast_section
 from study_app.analysis.data.study_tables import Study, load_study
 from study_app.analysis.evaluate import evaluate
 from study_app.analysis.figures.level_figures import level_figure_tasks
@@ -585,6 +585,19 @@ def test_power_says_whether_the_planned_participants_suffice() -> None:
     assert "**The planned 5 participants are too few to find a difference in d′ of 3 SD with 80% power.**" in told(
         5, 1.3
     )
+
+
+@pytest.mark.parametrize(
+    ("kinds", "ways", "se"),
+    [
+        (["difference"], "differences are first minus second", "difference"),
+        (["ratio"], "ratios are first divided by second", "difference, or of the mean logarithm for a ratio"),
+    ],
+)
+def test_the_direction_of_each_kind_and_its_standard_error_are_told(kinds: list[str], ways: str, se: str) -> None:
+    told = _direction_words(kinds)
+    assert told.startswith(f"In the text, figures and tables, {ways}, in the order of the hypothesis;")
+    assert f"SE is the standard error of the mean {se}, and CI" in told
 
 
 def test_the_smallest_difference_is_that_of_published_tables() -> None:
