@@ -14,12 +14,12 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 from study_app import figure_style as style
-from study_app.analysis import html_page, page_layout
+from study_app.analysis import page_layout
 from study_app.analysis.data.blocks import Block
 from study_app.analysis.data.study_tables import Study, load_study
 from study_app.analysis.figures import answer_figures
 from study_app.analysis.page_layout import SMALL, Look, Picture, study_marks
-from study_app.analysis.report import study_figures
+from study_app.analysis.report import first_page, study_figures
 from study_app.analysis.statistics.outcome import Interval
 from study_app.analysis.statistics.thresholds import Threshold
 from study_app.errors import AnalysisError
@@ -176,7 +176,7 @@ def test_an_answer_is_as_wide_as_fits_and_each_side_has_room_for_its_label(
 @pytest.mark.parametrize("beside", [False, True])
 def test_a_png_is_shown_at_two_fifths_of_its_width_with_its_caption(beside: bool) -> None:
     png = b"\x89PNG\r\n\x1a\n" + struct.pack(">I4sII", 13, b"IHDR", 500, 300)
-    shown = html_page.picture(Picture(block="b", name="f", caption="Is <it> so?", files={"png": png}), beside=beside)
+    shown = first_page.picture(Picture(block="b", name="f", caption="Is <it> so?", files={"png": png}), beside=beside)
     caption = "" if beside else '<figcaption class="soft">Is &lt;it&gt; so?</figcaption>'
     assert shown == (
         '<figure><img width="200" alt="Is &lt;it&gt; so?" src="data:image/png;base64,'
@@ -192,7 +192,7 @@ def test_an_svg_has_the_colours_of_the_page_and_its_size() -> None:
         f'<text fill="#ffffff">{style.TEXT}</text></svg>'
     )
     one = Picture(block="b", name="f", caption='A "b"', files={"svg": svg.encode()})
-    assert html_page.picture(one, beside=True) == (
+    assert first_page.picture(one, beside=True) == (
         '<figure><svg role="img" aria-label="A &#34;b&#34;" style="width: 399px; --share: 50%; --least: '
         f'{math.ceil(11 / SMALL * 210)}px" viewBox="0 0 210 90" id="a">'
         '<g fill="var(--accent)" stroke="var(--paper)"/><text fill="var(--text)">t</text>'

@@ -10,9 +10,10 @@ import pandas as pd
 import pytest
 
 from study_app.analysis.data.blocks import LevelBlock, Setting
-from study_app.analysis.levels import conduct, thresholds
+from study_app.analysis.levels import thresholds
 from study_app.analysis.levels.answers import Answers
 from study_app.analysis.levels.evaluate import level_results
+from study_app.analysis.levels.statistic import statistics
 from study_app.protocol.trials.designs import Rated
 from study_app.protocol.trials.stimuli import Stimulus
 from tests.analysis.levels.level_studies import ONE, STIMULUS, block
@@ -129,7 +130,9 @@ def test_incorrect_answers_to_catch_trials_are_counted_by_session(most: float | 
     frame = pd.DataFrame(found, columns=["participant", "session", "block", "catch", "right"])
     opened = frame.astype(dict.fromkeys(("catch", "right"), "boolean"))
     counted = [] if most is None else [("P001", 1, 3, 2, most), ("P001", 2, 4, 1, most), ("P002", 1, 1, 1, most)]
-    rows = conduct._catch_answers(replace(BLOCKS["forced choice"], wrong_most=most), opened)
+    (catches,) = (statistic for statistic in statistics() if statistic.key == "catches")
+    nothing: Any = None
+    rows = catches.compute(replace(BLOCKS["forced choice"], wrong_most=most), opened, nothing, nothing)
     assert [tuple(row.values()) for row in rows] == counted
 
 

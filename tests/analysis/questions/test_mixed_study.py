@@ -4,6 +4,7 @@ import json
 import re
 import shutil
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 
 import pandas as pd
@@ -12,7 +13,6 @@ import pytest
 from study_app.analysis.data.study_tables import Study, load_study
 from study_app.analysis.evaluate import evaluate
 from study_app.analysis.export.tables import wide_table
-from study_app.analysis.questions import counts_of_missing
 from study_app.analysis.report.write_report import report
 from study_app.protocol.load import load
 from study_app.protocol.warnings.study_warnings import warnings
@@ -50,10 +50,16 @@ def test_only_the_scale_of_an_answer_has_ends(study: Study) -> None:
     assert asked["age"].bounds == (16, 99)
 
 
-def test_answers_that_are_given_missing_and_off_the_scale_are_counted() -> None:
-    frame = pd.DataFrame({"participant": [*"AABBACCC"], "response": [*"7152", *[None] * 4]})
-    given = counts_of_missing(frame.assign(cannot_judge=[False] * 4 + [True] + [False] * 3))
-    assert given == {"n": 4, "participants": 2, "cannot_judge": 1, "missing": 3}
+def test_answers_that_are_given_missing_and_off_the_scale_are_counted(study: Study) -> None:
+    """About each liquid, the first of six participants does not answer, and the next two cannot judge."""
+    answered = study.answered.copy()
+    place = answered[answered["item"] == "thickness"].groupby("code").cumcount()
+    answered.loc[place.index[place < 3], ["response", "value"]] = pd.NA
+    answered.loc[place.index[place.isin([1, 2])], "cannot_judge"] = True
+    results = evaluate(replace(study, answered=answered), recordings=False)
+    (found,) = (result for result in results.questions if result.item == "thickness")
+    counts = {"n": 3, "participants": 3, "cannot_judge": 2, "missing": 1}
+    assert [{name: group.numbers[name] for name in counts} for group in found.groups] == [counts] * 2
 
 
 def test_order_is_reproduced_where_answers_hid_questions(tmp_path: Path) -> None:
