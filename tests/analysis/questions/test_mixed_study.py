@@ -14,6 +14,7 @@ from study_app.analysis.data.study_tables import Study, load_study
 from study_app.analysis.evaluate import evaluate
 from study_app.analysis.export.tables import wide_table
 from study_app.analysis.report.write_report import report
+from study_app.protocol import questions
 from study_app.protocol.load import load
 from study_app.protocol.warnings.study_warnings import warnings
 from study_app.session.simulated.answers_only import rehearse_answers
@@ -148,7 +149,9 @@ def test_readers_see_the_name_of_a_standard_questionnaire_in_place_of_its_title(
 
 
 @pytest.mark.usefixtures("figures_of_the_page")
-def test_blocks_that_share_a_title_are_told_apart(tmp_path: Path) -> None:
+def test_blocks_that_share_a_title_are_told_apart(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Simulated people, who have one opinion of the task load, answer at random, so that the blocks differ."""
+    monkeypatch.setattr(questions.SliderView, "simulated", lambda _self, _opinion, draw: 5 * int(20 * draw()))
     again = '[blocks.again]\ntitle = "Stir"\nconditions = ["thin", "thick"]'
     last = 'conditions = ["thin", "thick"]'
     sequence = 'sequence = ["start", "stir", "load", "usability", "end"]'
@@ -165,15 +168,20 @@ def test_blocks_that_share_a_title_are_told_apart(tmp_path: Path) -> None:
     report(folder, tmp_path / "report", failed=pytest.fail)
     content = json.loads((tmp_path / "report" / "report.json").read_bytes())
     (score,) = (score for score in content["results"]["scores"] if score["where"] == "load")
-    of_groups = {group["name"]: group["numbers"]["mean"] for group in score["groups"]}
-    assert list(of_groups) == ["After Stir (stir)", "After Stir (again)"]
-    means = {name: format(mean, "#.3g") for name, mean in of_groups.items()}
+    means = {group["name"]: group["numbers"]["mean"] for group in score["groups"]}
+    assert list(means) == ["After Stir (stir)", "After Stir (again)"]
+    first, second = means.values()
+    assert first != second
     page = (tmp_path / "report" / "report.html").read_text(encoding="utf-8").replace("\u00a0", " ")
-    for name, mean in means.items():
-        assert re.search(rf"score was [^.]*{re.escape(mean)}\b.* {re.escape(name.replace('After', 'after'))}", page)
-    (difference,) = re.findall(r"difference \(after Stir \(stir\) − after Stir \(again\)\) was (\S+) \[", page)
-    first, second = of_groups.values()
-    assert float(difference.replace("−", "-")) == pytest.approx(first - second, rel=5e-3)
+    said = re.search(
+        r"score was (\S+) \[[^]]+\] after Stir \(stir\) and (\S+) \[[^]]+\] after Stir \(again\) .* "
+        r"difference \(after Stir \(stir\) − after Stir \(again\)\) was (\S+) \[",
+        page,
+    )
+    assert said is not None
+    assert [float(word.replace("−", "-")) for word in said.groups()] == pytest.approx(
+        [first, second, first - second], rel=5e-3
+    )
     asked = [f"question-{question['where']}-{question['item']}.png" for question in content["results"]["questions"]]
     assert len(asked) == 8, "two after each trial and those of the NASA-TLX"
     assert sorted(asked) == sorted(path.name for path in (tmp_path / "report").glob("question-*.png"))
