@@ -200,6 +200,28 @@ def test_an_svg_has_the_colours_of_the_page_and_its_size() -> None:
     )
 
 
+@pytest.mark.parametrize(
+    ("groups", "columns", "lines"),
+    [
+        (
+            ["old", "new"],
+            ["code", "participant", "value"],
+            ["code participant group value", "L1 B new 5", "L2 A old 7"],
+        ),
+        (["old", "new"], ["participant", "group"], ["participant group", "B new", "A old"]),
+        (["old", "new"], ["code", "value"], ["code value", "L1 5", "L2 7"]),
+        ([None, None], ["participant", "value"], ["participant value", "B 5", "A 7"]),
+    ],
+)
+def test_the_numbers_of_a_figure_have_the_group_after_each_participant(
+    groups: list[str | None], columns: list[str], lines: list[str]
+) -> None:
+    made = made_up.study(made_up.liquids(1), [(who, 1, "L1", (4, 4)) for who in "AB"])
+    made = replace(made, participants=made.participants.assign(group=groups))
+    rows = pd.DataFrame({"code": ["L1", "L2"], "participant": ["B", "A"], "group": ["x", "y"], "value": [5, 7]})
+    assert page_layout.tab_separated(made, rows[columns]).replace("\t", " ").splitlines() == lines
+
+
 def test_a_picture_has_its_own_title_participants_and_files(monkeypatch: pytest.MonkeyPatch) -> None:
     made = replace(made_up.study(made_up.liquids(1), [(who, 1, "L1", (4, 4)) for who in "ABC"]), name="oils")
     monkeypatch.setattr(style, "file_bytes", lambda *given: given)
