@@ -117,8 +117,9 @@ def test_every_link_leads_to_a_heading() -> None:
 
 
 def test_a_row_has_range_default_and_meaning() -> None:
-    blocks = tables()["device"].splitlines()
-    (row,) = [line for line in blocks if line.startswith("| `force_limit_n`")]
+    header, rule, *cells = [line for line in tables()["device"].splitlines() if line.startswith("|")]
+    assert (header, rule) == ("| key | value | default | meaning |", "| --- | --- | --- | --- |")
+    (row,) = [line for line in cells if line.startswith("| `force_limit_n`")]
     assert row == "| `force_limit_n` | number, at least 0.1, at most 8 | `8.0` | Maximum force on the hand \\[N]. |"
     rows = [line.replace("\\|", "") for line in format_markdown().splitlines() if line.startswith("|")]
     assert {line.count("|") for line in rows} == {5}

@@ -54,6 +54,10 @@ def test_a_session_and_a_trial_are_left_out_with_their_reasons(folder: Path) -> 
         key_open=False,
     )
     assert exclusions(folder) == (first, second)
+    for row, said in ((first, r"(withdrew)"), (second, "(=1+1, it rang)")):
+        with pytest.raises(StoreError) as refused:
+            exclude(folder, row.participant, 1, trial=row.trial, by="CD", reason="slept")
+        assert str(refused.value).endswith(f" has been excluded since 2026-03-02T09:30:00.000+01:00 {said}")
     assert (folder / "exclusions.csv").read_text(encoding="utf-8") == (
         "participant,session,trial,rule_or_person,reason,excluded_at,key_open\n"
         "P008,1,n/a,rule 3,withdrew,2026-03-02T09:30:00.000+01:00,false\n"

@@ -5,6 +5,7 @@ twice; and whatever was written was on the disk before what follows from it.
 """
 
 import ast
+import hashlib
 import json
 import os
 import platform
@@ -179,7 +180,8 @@ def write_small_files(folder: Path) -> None:
     csv_files.write_columns(folder / "table.csv", made_table())
     support.write_support(folder / "support.zip")
     atomic.probe_free_bytes(folder)
-    output_files.write_output(folder / "study", folder / "report", {"report.html": b"report"})
+    footage = output_files.FileCopy(folder / "waves.mp4", hashlib.sha256(b"waves").hexdigest())
+    output_files.write_output(folder / "study", folder / "report", {"report.html": b"report", "waves.mp4": footage})
     atomic.copy_folder(folder / "study/blinding", folder / "copied") if not (folder / "copied").exists() else None
 
 
@@ -311,7 +313,7 @@ OTHERS: Final = {
         save_edits, lambda folder: (folder / "edited.toml").write_text("[study]", encoding="utf-8", newline="\n")
     ),
     "settings": Writer(keep_settings, spoil_settings),
-    "small files": Writer(write_small_files),
+    "small files": Writer(write_small_files, lambda folder: (folder / "waves.mp4").write_bytes(b"waves")),
     "resumed session": Writer(hold_session, leave_session),
     "session in a claimed folder": Writer(hold_session, leave_claims),
     "refused session": Writer(refuse_session),
@@ -524,6 +526,9 @@ def test_what_is_written_is_on_the_disk_before_what_follows_from_it(studied: Pat
         left_out = "subject-P009" if name == "session" else "report.html"  # which a repeated withdrawal erases again
         of_results = [call for call in calls if call.path.is_relative_to(tmp_path / name)]
         assert list(early_changes([call for call in of_results if left_out not in call.path.name])) == [], name
+    calls = recorded_disk(studied, tmp_path / "outputs", OTHERS["small files"]).calls
+    early = list(early_changes([call for call in calls if call.path.is_relative_to(tmp_path / "outputs/report")]))
+    assert [line for line in early if "takes its place" in line] == []
 
 
 @pytest.mark.slow

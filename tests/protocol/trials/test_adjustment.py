@@ -4,8 +4,10 @@ import math
 
 import pytest
 
+from study_app.protocol.load import parse
 from study_app.protocol.trials.methods import Adjustment
 from study_app.protocol.trials.stimuli import Stimulus
+from tests.protocol.edited_studies import text_of
 from tests.protocol.trials.matching import matching
 
 LOW, HIGH = math.log10(2), math.log10(18)
@@ -49,3 +51,9 @@ def test_a_task_goes_on_for_as_long_as_a_setting_may_take() -> None:
     followed = protocol.tasks["stir"].lasting(method.most_s)
     assert followed.limit_s == 60.0
     assert followed.start_m == protocol.tasks["stir"].start_m
+
+
+@pytest.mark.parametrize("name", ["explore", "reach"])
+def test_time_alone_ends_a_task_of_a_setting(name: str) -> None:
+    task = parse(text_of("sound").encode(), "file.toml").tasks[name].lasting(47.5)
+    assert (task.limit_s, task.expected_s, task.shortest_s, task.wanted) == (47.5, 47.5, 47.5, None)

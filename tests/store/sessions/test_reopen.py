@@ -93,6 +93,9 @@ def test_a_power_cut_may_leave_a_trial_and_an_interval_more_than_the_journal_and
         again()
     path.write_text("a,b\n" + spare * "1,2\n", encoding="utf-8", newline="\n")
     again().close()
+    store.folder.journal.write_bytes(b"")
+    with pytest.raises(StoreError, match=r"journal\.jsonl is empty: .*; use a new session number$"):
+        again()
 
 
 def test_times_never_go_back_whatever_the_clocks_do(start: Start, again: Again) -> None:
@@ -130,8 +133,9 @@ def test_a_gap_that_no_session_has_is_unknown_and_locks_nothing(start: Start, ag
 def test_the_receipt_tells_what_it_goes_on_with(start: Start, again: Again) -> None:
     with start() as store:
         before = receipt.read(store.folder.receipt)
-    for count in (1, 2):
-        with again() as resumed:
+    optional = {"motors_masked": {"by": "noise"}, "outlets": {"port": "COM3"}, "video": {"camera": "desk"}}
+    for count, told in enumerate(({"screens": {"width": 1280}}, optional), start=1):
+        with again(**told) as resumed:
             assert len(receipt.read(store.folder.receipt)["resumed"]) == count
     after = receipt.read(store.folder.receipt)
     assert before["resumed"] == []
@@ -139,6 +143,9 @@ def test_the_receipt_tells_what_it_goes_on_with(start: Start, again: Again) -> N
     assert [one["at"] for one in after["resumed"]] == [line.at for line in resumed.lines[1:]]
     assert after["resumed"][0]["device"] == {"name": "mouse"}
     assert after["resumed"][0]["operator"] == "CD"
+    assert after["resumed"][0]["screens"] == {"width": 1280}
+    assert after["resumed"][0].keys().isdisjoint(optional)
+    assert {name: after["resumed"][1][name] for name in optional} == optional
     assert after["resumed"][0]["versions"] == before["versions"]
     assert after["resumed"][1]["clock"] == {"origin_ns": resumed.clock.origin_ns, "origin_at": resumed.clock.at(0)}
 

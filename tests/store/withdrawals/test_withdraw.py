@@ -202,6 +202,22 @@ def test_every_copy_and_output_in_the_workspace_is_erased_without_being_named(st
     assert verify_study(pooled).is_sound
 
 
+def test_two_sessions_that_both_lost_their_journals_are_no_copies_of_each_other(study: Path, results: Path) -> None:
+    """The other study's person happens to have the same ID; only the first line tells whose a session is."""
+    other = results / "another"
+    with begun(other, PERSON) as store:
+        store.finish("completed")
+    for folder in (study, other):
+        StudyFolder(folder).session(PERSON, 1).journal.write_bytes(b"")
+    before = contents(other)
+    told = f"{other} was not changed, because its session {store.folder.path} is not a copy of an erased session"
+    for also in ((), (other,)):
+        left = [line for line in erase(study, also=also).left if "was not changed" in line]
+        assert [line.startswith(told) for line in left] == [True] * len(also)
+    assert contents(other) == before
+    assert not (study / "data" / f"sub-{PERSON}").exists()
+
+
 @needs_fork  # where folders can be linked, and pipes made
 def test_a_link_and_a_pipe_are_named_before_anything_is_written(study: Path, tmp_path: Path) -> None:
     person = study / "data" / f"sub-{PERSON}"
