@@ -118,7 +118,7 @@ def make_folder(path: Path, *, waits: bool = True) -> None:
 
 
 def copy_folder(folder: Path, to: Path) -> None:
-    """Copy a folder with its contents to ``to``, which must not exist, atomically.
+    """Copy a folder with its contents to ``to``, which must not exist, atomically, and flush it to the disk.
 
     Raises
     ------
@@ -128,13 +128,24 @@ def copy_folder(folder: Path, to: Path) -> None:
     half = temporary_path(to)
     try:
         to.parent.mkdir(parents=True, exist_ok=True)
-        shutil.copytree(folder, half)
+        shutil.copytree(folder, half, copy_function=copy_file)
+        sync_folders(half)
         move(half, to)
     except OSError as error:  # shutil.Error, too
         raise cannot_write(to, error) from error
     finally:
         shutil.rmtree(half, ignore_errors=True)
     flush_entry(to)
+
+
+def copy_file(source: str, to: str) -> str:
+    """Copy a regular file with its times to ``to``, which must not exist; flush it to the disk and return ``to``."""
+    with open_regular(Path(source)) as file, Path(to).open("xb") as copy:
+        shutil.copyfileobj(file, copy)
+        copy.flush()
+        flush_file(copy.fileno())
+    shutil.copystat(source, to)
+    return to
 
 
 def append_line(path: Path, line: bytes, *, waits: bool = True) -> None:
@@ -262,6 +273,12 @@ def sync_folder(path: Path) -> None:
             raise
     finally:
         os.close(descriptor)
+
+
+def sync_folders(path: Path) -> None:
+    """Flush the entries of a folder and of all folders below it."""
+    for folder in (path, *(entry for entry in paths_in(path) if entry.is_dir() and not entry.is_symlink())):
+        sync_folder(folder)
 
 
 def flush_entry(path: Path) -> None:

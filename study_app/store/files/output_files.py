@@ -24,6 +24,7 @@ from study_app.store.files.atomic import (
     open_regular,
     parse_json,
     remove_old_temporary_files,
+    sync_folder,
     system_message,
     temporary_path,
     write_all,
@@ -197,6 +198,7 @@ def erase_outputs(study: Path, within: Path) -> tuple[tuple[Path, ...], tuple[Ou
         for path in output.paths:
             try:
                 path.unlink()
+                sync_folder(path.parent)
             except OSError as error:
                 raise cannot_write(path, error) from error
             erased.append(path)

@@ -20,15 +20,15 @@ from study_app.store.blinded.blinding import Key, verified_key
 from study_app.store.files.atomic import (
     cannot_read,
     cannot_write,
+    copy_file,
     flush_entry,
-    flush_file,
     is_there,
     move,
-    open_regular,
     paths_in,
     refuse_special_files,
     remove_temporary_files,
     sync_folder,
+    sync_folders,
     temporary_files,
     temporary_path,
     write_file,
@@ -282,15 +282,14 @@ def _copy(source: _Source, to: Path, progress: ReportProgress | None) -> None:
     """Copy a results folder and flush it to the disk; links stay links, for `verify` to judge."""
     numbers = count()
 
-    def copy_file(*paths: str) -> str:
+    def copy_next(*paths: str) -> str:
         number = next(numbers)
         if progress is not None and number % 100 == 0:
             progress(f"copying site {source.name}", min(number / len(source.state), 1.0))
-        return _copy_file(*paths)
+        return copy_file(*paths)
 
-    shutil.copytree(source.path, to, symlinks=True, ignore=_LEFT_BEHIND, copy_function=copy_file)
-    for place in (to, *(path for path in paths_in(to) if path.is_dir() and not path.is_symlink())):
-        sync_folder(place)
+    shutil.copytree(source.path, to, symlinks=True, ignore=_LEFT_BEHIND, copy_function=copy_next)
+    sync_folders(to)
     refuse_if_open(source.path)
     if _folder_state(source.path) != source.state:
         raise StoreError(
@@ -302,15 +301,6 @@ def _folder_state(path: Path) -> list[tuple[Path, int, int]]:
     """Return path, size and modification time of every file in a folder, to detect changes."""
     states = [(entry, entry.lstat()) for entry in paths_in(path)]
     return [(entry, held.st_size, held.st_mtime_ns) for entry, held in states if not entry.is_dir()]
-
-
-def _copy_file(source: str, to: str) -> str:
-    with open_regular(Path(source)) as file, Path(to).open("xb") as copy:
-        shutil.copyfileobj(file, copy)
-        copy.flush()
-        flush_file(copy.fileno())
-    shutil.copystat(source, to)
-    return to
 
 
 def stray_entries(merged: Merged) -> tuple[Path, ...]:

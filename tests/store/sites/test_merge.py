@@ -102,7 +102,7 @@ def merge_until(count: int, lab: Path, to: Path) -> None:
     def watched(whole: Callable[..., Any]) -> Callable[..., Any]:
         return lambda *words, **options: die() if next(left, None) is None else whole(*words, **options)
 
-    for module, name in ((merging, "_copy_file"), (merging, "write_file"), (merging, "sync_folder"), (Path, "rename")):
+    for module, name in ((merging, "copy_file"), (merging, "write_file"), (merging, "sync_folder"), (Path, "rename")):
         setattr(module, name, watched(getattr(module, name)))
     merge_sites({"C": lab}, to)
 
