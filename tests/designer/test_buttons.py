@@ -15,6 +15,7 @@ from study_app.designer.document.steps import ChangeLanguage
 from study_app.designer.document.toml_edits import Set
 from study_app.protocol.source.document import Path
 from tests.designer.support.inputs import name_of
+from tests.gui.walk import upright
 
 pytestmark = pytest.mark.slow
 
@@ -177,6 +178,11 @@ def test_each_entry_of_a_questionnaires_menu_asks_it_where_the_entry_says(design
         "After each block": ("welcome liquids liquid reaching delays liquid thanks", "delay"),
         "At the end": ("welcome liquids reaching delays liquid thanks", "delay"),
     }
+
+
+def test_no_button_of_the_designer_asks_for_more_height_than_width(designer: Any) -> None:
+    designer.open("kitchen", "blocks", "liquids")
+    assert upright(designer.place) == []
 
 
 UNITS = {"mm": "mm", "s": "s", "ms": "ms", "n": "N", "hz": "Hz", "percent": "%", "nspm": "N·s/m", "kg_m3": "kg/m³"}

@@ -15,6 +15,7 @@ from study_app.designer.document.steps import AddElement, AddKey, ChangeLanguage
 from study_app.designer.document.toml_edits import Set, Unset
 from study_app.designer.window import focus_stops
 from study_app.gui.widgets.controls import IconButton
+from tests.gui.walk import settle
 
 pytestmark = pytest.mark.slow
 
@@ -109,16 +110,23 @@ def test_the_help_is_that_of_the_row_with_the_keyboard(designer: Any) -> None:
     assert replace(repetitions, bounds=("at least 1", "at most 9")).range == "1 to 9"
 
 
-def test_the_file_is_handed_on_while_typing_goes_on(designer: Any, qtbot: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_file_is_handed_on_while_typing_goes_on_and_when_it_is_left(
+    designer: Any, qtbot: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr("study_app.designer.file.HAND_ON_MS", 60_000)
     designer.open()
     editor = designer.place.file.editor
+    designer.place.show_tab("file")
+    editor.setFocus()
     editor._rest.setTimerType(Qt.TimerType.PreciseTimer)
     editor.insertPlainText("# ")
     left_ms = editor._rest.remainingTime()
     qtbot.wait(50)
     editor.insertPlainText("x")
     assert 0 < editor._rest.remainingTime() <= left_ms - 40
+    assert "# x" not in designer.text
+    designer.place.outline.tree.setFocus()
+    assert "# x" in designer.text
 
 
 def test_a_text_loses_its_selection_with_the_keyboard(designer: Any) -> None:
@@ -128,6 +136,24 @@ def test_a_text_loses_its_selection_with_the_keyboard(designer: Any) -> None:
     assert line.textCursor().hasSelection()
     designer.form_row(*ITEMS).field.take_keyboard()
     assert not line.textCursor().hasSelection()
+
+
+@pytest.mark.parametrize("where", ["form", "file"])
+def test_a_text_shows_the_caret_only_while_it_has_the_keyboard(designer: Any, where: str) -> None:
+    flash_ms = QApplication.cursorFlashTime()
+    QApplication.setCursorFlashTime(0)
+    designer.open("kitchen", *QUESTIONNAIRE)
+    designer.place.show_tab("file")
+    around = designer.place.file if where == "file" else designer.field(*QUESTIONNAIRE, "intro")
+    text = around.findChildren(QPlainTextEdit)[0]
+    settle(designer.window)
+    pictures = []
+    for part in (designer.place.outline.tree, text, designer.place.outline.tree):
+        part.setFocus()
+        settle(designer.window)
+        pictures.append(text.grab().toImage())
+    QApplication.setCursorFlashTime(flash_ms)
+    assert pictures[0] == pictures[2] != pictures[1]
 
 
 def test_a_liquid_file_is_chosen_before_a_liquid_changes(designer: Any, monkeypatch: pytest.MonkeyPatch) -> None:

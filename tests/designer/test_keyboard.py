@@ -12,6 +12,7 @@ from study_app.designer.measures.study_facts import revealing_texts
 from study_app.designer.outline import ROW_ROLE
 from study_app.designer.window import focus_stops
 from study_app.gui.kit.commands import COMMANDS
+from study_app.gui.widgets.controls import ActionButton
 
 pytestmark = pytest.mark.slow
 
@@ -21,6 +22,16 @@ def test_every_key_of_the_place_is_one_shortcut(designer: Any) -> None:
     made.append(designer.place.header.play.play.shortcut().toString())
     wanted = [keys for one in COMMANDS if not one.within for keys in one.keys]
     assert sorted({"Ins": "Insert"}.get(keys, keys) for keys in made) == sorted(wanted)
+
+
+CAPS = {"Add": "Ins", "Duplicate": "Ctrl D", "Outline": "Ctrl 1", "Next": "F8", "New study …": "Ctrl N",
+        "Make study": "Enter", "Play from here": "F5"}  # fmt: skip
+
+
+def test_each_button_shows_the_key_that_does_the_same(designer: Any) -> None:
+    designer.open("kitchen", "study")
+    buttons = designer.place.findChildren(ActionButton)
+    assert {button.text(): button.cap for button in buttons if button.cap} == CAPS
 
 
 def test_a_tab_that_is_asked_for_comes_to_the_front_in_a_narrow_window(designer: Any) -> None:
@@ -182,7 +193,7 @@ def test_groups_are_added_in_twos_which_the_entry_and_the_foot_say(designer: Any
     designer.add("Two groups")
     assert tuple(designer.value("groups")) == ("group", "group_2")
     form = designer.place.form
-    assert "Group 2" in form.foot.words.text()
+    assert form.foot.words.text() == "Also added, because the study needs it: Group 2. Groups lists it."
     assert (designer.keyboard, form.head.id.selectedText()) == (form.head.id, "group")
     QTest.keyClicks(designer.keyboard, "thick_first")
     designer.hit("Return")

@@ -8,7 +8,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QAccessible
 from PySide6.QtWidgets import QApplication, QLabel
 
-from tests.gui.walk import cut, dead, misnamed, settle, unnamed, unreached
+from tests.gui.walk import cut, dead, misnamed, settle, unnamed, unreached, upright
 from tests.gui.windows import WINDOWS, two_screens
 
 pytestmark = pytest.mark.slow
@@ -38,6 +38,7 @@ def test_nothing_is_cut_everything_has_a_name_and_no_button_is_dead(qtbot: Any, 
     assert misnamed(window) == []
     assert unreached(window) == []
     assert dead(window) == []
+    assert upright(window) == []
     guessing = [each for each in window.findChildren(QLabel) if each.textFormat() is Qt.TextFormat.AutoText]
     assert [each.text() for each in guessing] == [], "Qt would take <b> in a study's text for markup"
     if name.startswith(("opening", "preflight")):

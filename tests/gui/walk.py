@@ -11,6 +11,7 @@ from PySide6.QtWidgets import (
     QLineEdit,
     QPushButton,
     QScrollBar,
+    QSlider,
     QWidget,
 )
 
@@ -110,6 +111,13 @@ def unreached(window: QWidget) -> list[str]:
         one for one in window.findChildren(QWidget) if one.isVisible() and one.focusPolicy() & Qt.FocusPolicy.TabFocus
     )
     return [repr(one) for one in takes if one not in chain]
+
+
+def upright(window: QWidget) -> list[str]:
+    """Return the buttons and sliders that ask for more height than width."""
+    parts = [*window.findChildren(QPushButton), *window.findChildren(QSlider)]
+    hints = [(part.accessibleName() or part.text(), part.sizeHint()) for part in parts if part.isVisible()]
+    return [name for name, hint in hints if hint.width() < hint.height()]
 
 
 def dead(window: QWidget) -> list[str]:

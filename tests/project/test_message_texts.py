@@ -44,6 +44,24 @@ def test_no_text_prints_the_name_of_a_variable() -> None:
     assert found == {}
 
 
+def test_each_logged_text_has_a_place_for_each_of_its_values() -> None:
+    found = []
+    for path in sorted(Path(study_app.__file__).parent.rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+            match node:
+                case ast.Call(func=ast.Attribute(value=ast.Name("log")), args=[ast.Name(name), _]) if name.isupper():
+                    continue
+                case ast.Call(func=ast.Attribute(value=ast.Name("log")), args=[ast.Constant(str(text)), *values]):
+                    whole = text.replace("%%", "").count("%") == len(values)
+                case ast.Call(func=ast.Attribute(value=ast.Name("log")), args=[_, _, *_]):
+                    whole = False
+                case _:
+                    continue
+            if not whole:
+                found.append((path.name, node.lineno))
+    assert found == []
+
+
 def test_no_part_of_a_text_stands_alone() -> None:
     """An f-string after a finished statement is computed and lost."""
     lost = [

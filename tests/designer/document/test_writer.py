@@ -23,6 +23,7 @@ from study_app.designer.document.toml_edits import (
     WriterError,
     apply_edit,
 )
+from study_app.designer.document.toml_text import common_ends
 from study_app.errors import StudyError
 from study_app.protocol.source.document import value_at
 from tests.designer.document.grown import texts
@@ -32,6 +33,17 @@ EDITS = int(os.environ.get("LIQUID_STUDY_EDITS", "0"))
 """How many random edits are tried; without it about 400."""
 TEXTS = texts()
 STEPS = 16
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "equal"),
+    [
+        ("honey", "honey", (5, 0)), ("thin honey", "thick honey", (3, 6)), ("honey", "money", (0, 4)),
+        ("abcd", "abcde", (4, 0)), ("aa", "aaaa", (2, 0)), ("", "honey", (0, 0)), ((7, 1, 2, 3), (8, 2, 3), (0, 2)),
+    ],
+)  # fmt: skip
+def test_the_equal_ends_of_two_texts_or_arrays_do_not_overlap(old: Any, new: Any, equal: tuple[int, int]) -> None:
+    assert common_ends(old, new) == equal
 
 
 class Edited(RuleBasedStateMachine):

@@ -1,5 +1,6 @@
 """The tab Participant: which page and texts it shows, and how keys, mouse and edits reach it."""
 
+import math
 import os
 import re
 import subprocess
@@ -334,6 +335,18 @@ def test_the_page_has_the_language_of_the_text_that_is_edited(designer: Any, tab
         assert tab.view.language == language
 
 
+def test_each_trial_keeps_the_answers_that_were_given_in_it(designer: Any, live: Any) -> None:
+    preview, found = designer.controller.preview, []
+    for answer in (2, 6):
+        assert answers(live) == {}
+        live.page_window.widget.fields[0].give_answer(answer)
+        designer.click_on(preview.after)
+    for _ in range(2):
+        designer.click_on(preview.before)
+        found.append((preview.step.text(), *answers(live).values()))
+    assert found == [("Liquids, trial 2 of 2", 6), ("Liquids, trial 1 of 2", 2)]
+
+
 def test_an_answer_that_was_emptied_does_not_come_back_when_the_page_is_repainted(designer: Any, live: Any) -> None:
     field = live.page_window.widget.fields[0]
     field.give_answer(3)
@@ -351,3 +364,7 @@ def test_the_page_has_the_size_of_the_chosen_screen(designer: Any, live: Any) ->
         preview.screens.activated.emit(at)
         width, height = (int(number) for number in re.findall(r"(\d+) × (\d+)", names[at])[-1])
         assert (live.page_size.width(), live.page_size.height()) == (width, height)
+        QApplication.processEvents()
+        assert live.maximumHeight() == math.ceil(live.width() * height / width), (
+            "the page is whole, and no room is left"
+        )

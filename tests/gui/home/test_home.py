@@ -8,9 +8,11 @@ from PySide6.QtCore import QEvent, QPoint, QSize, Qt
 from PySide6.QtWidgets import QApplication, QDialog, QFileDialog
 
 from study_app.gui.home import view
+from study_app.gui.home.cards import CardGrid
 from study_app.gui.home.dialogs import NewSessionDialog, RehearsalDialog
 from study_app.gui.widgets.background import wait_for_jobs
 from study_app.gui.widgets.controls import ActionButton
+from study_app.gui.widgets.labels import label
 from study_app.protocol.source.files import source_bytes
 from study_app.store.versions.drafts import Draft, delete_draft, write_draft
 from study_app.store.versions.study_settings import keep_original
@@ -156,6 +158,16 @@ def test_the_card_that_one_went_on_from_keeps_the_keyboard_and_is_in_sight(qtbot
         assert (held.facts.title, bar.value() > 0) == ("Zest", True)
     else:
         assert (len(home.grid.cards), held, bar.value()) == (count - 1, home.grid.cards[0], 0)
+
+
+def test_the_height_of_the_cards_is_that_of_their_texts_in_the_present_width(qtbot):
+    grid, cards = CardGrid(), [label("word " * count, "label", wraps=True) for count in (40, 90)]
+    qtbot.addWidget(grid)
+    grid.resize(240, 900)
+    grid.show()
+    grid.show_cards(cards)
+    QApplication.processEvents()
+    assert grid.whole_height == sum(card.heightForWidth(240) for card in cards) + grid.layout().verticalSpacing()
 
 
 def test_each_button_of_a_study_opens_what_it_says(qtbot, tmp_path):

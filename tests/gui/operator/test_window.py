@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 from PySide6.QtCore import Qt, QTimer
-from PySide6.QtGui import QGuiApplication
+from PySide6.QtGui import QColor, QGuiApplication
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
@@ -88,6 +88,16 @@ def test_no_question_keeps_a_hand_from_the_force_stop_or_from_escape(running, qt
     qtbot.waitUntil(lambda: QGuiApplication.focusWindow() is handle)
     with qtbot.waitSignal(running.asked, timeout=HOLD_MS * 5, check_params_cb=stops):
         QTest.keyPress(handle, Qt.Key.Key_Escape)
+
+
+def test_the_force_stop_shows_its_sign_above_its_name_and_below_it_the_other_ways(running):
+    stop = running.stop.stop
+    picture, ink = stop.grab().toImage(), QColor(stop.theme.on_stop)
+    rows = {y for y in range(picture.height()) for x in range(picture.width()) if picture.pixelColor(x, y) == ink}
+    middle = stop.height() // 2
+    for part, first, last in (("sign", -66, -10), ("name", 2, 36), ("other ways", 42, 78)):
+        inked = rows & set(range(middle + first, middle + last))
+        assert len(inked) >= 8, part
 
 
 @pytest.mark.slow

@@ -55,6 +55,19 @@ def test_one_key_answers_and_continues_once(opening: Opening, key: KEY, language
     assert seen.kinds.count(Submitted) == 1
 
 
+@pytest.mark.parametrize(("language", "on", "back"), [("en", "Right", "Left"), ("ar", "Left", "Right")])
+def test_each_arrow_goes_to_the_next_of_three_answers_and_enter_chooses_it(
+    opening: Opening, language: str, on: str, back: str
+) -> None:
+    seen, passed = opening(choice(3, language), FULL, language), []
+    for way in (on, on, on, on, back):
+        seen.press(KEY[f"Key_{way}"])
+        passed.append(seen.focus.accessibleName())
+    assert passed == [words(language).design_answers[ORDINALS[at]] for at in (0, 1, 2, 0, 2)]
+    seen.press(KEY.Key_Return)
+    assert (values(seen), seen.kinds.count(Submitted)) == ([ORDINALS[2]], 1)
+
+
 @pytest.mark.parametrize("typed", ["12", "2.5", "2,5", "1e3", "", "0", "-3", "many", "nan", "inf", "1e400"])
 def test_a_number_above_0_is_taken_and_anything_else_is_reported(opening: Opening, typed: str) -> None:
     taken = {"12": [12], "2.5": [2.5], "2,5": [2.5], "1e3": [1000]}.get(typed, [])

@@ -3,6 +3,7 @@
 import importlib.util
 import re
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from PySide6.QtCore import QPoint, QSize, Qt
@@ -13,10 +14,11 @@ from PySide6.QtWidgets import QLabel
 from study_app import figure_style as style
 from study_app.analysis.data.study_tables import load_study
 from study_app.analysis.report.study_figures import plot
-from study_app.analysis.worker_messages import FigureDrawn, LeaveOut, OpenKey, Progress, TakeBack
+from study_app.analysis.worker_messages import FigureDrawn, LeaveOut, OpenKey, Progress, ReadStudy, TakeBack
 from study_app.gui.results import figures
 from study_app.gui.results.view import NO_SAV
 from study_app.gui.widgets.controls import ActionButton
+from study_app.workers.server import Refused
 from tests.analysis.conftest import SAMPLE
 from tests.gui.results.sample import LEFT_OUT, SVG, facts, view
 from tests.gui.windows import results
@@ -224,6 +226,26 @@ def test_what_a_rule_proposes_is_excluded_or_kept_by_a_person(place, qtbot):
         folder=place.view.chosen, participant="P003", session=1, trial=None, by="CD", reason="left-handed",
         rule="below_chance",
     )  # fmt: skip
+
+
+DECISION = {"folder": Path("demo"), "by": "AK", "reason": "asleep"}
+TRIAL = DECISION | {"participant": "P002", "session": 1, "trial": 3}
+
+
+@pytest.mark.parametrize(
+    ("decision", "stays"),
+    [
+        (LeaveOut(**TRIAL), "Nothing was excluded"),
+        (TakeBack(**TRIAL), "The exclusion still applies"),
+        (OpenKey(**DECISION), "The study is still blinded"),
+    ],
+)
+def test_a_decision_that_is_refused_says_what_stays_and_the_study_is_read_again(place, qtbot, decision, stays):
+    place._send_order(decision, "deciding")
+    with qtbot.waitSignal(place.message) as told:
+        place._handle_answer(len(place.reader.orders), Refused("the disk is full"))
+    assert told.args == [stays, "the disk is full."]
+    assert place.reader.orders[-1] == ReadStudy(decision.folder)
 
 
 @pytest.mark.parametrize("sealed", [True, False])
