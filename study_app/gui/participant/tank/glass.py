@@ -13,7 +13,6 @@ from PySide6.QtGui import (
     QImage,
     QLinearGradient,
     QPainter,
-    QPainterPath,
     QPen,
     QPolygonF,
     QRadialGradient,
@@ -113,14 +112,11 @@ def shade(gradient: QGradient, *stops: tuple[float, str, int]) -> QBrush:
     return QBrush(gradient)
 
 
-def fill_shape(painter: QPainter, shape: QPolygonF | QPainterPath, brush: QBrush) -> None:
+def fill_shape(painter: QPainter, shape: QPolygonF, brush: QBrush) -> None:
     """Fill a shape, without an edge."""
     painter.setPen(Qt.PenStyle.NoPen)
     painter.setBrush(brush)
-    if isinstance(shape, QPainterPath):
-        painter.drawPath(shape)
-    else:
-        painter.drawPolygon(shape)
+    painter.drawPolygon(shape)
 
 
 def paint_walls(painter: QPainter, box: Box, camera: Camera) -> None:
