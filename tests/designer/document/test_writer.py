@@ -23,7 +23,6 @@ from study_app.designer.document.toml_edits import (
     WriterError,
     apply_edit,
 )
-from study_app.designer.document.toml_text import common_ends
 from study_app.errors import StudyError
 from study_app.protocol.source.document import value_at
 from tests.designer.document.grown import texts
@@ -36,14 +35,15 @@ STEPS = 16
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "equal"),
+    ("old", "new", "at", "before", "after"),
     [
-        ("honey", "honey", (5, 0)), ("thin honey", "thick honey", (3, 6)), ("honey", "money", (0, 4)),
-        ("abcd", "abcde", (4, 0)), ("aa", "aaaa", (2, 0)), ("", "honey", (0, 0)), ((7, 1, 2, 3), (8, 2, 3), (0, 2)),
+        ("thin honey", "thick honey", 3, "n", "ck"), ("honey", "money", 0, "h", "m"), ("abcd", "abcde", 4, "", "e"),
+        ("aa", "aaaa", 2, "", "aa"), ("", "honey", 0, "", "honey"), ("aaaa", "aa", 2, "aa", ""),
     ],
 )  # fmt: skip
-def test_the_equal_ends_of_two_texts_or_arrays_do_not_overlap(old: Any, new: Any, equal: tuple[int, int]) -> None:
-    assert common_ends(old, new) == equal
+def test_a_typed_text_replaces_only_what_differs(old: str, new: str, at: int, before: str, after: str) -> None:
+    study, (((splice,)),) = Study(old).with_text(new)
+    assert (study.text, splice.at, splice.before, splice.after) == (new, at, before, after)
 
 
 class Edited(RuleBasedStateMachine):

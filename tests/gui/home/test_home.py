@@ -8,7 +8,6 @@ from PySide6.QtCore import QEvent, QPoint, QSize, Qt
 from PySide6.QtWidgets import QApplication, QDialog, QFileDialog
 
 from study_app.gui.home import view
-from study_app.gui.home.cards import CardGrid
 from study_app.gui.home.dialogs import NewSessionDialog, RehearsalDialog
 from study_app.gui.widgets.background import wait_for_jobs
 from study_app.gui.widgets.controls import ActionButton
@@ -160,8 +159,9 @@ def test_the_card_that_one_went_on_from_keeps_the_keyboard_and_is_in_sight(qtbot
         assert (len(home.grid.cards), held, bar.value()) == (count - 1, home.grid.cards[0], 0)
 
 
-def test_the_height_of_the_cards_is_that_of_their_texts_in_the_present_width(qtbot):
-    grid, cards = CardGrid(), [label("word " * count, "label", wraps=True) for count in (40, 90)]
+def test_the_height_of_the_cards_is_that_of_their_texts_in_the_present_width(qtbot, tmp_path):
+    grid = type(open_home(qtbot, tmp_path).grid)()
+    cards = [label("word " * count, "label", wraps=True) for count in (40, 90)]
     qtbot.addWidget(grid)
     grid.resize(240, 900)
     grid.show()

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from PySide6.QtCore import QRectF
 
-from study_app.gui.participant.tank.layers import VideoLayer
 from study_app.gui.participant.tank_widget import TankWidget
 from study_app.video.frames import VideoFrame
 from tests.gui.drawn import shown
@@ -42,11 +41,11 @@ def seen(tank: TankWidget, video: VideoFrame | None) -> np.ndarray:
     ("place", "ratio", "size"), [((640, 361), 1.5, (960, 541)), ((3, 5), 0.75, (2, 3)), ((0, 0), 2.0, (2, 2))]
 )
 def test_frames_are_asked_for_in_pixels_of_the_screen_and_at_least_two_each_way(
-    place: tuple[int, int], ratio: float, size: tuple[int, int]
+    made: Make, place: tuple[int, int], ratio: float, size: tuple[int, int]
 ) -> None:
-    layer = VideoLayer()
-    layer.place = QRectF(7, 11, *place)
-    assert layer.size(ratio) == size
+    video = made(task_page(follow(), video=True)).video
+    video.place = QRectF(7, 11, *place)
+    assert video.size(ratio) == size
 
 
 def test_another_frame_is_painted_and_the_same_one_is_not(made: Make, monkeypatch: pytest.MonkeyPatch) -> None:
