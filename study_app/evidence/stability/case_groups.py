@@ -31,7 +31,6 @@ from study_app.evidence.stability.stability_cases import (
     of_physical2,
     scenes,
 )
-from study_app.haptics.model.slope_limits import FASTEST_DELAYED_HZ, refusal_reason
 from study_app.haptics.runtime.closed_loop import BURST_PERIOD_S
 
 _SCALES: Final = (1.0, 3.0, 10.0, 20.0, 40.0)
@@ -70,8 +69,8 @@ _LINKS: Final[Mapping[str, tuple[Any, ...]]] = {
     "force_loss": (0.0, 0.0, 0.1, 0.5),
 }
 """How a study delays forces; a link that does nothing is one of 48."""
-_DELAYED_HZ: Final = tuple(hz for hz in _RATES_HZ if refusal_reason(hz) is None and hz <= FASTEST_DELAYED_HZ)
-"""Rates at which a session may delay forces; it needs a handle of `LEAST_DELAYED_KG`, the lightest of `_DRAWN`."""
+_DELAYED_HZ: Final = (500.0, 1000.0)
+"""Rates at which a session may delay forces; it also requires a handle that is no lighter than those of `_DRAWN`."""
 _OUTLIERS: Final[Mapping[str, tuple[Any, ...]]] = {"outliers": (0.002, 0.02), "outlier_mm": (0.5, 2.0, 5.0, 20.0)}
 _JUMPS: Final[Mapping[str, tuple[Any, ...]]] = {"burst_ms": (4.0, 8.0, 20.0, 40.0), "jump_mm": (0.5, 2.0, 5.0, 20.0)}
 DELAYS: Final[Mapping[str, tuple[Any, ...]]] = {"slows_to": (2, 3, 4), "swaps": (1,)}

@@ -22,8 +22,8 @@ from study_app.haptics.model.scene import Ewma, Given, Kalman, Scene, Velocity, 
 
 _SLOWEST_HZ: Final = 500.0
 """Lowest rate for participants [Hz]: with slower servos they would feel the limits rather than the liquids."""
-FASTEST_DELAYED_HZ: Final = 1000.0
-LEAST_DELAYED_KG: Final = 0.1
+_FASTEST_DELAYED_HZ: Final = 1000.0
+_LEAST_DELAYED_KG: Final = 0.1
 """Highest rate and least mass of the handle with a force that a study delays: a loop of 3,500 beyond was unstable."""
 MEASURED_KG: Final = 0.1
 """Mass of the free handle in the measurement of the table."""
@@ -181,15 +181,15 @@ def refusal_reason(rate_hz: float) -> str | None:
 
 def delayed_force_fault(rate_hz: float, mass_kg: float) -> str | None:
     """Return the reason why no force may be delayed at this rate with a handle of this mass, or None."""
-    if rate_hz > FASTEST_DELAYED_HZ:
+    if rate_hz > _FASTEST_DELAYED_HZ:
         return (
-            f"the servo runs at {rate_hz:g} Hz; above {FASTEST_DELAYED_HZ:g} Hz a delayed force may be unstable: set "
+            f"the servo runs at {rate_hz:g} Hz; above {_FASTEST_DELAYED_HZ:g} Hz a delayed force may be unstable: set "
             "device.rate_hz to 1000"
         )
-    if mass_kg < LEAST_DELAYED_KG:
+    if mass_kg < _LEAST_DELAYED_KG:
         return (
-            f"the handle has a mass of {1000 * mass_kg:.0f} g; below {1000 * LEAST_DELAYED_KG:g} g a delayed force may "
-            "be unstable: use a heavier handle"
+            f"the handle has a mass of {1000 * mass_kg:.0f} g; below {1000 * _LEAST_DELAYED_KG:g} g a delayed force "
+            "may be unstable: use a heavier handle"
         )
     return None
 

@@ -10,7 +10,7 @@ from study_app.evidence.stability.bench import Bench, new_trace
 from study_app.evidence.stability.case_groups import groups
 from study_app.evidence.stability.stability_cases import materials, of_physical2, parse_case
 from study_app.evidence.stability.verdict import MISJUDGED_ALLOWANCE_J, judge
-from study_app.haptics.model.slope_limits import delayed_force_fault
+from study_app.haptics.model.slope_limits import delayed_force_fault, refusal_reason
 from tests.haptics.scenes import COMPILED
 
 pytestmark = [pytest.mark.nightly, pytest.mark.slow]
@@ -31,6 +31,7 @@ def test_forces_are_delayed_only_in_loops_in_which_a_session_may_delay_them():
     late = [case for group in groups(count=200) if group.name == "late forces" for case in group.cases]
     assert len(late) == 200
     assert {delayed_force_fault(case.rate_hz, case.mass_kg) for case in late} == {None}
+    assert {refusal_reason(case.rate_hz) for case in late} == {None}
     assert {case.rate_hz for case in late} == {500, 1000}
     assert {case.mass_kg for case in late} == {0.1, 0.25, 0.6}
 
