@@ -453,19 +453,21 @@ class _Ends:
 
 
 def _choice_words(result: QuestionResult) -> str:
-    """Return how often each option was chosen."""
+    """Return how many participants chose the most frequent options."""
     parts = []
     for group in result.groups:
         n, counts = int(group.numbers["n"]), group.numbers["counts"]
         if not n:
             continue
-        option = max(counts, key=lambda count: counts[count])
-        share = clopper_pearson(int(counts[option]), n)
+        most = int(max(counts.values()))
+        first, *tied = [f"“{option}”" for option, count in counts.items() if count == most]
+        equal = f", and as many chose {listed(tied)}" if tied else ""
+        share = clopper_pearson(most, n)
         of = f" ({group.name.lower()})" if len(result.groups) > 1 else ""
         ends = f"[{100 * share.low:.0f}, {100 * share.high:.0f}] %"
         parts.append(
-            f"{counts[option]} of {n} participants chose “{option}”{of} ({100 * counts[option] / n:.0f} %, 95 % "
-            f"confidence interval {ends})"
+            f"{most} of {n} participants chose {first}{equal}{of} ({100 * most / n:.0f} %, 95 % confidence interval "
+            f"{ends})"
         )
     return f"“{result.short}”: {'; '.join(parts)}."
 

@@ -23,7 +23,7 @@ from study_app.analysis.report import first_page as pages
 from study_app.analysis.report import sections
 from study_app.analysis.report.first_page import Card, Presented, first_page, presented_in
 from study_app.analysis.report.sections import CLAIMS, answers, empty_studies
-from study_app.analysis.results import Results, lead_phrase
+from study_app.analysis.results import GroupAnswers, QuestionResult, Results, lead_phrase
 from study_app.analysis.statistics.recognition_tests import recognition
 from study_app.protocol.trials.designs import default_design
 from tests.analysis.made_up import DECIDED, ITEMS, delays, everybody, liquids, study
@@ -487,3 +487,20 @@ def test_of_successive_short_cards_each_pair_is_side_by_side(monkeypatch: pytest
         "SS--SS-----SS-"
     )
     assert page.count("n\u00a0=\u00a012") == len(made)
+
+
+@pytest.mark.parametrize(
+    ("counts", "sentence"),
+    [
+        ({"tea": 2, "milk": 5, "rum": 0}, "5 of 8 participants chose “milk” (62 %"),
+        ({"tea": 3, "milk": 1, "rum": 3}, "3 of 8 participants chose “tea”, and as many chose “rum” (38 %"),
+        ({"tea": 2, "milk": 2, "rum": 2}, "2 of 8 participants chose “tea”, and as many chose “milk” and “rum” (25 %"),
+    ],
+)
+def test_a_choice_names_each_of_the_most_frequent_options(counts: dict[str, int], sentence: str) -> None:
+    answered = GroupAnswers(code=None, name="", numbers={"n": 8, "counts": counts})
+    result = QuestionResult(
+        where="form", title="Form", is_form=True, item="drink", text="Which drink?", short="Drink", kind="choice",
+        measure="counts", figure=None, groups=(answered,),
+    )  # fmt: skip
+    assert pages._choice_words(result).startswith(f"“Drink”: {sentence}, 95 % confidence interval [")
