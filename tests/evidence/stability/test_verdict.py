@@ -37,16 +37,16 @@ def burst(seconds):
     ],
 )
 def test_force_above_40_hz_is_graded_by_its_excess(force_n, reasons):
-    restlessness = compare_fast(force_n, [SILENCE], 1000.0, FIRST)
-    assert reasons_of(limit=False, energy=False, oscillation=False, restlessness=restlessness) == reasons
-    as_restless = compare_fast(force_n, [SILENCE, force_n], 1000.0, FIRST)
-    assert reasons_of(limit=False, energy=False, oscillation=False, restlessness=as_restless) == ()
+    fast_force = compare_fast(force_n, [SILENCE], 1000.0, FIRST)
+    assert reasons_of(limit=False, energy=False, oscillation=False, fast_force=fast_force) == reasons
+    as_controlled = compare_fast(force_n, [SILENCE, force_n], 1000.0, FIRST)
+    assert reasons_of(limit=False, energy=False, oscillation=False, fast_force=as_controlled) == ()
 
 
 def test_fast_part_of_a_tone_is_its_rms():
-    restlessness = compare_fast(tone(0.1), [tone(0.03)], 1000.0, FIRST)
-    assert restlessness.fast_n == pytest.approx(0.1 / np.sqrt(2), rel=0.02)
-    assert restlessness.control_n == pytest.approx(0.03 / np.sqrt(2), rel=0.02)
+    fast_force = compare_fast(tone(0.1), [tone(0.03)], 1000.0, FIRST)
+    assert fast_force.fast_n == pytest.approx(0.1 / np.sqrt(2), rel=0.02)
+    assert fast_force.control_n == pytest.approx(0.03 / np.sqrt(2), rel=0.02)
 
 
 def test_late_force_may_exceed_its_control_by_a_share():
