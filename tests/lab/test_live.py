@@ -199,6 +199,21 @@ def test_a_fault_is_told_and_nothing_more_is_presented() -> None:
     live.close()
 
 
+def test_paths_begin_on_the_left_and_a_zigzag_turns_by_90_degrees_on_its_way_to_the_right() -> None:
+    """A workspace of 0.5 m by 0.4 m in the scene: five legs of 0.085 m / sin 45° along x, each at ±45°."""
+    half_m, filled = (0.025, 0.02, 0.02), REACHED * 10 * 0.025
+    ways_m = {name: 10 * programmed_path(name, SCENES["water"], half_m).position_m for name in TITLES}
+    for name in ("line", "stop"):
+        assert ways_m[name][[0, -1]] == pytest.approx(np.array([[-filled, 0, 0], [filled, 0, 0]]), abs=1e-3)
+    assert ways_m["reach"][[0, 800]] == pytest.approx(np.array([[-filled, 0, 0], [filled, 0, 0]]), abs=1e-3)
+    way_m = ways_m["zigzag"]
+    corners = np.round(np.linspace(0, len(way_m) - 1, 6)).astype(int)
+    leg_m = 2 * filled / 5
+    zs_m = leg_m / 2 * np.array([-1, 1, -1, 1, -1, 1])
+    expected_m = np.column_stack([np.linspace(-filled, filled, 6), np.zeros(6), zs_m])
+    assert way_m[corners] == pytest.approx(expected_m, abs=2e-3)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", TITLES)
 def test_programmed_paths_fit_the_workspace_and_the_hand_goes_along_them(name: str) -> None:

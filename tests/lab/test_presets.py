@@ -53,14 +53,20 @@ def test_a_preset_reads_back_as_it_was_and_check_takes_it(source: str, edit: boo
 
 
 @pytest.mark.slow
-def test_the_shipped_liquids_are_at_hand_with_those_of_a_folder_and_without_broken_files(tmp_path: Path) -> None:
-    origin = load_scene("rek2024", "honey")
-    save_preset(tmp_path / "mine.toml", preset_text(Setting("Honey", origin, origin)))
-    (tmp_path / "broken.toml").write_text("format = ", encoding="utf-8", newline="\n")
-    at_hand = available_liquids((tmp_path,))
+def test_the_shipped_liquids_are_at_hand_with_those_of_a_folder_and_without_broken_files(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("LIQUID_STUDY_WORKSPACE", str(tmp_path))
+    origin, folder = load_scene("rek2024", "honey"), tmp_path / "protocols"
+    folder.mkdir()
+    for name in ("mine", "physical_liquids"):  # the second one replaces a shipped file
+        save_preset(folder / f"{name}.toml", preset_text(Setting("Honey", origin, origin)))
+    (folder / "broken.toml").write_text("format = ", encoding="utf-8", newline="\n")
+    at_hand = available_liquids()
     assert Choice(source="rek2024", liquid="light_oil", title="Light oil (rek2024)") in at_hand
-    assert Choice(source=str(tmp_path / "mine.toml"), liquid="honey", title="Honey (mine)") in at_hand
-    assert {it.source for it in at_hand} == {*shipped(), str(tmp_path / "mine.toml")}
+    assert Choice(source=str(folder / "mine.toml"), liquid="honey", title="Honey (mine)") in at_hand
+    assert [it.liquid for it in at_hand if it.source == "physical_liquids"] == ["honey"]
+    assert {it.source for it in at_hand} == {*shipped(), str(folder / "mine.toml")}
     assert len({it.title for it in at_hand}) == len(at_hand)
     water = next(it for it in at_hand if (it.source, it.liquid) == ("rek2024", "water"))
     assert water.scene.velocity == Ewma()  # as its file says

@@ -162,6 +162,9 @@ def test_a_process_that_does_not_listen_is_killed(start: Callable[..., Tried], m
     monkeypatch.setattr(clients, "PATIENCE_S", 0.05)
     worker = start()
     answers_until(worker, worker.order("ignore"), lambda answer: answer == "deaf")
+    monkeypatch.setattr(
+        worker.process, "kill", threading.Timer(0.2, worker.process.kill).start
+    )  # it dies a little later
     worker.close()
     assert not worker.works
     worker.wait_until_ended()

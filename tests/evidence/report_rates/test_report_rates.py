@@ -135,3 +135,5 @@ def test_single_tests_are_counted() -> None:
     printed, covered, _ = count_single(("the same threshold for all", 12), 1, 0, 4)
     assert (printed.what, printed.hits, printed.studies, printed.limit) == (PRINTED, 4, 4, "at least 93 %")
     assert covered.hits >= 2
+    (skewed,) = count_single(("individual trends, skewed with mean 0, so that ranks decrease", 30), 1, 0, 60)
+    assert skewed.hits == 0

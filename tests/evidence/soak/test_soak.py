@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import threading
+from dataclasses import replace
 from pathlib import Path
 
 import numba
@@ -15,8 +16,9 @@ if numba.config.DISABLE_JIT:
     pytest.skip("the servo exists compiled only", allow_module_level=True)
 
 from study_app.cli import main
+from study_app.devices.faulty import KINDS
 from study_app.evidence.soak.soak import Audit, Soak, soak_servo
-from study_app.haptics.model.layout import LIMITER_GLITCH, LIMITER_STOP, SAMPLE, records
+from study_app.haptics.model.layout import LIMITER_GLITCH, LIMITER_NAMES, LIMITER_STOP, SAMPLE, records
 from study_app.haptics.runtime.telemetry import Samples
 from study_app.protocol.load import load_scenes
 
@@ -52,6 +54,65 @@ def test_two_virtual_minutes_of_every_fault_find_nothing(found):
     assert not found.device.last_n.any()
     assert found.dropped == 0
     assert len(found.memory) == 11
+
+
+def test_each_number_of_the_report_stands_beside_its_own_name(found):
+    """Every number is another one."""
+    counts, device, mib = found.counts.copy(), found.device.copy(), 2**20
+    for name, number in {
+        "limit_n": 8.0, "steepest_n": 1.2, "release_step_n": 1.1, "energy_step_n": 0.3, "no_number": 4, "refused": 15,
+        "stale": 1600, "drift_ns": 17, "latest_s": 0.018, "limiters": 30 + np.arange(len(LIMITER_NAMES)),
+        "not_finite": 91, "displaced": 92, "silent": 93, "long_ticks": 94, "buttons": 95, "lost": 96,
+        "lost_at_write": 97,
+    }.items():  # fmt: skip
+        counts[name] = number
+    for name, number in {
+        "most_n": 1.9, "writes": 2000, "not_finite": 21, "episodes": 50 + np.arange(7), "injected": 70 + np.arange(7),
+    }.items():  # fmt: skip
+        device[name] = number
+    report = replace(
+        found, counts=counts, device=device, overruns=22, dropped=23, recoveries=24, loads=25, stops=26,
+        memory=(mib, 2 * mib, 7 * mib // 2), drift=replace(found.drift, comparisons=27, worst=2.8e-10, longest_s=29.0),
+        rests=replace(found.rests, count=61, pushed_s=0.62, wake_mps=0.63, force_n=0.64),
+    )  # fmt: skip
+    limiters = {name: 30 + k for k, name in enumerate(LIMITER_NAMES)}
+    faults = {name: {"times": 50 + k, "readings": 70 + k, "seen": 91 + k} for k, name in enumerate(KINDS)}
+    _, drift, forces, counters, injected, memory, _ = (part.splitlines() for part in report.text().split("\n\n"))
+    assert drift == [
+        "drift",
+        "  clock                 17 ns from the ticks at most",
+        "  wake                  2.8e-10 of Σ|e|/S from its definition at most, in 27 comparisons; "
+        "the longest wake lasted 29 s",
+        "  remains after 61 rests   wake 0.63 m/s, force 6.4e-01 N; above 0.05 N for at most 0.62 s",
+    ]
+    assert forces == [
+        "forces",
+        "  largest written       1.900000 N (limit 8 N), 2,000 writes",
+        "  largest step          1.200000 N",
+        "    at a stop or fault  1.100000 N",
+        "    passivity control   0.300000 N",
+        "  non-finite forces     25",
+    ]
+    assert counters == [
+        "counters",
+        "  overruns 22; dropped samples 23; latest tick 18.000 ms late",
+        "  readings rejected 15; stale faults 1,600; recoveries 24",
+        "  scenes presented 25; force stopped by the host 26 times",
+        f"  limiters: {', '.join(f'{name} {ticks}' for name, ticks in limiters.items())}",
+    ]
+    assert [line.split() for line in injected] == [
+        ["fault", "times", "readings", "seen"],
+        *([name, *map(str, row.values())] for name, row in faults.items()),
+    ]
+    assert memory == ["memory [MiB]", "  1.0 2.0 3.5; growth +2.5"]
+    numbers = {
+        "clock_drift_ns": 17, "wake_drift": 2.8e-10, "wake_comparisons": 27, "longest_wake_s": 29.0, "rests": 61,
+        "residue_wake_mps": 0.63, "residue_force_n": 0.64, "pushed_at_rest_s": 0.62, "largest_force_n": 1.9,
+        "largest_step_n": 1.2, "largest_let_go_n": 1.1, "largest_energy_step_n": 0.3, "latest_s": 0.018,
+        "overruns": 22, "dropped": 23, "refused": 15, "stale_faults": 1600, "recoveries": 24, "scenes_presented": 25,
+        "force_stops": 26, "limiters": limiters, "faults": faults, "memory_bytes": [mib, 2 * mib, 7 * mib // 2],
+    }  # fmt: skip
+    assert report.table() == report.table() | numbers
 
 
 def test_the_same_seed_finds_the_same(scenes, found):

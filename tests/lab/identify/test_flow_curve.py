@@ -9,7 +9,7 @@ from study_app.errors import StudyError
 from study_app.haptics.model.laws import stress_pa
 from study_app.haptics.model.motion import Motion
 from study_app.haptics.model.overrides import override_all
-from study_app.lab.identify import measured_force
+from study_app.lab.identify import measured_force, preset
 from study_app.lab.identify.fit import fit, fit_curve
 from study_app.lab.identify.measured_force import FlowCurve
 from study_app.protocol.load import load_scene
@@ -148,6 +148,17 @@ def test_from_a_rheometer_file_to_a_preset(tmp_path):
     rows = np.genfromtxt(tmp_path / "out" / "ketchup-fit.csv", delimiter=",", names=True)
     assert rows["residual_pa"] == pytest.approx(rows["shear_stress_pa"] - rows["fitted_pa"])
     assert (tmp_path / "out" / "ketchup-fit.png").stat().st_size > 10_000
+
+
+def test_the_figure_of_a_flow_curve_names_what_was_measured_and_what_is_fitted():
+    result = fit_curve(begun("ketchup"), "ketchup", list(STARTS["ketchup"]), measured("ketchup", noise=0.2))
+    above, below = preset.figures.draw_curve(result).axes
+    curves = {line.get_label(): line.get_xydata().T for line in above.lines}
+    assert (curves["measured"] == [RATES, result.curve.stress_pa]).all()
+    fitted_pa = np.exp(np.interp(np.log(RATES), *np.log(curves["fitted"])))
+    assert fitted_pa == pytest.approx(result.fitted_pa, rel=1e-3)
+    residual = 100 * (result.curve.stress_pa - fitted_pa) / result.curve.stress_pa
+    assert below.lines[-1].get_xydata() == pytest.approx(np.column_stack([RATES, residual]), abs=0.2)
 
 
 @pytest.mark.parametrize(

@@ -9,6 +9,7 @@ from click.testing import CliRunner
 from study_app.cli import commands
 from study_app.haptics.model.effects.current import Uniform
 from study_app.haptics.model.estimators import Kalman
+from study_app.haptics.model.motion import Motion
 from study_app.haptics.model.overrides import override_all
 from study_app.haptics.model.scene import Box, Liquid, Scene
 from study_app.lab.identify import measured_force, preset
@@ -97,6 +98,24 @@ def test_the_residuals_in_the_table_are_measured_less_fitted(fitted, tmp_path):
     for k, axis in enumerate("xyz"):
         assert rows[f"fitted_{axis}_n"] == pytest.approx(force_n[:, k], abs=1e-12)
         assert rows[f"residual_{axis}_n"] == pytest.approx(found.measured_n[:, k] - force_n[:, k], abs=1e-12)
+
+
+@pytest.mark.slow
+def test_the_figure_of_a_fit_shows_forces_and_residuals_of_each_axis(fitted):
+    speed_mps = np.linspace(0.1, 2, len(REVERSE.t_s))
+    velocity_mps = np.outer(speed_mps, [0.48, 0.6, -0.64])
+    result = replace(fitted[0], motion=Motion(REVERSE.t_s, REVERSE.position_m, velocity_mps=velocity_mps))
+    force, residual, along = preset.figures.draw_force(result).axes
+    residual_n = result.measured_n - result.fitted_n
+    for axes, named_n in ((force, result.fitted_n), (residual, residual_n)):
+        shown = {line.get_label(): line.get_ydata() for line in axes.lines if len(line.get_label()) == 1}
+        assert shown.keys() == {"xyz"[axis] for axis in result.axes}
+        for axis in result.axes:
+            assert shown["xyz"[axis]] == pytest.approx(named_n[:, axis])
+    behind = [line.get_ydata() for line in force.lines if len(line.get_label()) > 1][1:]
+    assert np.column_stack(behind) == pytest.approx(result.measured_n[:, list(result.axes)])
+    along_n = residual_n @ [0.48, 0.6, -0.64]
+    assert along.lines[1].get_xydata() == pytest.approx(np.column_stack([speed_mps, along_n]))
 
 
 def test_places_along_a_line_follow_from_the_velocity(tmp_path):

@@ -81,6 +81,17 @@ def test_an_exploration_stays_in_the_tank_moves_without_jumps_and_lasts(seed: in
     assert np.linalg.norm(np.diff(position_m, axis=0), axis=1).max() * RATE_HZ < 0.6  # m/s
 
 
+@pytest.mark.parametrize("drawn", [0.2, 0.5, 0.9])
+def test_an_exploration_rests_where_each_figure_ends(drawn: float) -> None:
+    _, position_m = exploration(lambda: drawn, HALF_M, 60.0)
+    reach_m = 0.7 * np.array(HALF_M)
+    rests = position_m[1:][(np.diff(position_m, axis=0) == 0).all(axis=1)] / reach_m
+    aside, radius_m = 0.5 * (2 * drawn - 1), min(reach_m[0], reach_m[2]) * (0.6 + 0.4 * drawn)
+    strokes, circles, zigzag = [(-1, aside, 0), (aside, 1, 0), (aside, 0, 1)], radius_m / reach_m[0], (1, 0, -0.5)
+    ends = np.round([*strokes, (circles, 0, 0), zigzag], 9) + 0.0  # -0.0 is 0.0
+    assert {*map(tuple, np.round(rests, 9) + 0.0)} == {*map(tuple, ends)}
+
+
 def test_senses_tell_drag_from_a_push_and_half_of_each() -> None:
     def share(force_x: list[float]) -> float:
         senses = SensedTrial(scale=10.0)
