@@ -52,3 +52,83 @@ def test_omitted_keys_of_a_plan_are_not_written() -> None:
 def test_the_kind_of_a_question_is_told_unless_all_are_statements(kind: str, rows: str) -> None:
     text = text_of("sound").replace('id = "cold"', f'id = "cold"\n{kind}')
     assert rows.replace("|", "\n") in describe(parse(text.encode(), "file.toml"))
+
+
+SHUFFLED = 'order = "shuffled"\nquestionnaire = "feel"'
+
+
+@pytest.mark.parametrize(
+    ("study", "edits", "lines"),
+    [
+        (
+            "session",
+            {},
+            {
+                "Blinding double-blind: the operator does not see the force",
+                "Asked 3 statements (questionnaire feel), in the order of the file",
+                "Trials 2 trials, a different order for each participant",
+            },
+        ),
+        (
+            "session",
+            {
+                'languages = ["en"]': 'languages = ["en"]\nblinding = "single"',
+                "workspace_mm = [100, 60, 60]": "workspace_mm = [130, 70, 50]\nforce_limit_n = 6.5\nrate_hz = 2000",
+                'scale = "judged"': 'scale = "judged"\nitem_order = "shuffled"',
+            },
+            {
+                "Blinding single-blind: the operator sees the force and the wake",
+                "Force limit 6.5 N",
+                "Servo 2000 Hz",
+                "Tank 130 × 70 × 50 mm in the hand frame, 10 times as large in the scene",
+                "Asked 3 statements (questionnaire feel), in a new order each time",
+            },
+        ),
+        (
+            "session",
+            {
+                SHUFFLED: f"{SHUFFLED.replace('shuffled', 'constrained')}\nrepetitions = 4\nmax_repeats = 3\n"
+                'min_distance = 2\nbreak_page = "rest"\nbreak_every = 3',
+                "[pages.thanks]": '[pages.rest]\nkind = "break"\ntitle = "Rest"\nbody = "Rest."\n[pages.thanks]',
+            },
+            {
+                "Trials 8 trials, each condition 4 times, a different order for each participant, with each condition "
+                "at most 3 times in a row and at least 2 trials from one presentation of a condition to the next",
+                "Breaks 2, after every 3 trials: Rest",
+            },
+        ),
+        (
+            "levels",
+            {"standards = [1, 2]": "standards = [1, 2.5]"},
+            {
+                "Design 2IFC of viscosity_pa_s, standard 1, 2.5: 2 intervals, 0.6 s apart",
+                "Levels Weber fraction 0.2 to 0.8 (constant), 24 trials per standard",
+                "Comparisons viscosity_pa_s from 1.2 to 4.5 Pa·s",
+            },
+        ),
+        (  # the pace is 2π · 20 mm · 1 Hz
+            "matching",
+            {"levels = [2, 18]": "levels = [3, 15]"},
+            {
+                "Levels value 3 to 15 (adjustment), 4 trials per standard",
+                "Comparisons damping_nspm from 3 to 15 N·s/m",
+                "Force at the paced speed 0.4 to 1.9 N at 0.126 m/s, and at most 2.3 N at 1.2 times that speed",
+            },
+        ),
+        (
+            "grouped",
+            {
+                "[groups.first_thin]": "[groups.first_thin]\nshare = 2",
+                "[groups.first_thick]": "[groups.first_thick]\nshare = 3",
+            },
+            {"Group first_thin, share 2", "Group first_thick, share 3", "Answers 6 to 7 per session"},
+        ),
+    ],
+)
+def test_each_row_states_its_own_value(study: str, edits: dict[str, str], lines: set[str]) -> None:
+    text = text_of(study)
+    for old, new in edits.items():
+        assert text.count(old) == 1, old
+        text = text.replace(old, new)
+    described = describe(parse(text.encode(), "file.toml"))
+    assert lines - {" ".join(line.split()) for line in described.splitlines()} == set()

@@ -13,7 +13,7 @@ from study_app.haptics.model.ranges import Frozen
 from study_app.protocol.descriptions.protocol_text import describe
 from study_app.protocol.load import load, parse
 from study_app.protocol.model import Protocol
-from study_app.protocol.quantities import quantity, quantity_words
+from study_app.protocol.quantities import can_vary, quantity, quantity_words
 from study_app.protocol.source.files import source_bytes
 from study_app.store.receipt import without_conditions
 from tests.protocol.sound import SOUND
@@ -99,6 +99,22 @@ def test_every_number_of_a_liquid_has_words(study: str) -> None:
     for name in names - OF_THE_LOOP:
         assert quantity_words(name)
         assert "_" not in quantity_words(name)
+
+
+@pytest.mark.parametrize(
+    ("name", "wording", "varies"),
+    [
+        ("viscosity_pa_s", "viscosity", True),
+        ("wake.scaling", "wake scaling", True),
+        ("local_wake.reach_m", "local wake reach", True),
+        ("scene.scale", "scale", False),
+        ("motion.speed_mps", "fastest", False),
+    ],
+)
+def test_a_quantity_is_named_with_its_effect_and_varies_unless_it_holds_for_a_session(
+    name: str, wording: str, varies: bool
+) -> None:
+    assert (quantity_words(name), can_vary(name)) == (wording, varies)
 
 
 def test_unknown_quantity_is_refused() -> None:

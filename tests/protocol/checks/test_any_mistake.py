@@ -14,7 +14,7 @@ from tests.protocol.trials.level_studies import BLOCK, HEAD
 pytestmark = pytest.mark.slow
 
 VALUE = re.compile(r'(?<== )("[^"]*"|\[[^\[\]=]*\]|[-\d.]+|true|false)')
-WRONG = ('"rating"', "{}", '{ nl = "x" }', "[1]", "-1e308")
+WRONG = ('"rating"', "{}", '{ nl = "x" }', '[1, { nl = "x" }]', "-1e308")
 
 
 def mistakes(text: str) -> Iterator[str]:

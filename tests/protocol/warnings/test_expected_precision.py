@@ -1,6 +1,7 @@
 """What check says of the precision that a block's thresholds are expected to have."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -37,6 +38,13 @@ def plan_of(protocol) -> ThresholdPlan:
     plan = threshold_plan(protocol, protocol.blocks["thicker"])
     assert plan is not None
     return plan
+
+
+@pytest.mark.parametrize(("level", "unit"), [("weber", ""), ("difference", " N·s/m"), ("value", " N·s/m")])
+def test_only_a_weber_fraction_has_no_unit(level, unit):
+    plan = plan_of(study())
+    stimulus = plan.stimulus.model_copy(update={"level": level})
+    assert replace(plan, stimulus=stimulus).unit == unit
 
 
 @pytest.mark.slow
