@@ -532,6 +532,10 @@ def test_what_is_written_is_on_the_disk_before_what_follows_from_it(studied: Pat
     assert [line for line in early if "takes its place" in line] == []
     copied = {path.name for path in (tmp_path / "outputs/copied").rglob("*")}
     assert copied - {call.path.name for call in calls if call.name == "fsync"} == set()
+    disk = Disk(tmp_path)
+    with disk.used():
+        atomic.make_folder(tmp_path / "new" / "results")
+    assert list(early_changes(disk.calls)) == []
 
 
 @pytest.mark.slow
