@@ -108,7 +108,13 @@ def test_each_answer_has_its_own_condition_delay_and_site(made: Study, answers: 
 
 
 def test_each_row_of_the_aggregate_counts_the_answers_on_one_setting(made: Study, answers: list[Given]) -> None:
-    aggregate = {table.name: table.frame for table in exported_tables(made)}["aggregate"]
+    (table,) = (table for table in exported_tables(made) if table.name == "aggregate")
+    aggregate, described = table.frame, {column.name: column.description for column in table.columns}
+    meanings = {
+        "n": "valid answers", "missing": "without an answer", "cannot_judge": "“cannot judge”", "count_3": "level 3.",
+        "median": "Median", "q1": "Lower quartile", "q3": "Upper quartile", "agree_percent": "levels 5 to 7",
+    }  # fmt: skip
+    assert [name for name, meaning in meanings.items() if meaning not in described[name]] == []
     assert list(zip(aggregate["code"], aggregate["item"], strict=True)) == [
         (setting.code, item) for setting in SETTINGS for item in ITEMS
     ]
