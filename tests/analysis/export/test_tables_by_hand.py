@@ -161,6 +161,19 @@ def test_the_wide_table_has_the_median_of_each_persons_answers(made: Study, answ
     assert {str(schema.field(column.name).type) for column in same.columns[3:]} == {"int8"}
 
 
+def test_a_text_in_the_wide_table_is_that_of_the_last_session(made: Study, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each session numbers its trials from 1."""
+    texts = pd.DataFrame(
+        {"participant": ["A-P002"] * 3, "session": [2, 1, 2], "trial": [3, 8, 1], "response": ["last", "first", "next"]}
+    )
+    form = SimpleNamespace(id="end", title="End", is_form=True, settings=())
+    asked: Any = SimpleNamespace(id="why", text="Why?", where=form, question=SimpleNamespace(value_type="text"))
+    monkeypatch.setattr(Study, "answers_to", lambda *_: texts)
+    others: Any = SimpleNamespace(questions=(asked,), scores=())
+    wide = wide_table(replace(made, others=others))[0].frame.set_index("participant")["end__why"]
+    assert wide.dropna().to_dict() == {"A-P002": "last"}
+
+
 def test_the_codebook_counts_answers_and_names_conditions_with_the_same_delay(
     made: Study, answers: list[Given]
 ) -> None:
@@ -318,11 +331,11 @@ def test_the_codebook_describes_columns_doubts_and_credits(made: Study) -> None:
         ]
     }  # fmt: skip
     assert credit_lines(credited) == ("Authors: A. Kox, B. Lam.", "Licence: CC0.", "How to cite: Kox (2026).")
-    assert [line.partition("not stated")[0] for line in credit_lines(made)] == [
-        "Authors: ",
-        "Licence: ",
-        "How to cite: ",
-    ]
+    assert credit_lines(made) == (
+        "Authors: not stated.",
+        "Licence: not stated; ask the authors before you use the data.",
+        "How to cite: not stated; cite the study, its version and its authors.",
+    )
     greek = replace(made, title="Ölε", sites=())
     text = codebook_bytes(greek, {}).decode()
     assert text.startswith('{\n  "study": {\n    "name": "made_up",\n    "title": "Ölε",\n')
