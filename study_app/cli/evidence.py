@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import os
-import secrets
 import signal
 import sys
 import threading
@@ -372,7 +371,7 @@ def stability(
             measured = _measure(part, executor, show, whole=whole)
         _present_evidence(measured, None)
         return
-    seed = seed or secrets.token_hex(4)
+    seed = seed or os.urandom(4).hex()
     chosen = groups(seed, cases) if only is None else tuple(it for it in groups(seed, cases) if only in it.name)
     if not chosen:
         names = ", ".join(group.name for group in groups(seed, cases))
