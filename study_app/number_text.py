@@ -2,7 +2,6 @@
 
 import math
 import re
-import unicodedata
 from typing import Final
 
 MINUS: Final = "\u2212"
@@ -43,7 +42,7 @@ def readings_of(text: str, decimal_sign: str = ".") -> tuple[int | float, ...]:
     A single comma or point followed by three digits is a decimal sign or separates thousands, unless it is the
     ``decimal_sign`` of the page's language, or the part before it cannot be thousands, as in "0,500".
     """
-    plain = "".join(str(unicodedata.decimal(letter, letter)) for letter in text.strip().translate(_SPELLINGS))
+    plain = "".join(str(int(letter)) if letter.isdecimal() else letter for letter in text.strip().translate(_SPELLINGS))
     numbers: dict[float, int | float] = {}
     for decimal, convention in _CONVENTIONS:
         if (match := re.fullmatch(convention, plain)) is None or not re.search(r"\d", match["whole"] + match["part"]):
