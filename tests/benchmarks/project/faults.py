@@ -8,9 +8,10 @@ Once, hours before: the contexts of the quick and of the slow tests (``NUMBA_DIS
         -m "slow and not nightly" --cov --cov-context=test --cov-report= --junitxml=FOLDER/slow.xml
 
 Then ``python tests/benchmarks/project/faults.py FOLDER [--functions 100] [--seed 1] [--package haptics]``. Each fault
-runs in a copy of the work tree, with the quick tests first; the first failure ends it. Neither mutmut nor cosmic-ray
-exchanges arguments or columns, or chooses tests by contexts, so the faults are made here. A test counts for the circle
-in which `tests/circles.txt` has it run; those of the nightly circle are left out.
+runs in a copy of the work tree, with the quick tests first; the first failure ends it. The tests write recorded outputs
+anew (``--regenerate``), so that only an assertion notices a fault. Neither mutmut nor cosmic-ray exchanges arguments or
+columns, or chooses tests by contexts, so the faults are made here. A test counts for the circle in which
+`tests/circles.txt` has it run; those of the nightly circle are left out.
 """
 
 import argparse
@@ -271,13 +272,16 @@ def noticed_by(fault: Fault, folder: Path, copy: Path) -> str:
         shutil.copytree(cache, cache_with_fault, dirs_exist_ok=True)
 
     def failed(tests: list[str]) -> list[str]:
-        command = [sys.executable, "-m", "pytest", "-x", "-q", "--no-header", "-p", "no:cacheprovider", *tests]
+        options = ["-x", "-q", "--no-header", "-p", "no:cacheprovider", "--regenerate"]
+        command, begun_s = [sys.executable, "-m", "pytest", *options, *tests], time.time()
         try:
             done = subprocess.run(
                 command, check=False, cwd=copy, env=environment, capture_output=True, text=True, timeout=LIMIT_S
             )
         except subprocess.TimeoutExpired:
             return tests[:1]
+        finally:
+            restore_recordings(copy, begun_s)
         if done.returncode in (0, 5):
             return []
         named = [line.split()[1] for line in done.stdout.splitlines() if line.startswith(("FAILED ", "ERROR "))]
@@ -296,6 +300,14 @@ def noticed_by(fault: Fault, folder: Path, copy: Path) -> str:
     if cache_with_fault != cache:
         shutil.rmtree(cache_with_fault, ignore_errors=True)
     return found
+
+
+def restore_recordings(copy: Path, since_s: float) -> None:
+    """Restore the files of the tests that were written since a time [s since the epoch]."""
+    for path in (copy / "tests").rglob("*"):
+        if path.suffix != ".pyc" and path.is_file() and path.stat().st_mtime >= since_s:
+            recorded = ROOT / path.relative_to(copy)
+            shutil.copy2(recorded, path) if recorded.is_file() else path.unlink()
 
 
 def main() -> None:
