@@ -302,6 +302,23 @@ def test_each_column_of_a_table_of_levels_shows_its_number() -> None:
     assert checked == {(key, heading) for key, headings in CELLS.items() for heading in headings}
 
 
+def test_the_answers_at_a_level_are_percentages_only_if_they_are_proportions() -> None:
+    checked = set()
+    for number in range(24):
+        found = filled(number)[1]
+        answers = [row for row in Answers.of(found) if row.participant is None and not row.catch]
+        if found.adaptive or not answers:
+            continue
+        page = "".join(Answers(found).section())
+        for row in answers:
+            percentage, plain = f"{100 * row.value:.0f} %", f"{row.value:.3g}"
+            shown, other = (percentage, plain) if found.summary == "share" else (plain, percentage)
+            assert f">{shown}</td>" in page
+            assert f">{other}</td>" not in page or other in {f"{row.comparison:g}", f"{row.level:g}"}
+        checked.add(found.summary)
+    assert checked == {"share", "mean", "geometric mean"}
+
+
 HAS_UNIT_OF_LEVELS = {"threshold": True, "pse": True, "exponent": False, "d_prime": False, "value": False}
 
 
