@@ -55,6 +55,16 @@ def test_escape_held_stops_the_force_and_a_tap_does_not(running, qtbot):
     QTest.keyRelease(handle, Qt.Key.Key_Escape)
 
 
+def test_the_first_button_asks_to_pause_and_during_a_pause_to_resume(running, told, health):
+    requests = []
+    running.asked.connect(lambda request, _details: requests.append(request))
+    running.buttons.pause.click()
+    told.tell("paused", by="operator")
+    running.show_view(told.view(health))
+    running.buttons.pause.click()
+    assert requests == ["pause", "resume"]
+
+
 def test_a_question_about_a_trial_goes_with_the_trial(running, told, health, qtbot):
     running.ask_to_repeat()
     told.end(1)

@@ -272,22 +272,22 @@ def none_complete(study: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("change", "title", "named", "listed"),
+    ("change", "title", "named", "button", "listed"),
     [
-        (shutil.rmtree, "No studies yet", "", 0),
-        (without_sessions, "No sessions yet", "", 0),
-        (none_complete, "No complete session to show", "Start or continue a session on Home", 1),
-        (cut_table, "The study cannot be read", "P002", 3),
-        (cut_exclusions, "The study cannot be read", "exclusions.csv", 0),
+        (shutil.rmtree, "No studies yet", "", "Go to Home", 0),
+        (without_sessions, "No sessions yet", "", "Go to Home", 0),
+        (none_complete, "No complete session to show", "Start or continue a session on Home", "Go to Home", 1),
+        (cut_table, "The study cannot be read", "P002", "Refresh", 3),
+        (cut_exclusions, "The study cannot be read", "exclusions.csv", "Refresh", 0),
     ],
 )
 def test_what_cannot_be_shown_is_said_in_one_sentence(
-    qtbot: QtBot, results: Path, change: Callable[[Path], object], title: str, named: str, listed: int
+    qtbot: QtBot, results: Path, change: Callable[[Path], object], title: str, named: str, button: str, listed: int
 ) -> None:
     change(results / "demo")
     opened = Opened(qtbot, results)
     trouble = opened.place.figures.trouble
-    assert trouble.title.text() == title
+    assert (trouble.title.text(), trouble.button.text()) == (title, button)
     assert named in trouble.sentence.text()
     assert (len(opened.place.sessions.rows.shown), opened.titles) == (listed, [])
     assert opened.place.report.isEnabled() == (listed > 0)
