@@ -221,7 +221,7 @@ def run(protocol: str, *, no_recordings: bool, results: Path | None, **chosen: A
 @click.option(
     "--group",
     metavar="GROUP",
-    help=("Pre-existing group for all participants; default: spread evenly across the groups."),
+    help=("Pre-existing group for all participants; default: the planned ratio of the groups."),
 )
 @click.option(
     "--results",
@@ -233,7 +233,7 @@ def run(protocol: str, *, no_recordings: bool, results: Path | None, **chosen: A
 def rehearse(
     context: click.Context, /, protocol: str, *, device: str, no_recordings: bool, answers_only: bool, **chosen: Any
 ) -> None:
-    """Run complete sessions with simulated participants, faster than real time; every row is marked as simulated."""
+    """Run all sessions with simulated participants, faster than real time; every row is marked as simulated."""
     from study_app.protocol.load import load
 
     if chosen["results"] is None:
@@ -241,7 +241,8 @@ def rehearse(
     study = load(protocol)
     if study.asks_group and chosen["group"] is None:
         click.echo(
-            f"Simulated participants are spread evenly across the pre-existing groups {', '.join(study.groups)}."
+            "Simulated participants are divided among the pre-existing groups in the planned ratio: "
+            + ", ".join(f"{name} {share}" for name, share in study.shares.items())
         )
     if answers_only:
         if context.get_parameter_source("device") is not ParameterSource.DEFAULT:

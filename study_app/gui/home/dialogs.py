@@ -25,6 +25,7 @@ from study_app.gui.widgets.boxes import STRETCH, grid, hbox, vbox
 from study_app.gui.widgets.cards import Icon, Rule, scrolled
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import Ink, label, set_ink
+from study_app.number_text import counted
 from study_app.protocol.load import read_document
 from study_app.protocol.model import Protocol
 from study_app.protocol.source import source_bytes
@@ -62,7 +63,11 @@ class RehearsalDialog(Work):
     ) -> None:
         self.folder = rehearsal_folder(results, facts.protocol.study.name)
         groups = LANGUAGES["en"].joined(tuple(facts.protocol.groups))
-        dealt = f" Participants are distributed evenly across the groups {groups}." if facts.protocol.asks_group else ""
+        dealt = (
+            f" Participants are divided among the groups {groups} in the planned ratio."
+            if facts.protocol.asks_group
+            else ""
+        )
         super().__init__(
             parent,
             theme,
@@ -125,7 +130,7 @@ class RehearsalDialog(Work):
                 self.worker.close()
                 if isinstance(answer, Path):
                     self.show_done(
-                        f"Done: {count} simulated sessions have been stored in {self.folder}.", "Open results"
+                        f"Done: {counted(count, 'simulated participant')}, stored in {self.folder}.", "Open results"
                     )
                 else:
                     self.show_refused(answer.sentence)

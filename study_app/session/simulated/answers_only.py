@@ -45,7 +45,7 @@ from study_app.session.transitions.events import (
     Write,
 )
 from study_app.session.transitions.page_builder import preview
-from study_app.session.transitions.state import FINAL, SessionState
+from study_app.session.transitions.state import FINAL, Phase, SessionState
 from study_app.session.transitions.table import advance, initial_state
 from study_app.store.blinded import simulated_groups
 from study_app.store.files import StudyFolder, rehearsal_folder
@@ -71,7 +71,7 @@ def rehearse_answers(
     features: ConditionFeatures | None = None,
     progress: Callable[[str], object] | None = None,
 ) -> Path:
-    """Simulate the answers of P001, P002 … and return the study folder.
+    """Simulate the answers of P001, P002 … in all their planned sessions and return the study folder.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ def rehearse_answers(
     results : Path, optional
         Study folder; by default a new ``results/<study>-rehearsal-<n>`` of the workspace.
     group : str, optional
-        The pre-existing group of all participants; by default they are distributed evenly.
+        The pre-existing group of all participants; by default they are divided in the planned ratio.
     features : ConditionFeatures, optional
         The features of each condition; by default they are rehearsed first.
     progress : callable, optional
@@ -110,7 +110,9 @@ def rehearse_answers(
     said_s = time.perf_counter()
     with kept:
         for number, person in enumerate(people, start=1):
-            _answer_session(study, person, groups[person], kept, features)
+            session = 1
+            while _answer_session(study, person, groups[person], kept, features, session=session):
+                session += 1
             if progress is not None and (time.perf_counter() - said_s >= SAY_EVERY_S or number == participants):
                 said_s = time.perf_counter()
                 progress(f"{person}: {number} of {participants} simulated participants have answered")
@@ -118,15 +120,19 @@ def rehearse_answers(
 
 
 def _answer_session(
-    study: Protocol, who: str, group: str | None, kept: SimulatedStudy, features: ConditionFeatures
-) -> None:
-    """Simulate the answers of one session; ``group`` is the participant's pre-existing group."""
+    study: Protocol, who: str, group: str | None, kept: SimulatedStudy, features: ConditionFeatures, *, session: int
+) -> bool:
+    """Simulate the answers of one session and return whether another follows; ``group`` is pre-existing."""
     time_passed = SimulatedTime()
-    store = kept.begin(who, SessionClock(time_passed.ns, datetime.now().astimezone()), group)
+    store = kept.begin(who, SessionClock(time_passed.ns, datetime.now().astimezone()), group, session=session)
     own = store.protocol
     schedule = begun_schedule(own, start_of(store.lines), kept.key)
     state = initial_state(own, schedule, kept.key.codes, study.study.languages[0], secret=kept.key.nonce)
-    Answering(study, state, store, time_passed, lambda block, condition: features[block, condition]).run()
+    answering = Answering(
+        study, state, store, time_passed, lambda block, condition: features[block, condition], session=session
+    )
+    answering.run()
+    return answering.state.phase is Phase.COMPLETE and session < store.planned
 
 
 class Kept(typing.Protocol):
@@ -157,13 +163,15 @@ class Answering(SimulatedParticipant):
         kept: Kept,
         time_passed: SimulatedTime,
         features: Callable[[str, str], Sequence[TrialFeatures]],
+        *,
+        session: int = 1,
     ) -> None:
         self._features_of = features
         self._feels = NO_FEATURES
         self._sensed_in: dict[int, list[float]] = {}  # by trial, in the order of intervals
         self._time = time_passed
         self._store = kept
-        super().__init__(study, state.plan.schedule)
+        super().__init__(study, state.plan.schedule, session=session)
         self.state = state
 
     def run(self, until: int | None = None) -> None:

@@ -68,15 +68,22 @@ class AdjustingObserver:
 
 
 class SimulatedParticipant(ABC):
-    """Answer the pages of a session; subclasses define how time passes and where events go."""
+    """Answer the pages of a session; subclasses define how time passes and where events go.
 
-    def __init__(self, study: Protocol, schedule: Schedule, observer: Observer | None = None) -> None:
+    In every session with the same seed, a participant is the same observer, but with new random choices.
+    """
+
+    def __init__(
+        self, study: Protocol, schedule: Schedule, observer: Observer | None = None, *, session: int = 1
+    ) -> None:
         self.page: Page | None = None
         self._study = study
         self._seed, self._who = schedule.seed, schedule.participant
         self._trials = {trial.number: trial for trial in schedule.trials}
-        self.observer = observer or observer_of(self._stream("observer"))
-        self._person = rater(self._stream("person"), study.simulated_participants or REHEARSED)
+        own = f"rehearsal/{self._who}"
+        self._streams = own if session == 1 else f"{own}/session {session}"
+        self.observer = observer or observer_of(stream(self._seed, f"{own}/observer").random)
+        self._person = rater(stream(self._seed, f"{own}/person").random, study.simulated_participants or REHEARSED)
         self._courses = courses_of(schedule)
         self._said: dict[int, str | int | float] = {}
 
@@ -101,7 +108,7 @@ class SimulatedParticipant(ABC):
         """Return the sensed magnitudes of each interval by trial, for a block with a design."""
 
     def _stream(self, name: str) -> Draw:
-        return stream(self._seed, f"rehearsal/{self._who}/{name}").random
+        return stream(self._seed, f"{self._streams}/{name}").random
 
     def _comparison_of(self, trial: int) -> Comparison:
         """Return the comparison that the observer makes in a trial of a block with a design."""

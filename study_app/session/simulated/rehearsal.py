@@ -11,6 +11,7 @@ had by arithmetic alone, but opinions rest on the wake's push, on how rough a fo
 too.
 """
 
+import itertools
 import operator
 import signal
 import threading
@@ -75,7 +76,7 @@ from study_app.session.simulated.participant import LOOK_AT_SETTING_S, Adjusting
 from study_app.session.tasks import TankView
 from study_app.session.transitions.events import Begin, Continue, Event, ResumeRequested, Stepped, Submitted
 from study_app.store import receipt
-from study_app.store.blinded import Key, session_protocol, simulated_groups
+from study_app.store.blinded import Key, planned_sessions, session_protocol, simulated_groups
 from study_app.store.files import StudyFolder, is_there, locate_session, rehearsal_folder
 from study_app.store.integrity import is_never_begun, place_of, read_list
 from study_app.store.journals import journal
@@ -232,8 +233,10 @@ class RehearsedSession(SimulatedParticipant):
         known: Mapping[int, tuple[TrialFeatures, ...]] | None = None,
         observer: Observer | None = None,
         answer: Answer | None = None,
+        *,
+        session: int = 1,
     ) -> None:
-        super().__init__(study, schedule, observer)
+        super().__init__(study, schedule, observer, session=session)
         self._answer = answer
         self.signals = _HeldSignals()
         self._known = known or {}
@@ -473,7 +476,9 @@ def rehearse(
     progress: Callable[[str], object] | None = None,
     observer: Observer | None = None,
 ) -> Path:
-    """Run one session each for P001, P002 … and return the study folder.
+    """Run all planned sessions of P001, P002 … and return the study folder.
+
+    A participant whose session ends early has no further sessions.
 
     Parameters
     ----------
@@ -490,9 +495,9 @@ def rehearse(
     recordings : bool
         Whether every tick of the servo and every frame of a trial is recorded.
     group : str, optional
-        The pre-existing group of all participants; by default they are distributed evenly.
+        The pre-existing group of all participants; by default they are divided in the planned ratio.
     progress : callable, optional
-        Called with a line after each session.
+        Called with a line for each session, after the last session of each participant.
     observer : Observer, optional
         The observer of interval trials; by default each participant's is drawn at random.
 
@@ -517,18 +522,27 @@ def rehearse(
     for person in people:
         used.check_unused(person, 1)
     for person, own_group in simulated_groups(StudyFolder(folder), study, people, group).items():
-        opening = open_session(
-            study,
-            source,
-            person,
-            seed=seed,
-            device=device,
-            results=folder,
-            recordings=recordings,
-            group=own_group,
-            observer=observer,
-        )
-        _run_to_end(person if own_group is None else f"{person} (group {own_group})", opening, progress)
+        label = person if own_group is None else f"{person} (group {own_group})"
+        lines: list[str] = []
+        for session in itertools.count(1):
+            opening = open_session(
+                study,
+                source,
+                person,
+                session=session,
+                seed=seed,
+                device=device,
+                results=folder,
+                recordings=recordings,
+                group=own_group,
+                observer=observer,
+            )
+            store = _run_to_end(label if session == 1 else f"{label}, session {session}", opening, lines.append)
+            last = planned_sessions(StudyFolder(folder), study, person)
+            if session == last or progress_of(store.lines).ended != "completed":
+                break
+        if progress is not None:
+            progress("\n".join(lines))
     return folder
 
 
@@ -588,7 +602,7 @@ def _run_to_end(
     participant: str,
     opening: AbstractContextManager[tuple[RehearsedSession, SessionStore]],
     progress: Callable[[str], object] | None,
-) -> None:
+) -> SessionStore:
     """Run an opened session to its last page; ``progress`` gets a line with its responses and missing trials."""
     began = time.perf_counter()
     with _HeldSignals() as signals, opening as (rehearsal, store):
@@ -600,6 +614,7 @@ def _run_to_end(
         missing = f"; {store.missing_trials}" if store.missing_trials.count else ""
         answers = sum(progress_of(store.lines).answered.values())
         progress(f"{participant}: {answers} responses, {held}, fingerprint {store.fingerprint}{missing}")
+    return store
 
 
 @contextmanager
@@ -669,9 +684,8 @@ def open_session(
         store = begin_session(results, study, source, start, clock=SessionClock(rig.servo.now_ns))
         own = session_protocol(StudyFolder(results), store.as_recorded(study), participant, session)
         with store:
-            rehearsed = RehearsedSession(
-                own, begun_schedule(own, start_of(store.lines), store.key), rig, store, observer=observer, answer=answer
-            )
+            schedule = begun_schedule(own, start_of(store.lines), store.key)
+            rehearsed = RehearsedSession(own, schedule, rig, store, observer=observer, answer=answer, session=session)
             with _updated_tables(store):
                 yield rehearsed, store
 
@@ -742,18 +756,28 @@ def reopen_session(
         schedule = begun_schedule(own, begun, store.key)
         with store:
             start = resume_at(own, schedule, lines, store.key)
-            known = _features_of_whole_session(own, schedule, rig.device.name, store.key.codes, store.key.nonce)
+            known = _features_of_whole_session(
+                own, schedule, rig.device.name, store.key.codes, store.key.nonce, session=begun.session
+            )
             with _updated_tables(store):
-                yield RehearsedSession(own, schedule, rig, store, start, known=known, answer=answer), store
+                rehearsed = RehearsedSession(
+                    own, schedule, rig, store, start, known=known, answer=answer, session=begun.session
+                )
+                yield rehearsed, store
 
 
 def _features_of_whole_session(
-    study: Protocol, schedule: Schedule, device: str, codes: dict[str, dict[str, str]], secret: bytes
+    study: Protocol, schedule: Schedule, device: str, codes: dict[str, dict[str, str]], secret: bytes, *, session: int
 ) -> dict[int, tuple[TrialFeatures, ...]]:
     """Return the features of each trial (by number) of an uninterrupted session."""
     features: dict[int, tuple[TrialFeatures, ...]] = {}
     with rehearsal_rig(study, schedule.participant, schedule.seed, device) as rig:
         RehearsedSession(
-            study, schedule, rig, _DiscardingStore(rig.servo.now_ns, codes, secret), features=features.__setitem__
+            study,
+            schedule,
+            rig,
+            _DiscardingStore(rig.servo.now_ns, codes, secret),
+            features=features.__setitem__,
+            session=session,
         ).run()
     return features

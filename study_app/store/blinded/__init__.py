@@ -5,6 +5,7 @@ from study_app.store.blinded.allocation import (
     check_choice,
     check_session,
     claims,
+    planned_sessions,
     session_protocol,
     simulated_groups,
 )
@@ -38,6 +39,7 @@ __all__ = [
     "opened_key",
     "participant_group",
     "place_number",
+    "planned_sessions",
     "protocol_errors",
     "read_key",
     "recorded_protocol",

@@ -275,7 +275,7 @@ def _check_replaced(
 def simulated_groups(
     study: StudyFolder, protocol: Protocol, participants: Iterable[str], group: str | None
 ) -> dict[str, str | None]:
-    """Return the group of each new simulated participant: ``group``, or pre-existing groups in equal numbers.
+    """Return the group of each new simulated participant: ``group``, or pre-existing groups in the planned ratio.
 
     StudyError rejects an impossible ``group`` (`check_choice`).
     """
@@ -302,14 +302,27 @@ def session_protocol(study: StudyFolder, protocol: Protocol, participant: str, s
     StudyError
         The participant has no entry, or fewer sessions; or the study's key cannot be read.
     """
+    return protocol.for_session(_known_group(study, protocol, participant), session)
+
+
+def planned_sessions(study: StudyFolder, protocol: Protocol, participant: str) -> int:
+    """Return how many sessions the protocol plans for a participant whose group is known; 1 if it does not say.
+
+    Errors as in `session_protocol`.
+    """
+    return protocol.session_count(_known_group(study, protocol, participant)) or 1
+
+
+def _known_group(study: StudyFolder, protocol: Protocol, participant: str) -> str | None:
+    """Return a participant's group, None in a study without groups."""
     if not protocol.groups:
-        return protocol.for_session(None, session)
+        return None
     allocation = allocation_of(study, read_key(study.path), participant)
     if allocation is None:
         raise StoreError(
             f"participant {participant} does not have an entry in {study.allocated}: restore it from a backup"
         )
-    return protocol.for_session(allocation.group, session)
+    return allocation.group
 
 
 def claims(study: StudyFolder) -> list[Claim]:

@@ -100,9 +100,11 @@ class SimulatedStudy:
         )
         self.receipt = plain_json(first_receipt)
 
-    def begin(self, participant: str, clock: SessionClock, group: str | None = None) -> SimulatedSession:
+    def begin(
+        self, participant: str, clock: SessionClock, group: str | None = None, *, session: int = 1
+    ) -> SimulatedSession:
         """Return a new session, in a pre-existing ``group`` if the study has these; it is written at its end."""
-        return SimulatedSession(self, participant, clock, group)
+        return SimulatedSession(self, participant, clock, group, session=session)
 
     def keep(self, session: SimulatedSession) -> None:
         """Store a finished session.
@@ -147,28 +149,34 @@ class SimulatedStudy:
 class SimulatedSession:
     """A simulated session with the interface of ``open_session.SessionStore``, kept in memory until its end.
 
-    ``protocol`` is that of the session: in a study with groups, with the steps of the participant's group.
+    ``protocol`` is that of the session: in a study with groups, with the steps of the participant's group. ``planned``
+    is the participant's number of sessions; 1 if the protocol does not say.
     """
 
-    def __init__(self, study: SimulatedStudy, participant: str, clock: SessionClock, group: str | None) -> None:
+    def __init__(
+        self, study: SimulatedStudy, participant: str, clock: SessionClock, group: str | None, *, session: int
+    ) -> None:
         name = study.protocol.study.name
-        self.place = Place(study.folder, study.folder.session(participant, 1), name)
+        self.place = Place(study.folder, study.folder.session(participant, session), name)
         self.clock = clock
         self.lines: list[Event] = []
         self.content = bytearray()  # of the journal
         self._hash = hashlib.sha256()
         self._study = study
         allocation = allocate(study.folder, study.key, participant, group=group, waits=False, entries=study.entries)
-        self.protocol = study.protocol.for_session(None if allocation is None else allocation.group, 1)
+        own_group = None if allocation is None else allocation.group
+        self.planned = study.protocol.session_count(own_group) or 1
+        self.protocol = study.protocol.for_session(own_group, session)
         started_at = clock.at(0)
         at = {"started_at": started_at, "clock": {"origin_ns": clock.origin_ns, "origin_at": started_at}}
         of_group = {} if group is None else {"group": group}
-        self.receipt = {**study.receipt, "participant": participant, **of_group, **at}
-        own: dict[str, Any] = {"participant": participant, **of_group, "receipt_hash": receipt.digest(self.receipt)}
+        who = {"participant": participant, "session": session, **of_group}
+        self.receipt = {**study.receipt, **who, **at}
+        own: dict[str, Any] = {**who, "receipt_hash": receipt.digest(self.receipt)}
         if allocation is not None:
             own |= {"entry": allocation.entry, "place_in_group": allocation.place_in_group or None}
         self.append(replace(study.started, **own), t_s=0.0)
-        if allocation is not None and not allocation.is_preexisting:
+        if allocation is not None and not allocation.is_preexisting and session == 1:
             self.append(Allocated(entry=allocation.entry, sealed=allocation.sealed))
 
     def append(self, event: Event, *, t_s: float | None = None) -> None:
