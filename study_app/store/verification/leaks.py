@@ -17,6 +17,8 @@ from typing import Any, TypeAlias
 
 from study_app.protocol.model import Protocol
 from study_app.store.files.atomic import cannot_read, parse_json, paths_in
+from study_app.store.files.columns import every_column
+from study_app.store.files.csv_files import MISSING
 from study_app.store.files.folders import StudyFolder
 from study_app.store.journals.journal_events import Event, Stepped, TrialStarted
 
@@ -28,6 +30,7 @@ _PASSED_OVER = _STATEMENTS | _CLOCKS  # times can have any value: 1.717 s does n
 _SETTINGS = frozenset(
     {"id", "effects", "kind", "axes"}
 )  # words of the force model that do not reveal a condition by themselves
+_ANY_STUDY = (MISSING, "true", "false", "none")  # values in the files of any study
 _TELLING_DIGITS = 5  # number of digits that are unlikely to occur by chance
 
 
@@ -98,11 +101,13 @@ def recorded_numbers(protocol: Protocol, opened: Iterable[Event]) -> frozenset[f
 
 
 def certain_telltales(tables: Tables, published: Any, levels: Iterable[float] = ()) -> Telltales:
-    """Return the words that reveal a condition and do not occur by chance: no short numbers, no ``published`` words.
+    """Return the words that reveal a condition and do not occur by chance.
 
+    Short numbers, words of the ``published`` protocol and words in the files of any study may occur by chance.
     ``tables`` are the sealed key's, ``published`` is the receipt's protocol, ``levels`` are `presented_numbers`.
     """
-    known = " ".join(text for _, text in _texts(published, "", frozenset()))
+    columns = [column.variable for column in every_column(intervals=True)]
+    known = " ".join(text for _, text in _texts([published, columns, _ANY_STUDY], "", frozenset()))
     every = _telling_words(tables) | _all_spelled(levels)
     certain = (word for word in every if not word[0].isdigit() or _count_digits(word) >= _TELLING_DIGITS)
     return Telltales(word for word in certain if not Telltales([word]).in_text(known))
@@ -171,7 +176,7 @@ def _texts(value: Any, place: str, passed_over: frozenset[str]) -> Iterator[tupl
             yield place, name
             if name not in passed_over:
                 yield from _texts(inner, f"{place}, {name}", passed_over)
-    elif isinstance(value, list):
+    elif isinstance(value, list | tuple):
         for inner in value:
             yield from _texts(inner, place, passed_over)
     elif value is not None and not isinstance(value, bool):

@@ -86,6 +86,21 @@ def test_what_stands_somewhere_by_chance_or_is_published_tells_nothing_for_certa
     assert not {"honey", "practice", "1", "50", "0.068", "1000"} & words
 
 
+def test_the_name_of_a_condition_that_every_folder_contains_anyway_is_no_leak(
+    tmp_path: Path, protocol: Protocol, start: Start, attend: Attend
+) -> None:
+    """Labs name their conditions "a", "none" or "force"; "n/a" and the descriptions of columns do not reveal them."""
+    store = start(device={"name": "scripted", "priority": "none"})
+    attend(store)
+    store.finish("completed")
+    names = ["a", "n", "none", "true", "force", "delay", "haptic", "baseline", "slow", "undertow"]
+    tables = {"liquids": dict.fromkeys(names, {}), "conditions": {}}
+    words = certain_telltales(tables, receipt.without_conditions(protocol))
+    assert find_leaks(tmp_path / "study", words) == []
+    (tmp_path / "study" / "notes.txt").write_text("felt undertow", encoding="utf-8", newline="\n")
+    assert [leak.word for leak in find_leaks(tmp_path / "study", words)] == ["undertow"]
+
+
 def test_levels_standards_and_comparisons_are_looked_for_in_every_unit(tmp_path: Path) -> None:
     edits = (("standards = [1, 2]", "standards = [1.0713]"), ("[0.2, 0.4, 0.8]", "[0.2371]"))
     protocol = levels_study(*edits)
