@@ -267,7 +267,7 @@ def _analysis_warnings(protocol: Protocol) -> Iterator[str]:
     yield from _attribute_groups(protocol)
     yield from _block_order_warnings(protocol)
     yield from dict.fromkeys(_repeated_pages(protocol))
-    for number, value in enumerate(() if decided is None else decided.published):
+    for number, value in enumerate(() if decided is None else decided.published, start=1):
         yield from _unbracketed_value(protocol, number, value)
 
 
@@ -291,14 +291,17 @@ def _repeated_pages(protocol: Protocol) -> Iterator[str]:
 
 def _block_order_warnings(protocol: Protocol) -> Iterator[str]:
     """Yield contrasts of blocks in a fixed order, and fixed blocks among changing ones."""
-    for number, contrast in enumerate(() if protocol.analysis is None else protocol.analysis.contrasts):
-        if len(contrast.blocks) == 2 and protocol.study.block_order == "fixed" and not protocol.groups:
-            yield (
-                f"analysis.contrasts.{number}: all participants complete {' and '.join(contrast.blocks)} in the same "
-                "order, so the difference between them is confounded with practice and fatigue; choose "
-                "study.block_order "
-                '= "balanced"'
-            )
+    for number, contrast in enumerate(() if protocol.analysis is None else protocol.analysis.contrasts, start=1):
+        if len(contrast.blocks) < 2 or protocol.groups:
+            continue
+        said = (
+            f"analysis.contrasts.{number}: all participants complete {' and '.join(contrast.blocks)} in the same "
+            "order, so the difference between them is confounded with"
+        )
+        if not any({*contrast.blocks} <= {*steps} for steps in protocol.every_session()):
+            yield f"{said} practice and with everything else that differs between the sessions; add a control group"
+        elif protocol.study.block_order == "fixed":
+            yield f'{said} practice and fatigue; choose study.block_order = "balanced"'
     blocks = protocol.blocks_in_order
     main = [at for at, block in enumerate(blocks) if block.phase == "main"]
     for block in blocks[main[0] : main[-1]] if main and protocol.study.block_order != "fixed" else ():
@@ -414,12 +417,12 @@ def _recalled_instruments(protocol: Protocol) -> Iterator[str]:
 
 def _untitled_forms(protocol: Protocol) -> Iterator[str]:
     """Yield the forms whose heading would be their id, in a study that is not in English."""
-    others = [language_name(language) for language in protocol.study.languages if language != "en"]
-    for name in protocol.forms if others else ():
+    languages = protocol.study.languages
+    for name in protocol.forms if {*languages} != {"en"} else ():
         if protocol.questionnaires[name].title is None:
             yield (
                 f"questionnaires.{name}.title: there is no title, so participants see the ID as the heading; add a "
-                f"title in {others[0]}"
+                f"title in {', '.join(map(language_name, languages))}"
             )
 
 

@@ -94,7 +94,7 @@ def test_the_name_of_a_condition_that_every_folder_contains_anyway_is_no_leak(
     attend(store)
     store.finish("completed")
     names = ["a", "n", "none", "true", "force", "delay", "haptic", "baseline", "slow", "undertow"]
-    tables = {"liquids": dict.fromkeys(names, {}), "conditions": {}}
+    tables = {"liquids": {name: {} for name in names}, "conditions": {}}
     words = certain_telltales(tables, receipt.without_conditions(protocol))
     assert find_leaks(tmp_path / "study", words) == []
     (tmp_path / "study" / "notes.txt").write_text("felt undertow", encoding="utf-8", newline="\n")
