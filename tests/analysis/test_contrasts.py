@@ -42,6 +42,7 @@ from study_app.analysis.results import Results
 from study_app.analysis.statistics.equivalence import tost
 from study_app.analysis.statistics.thresholds import group_mean
 from study_app.errors import ProtocolError
+from study_app.number_text import counted
 from study_app.protocol.load import parse
 from study_app.protocol.model import OF_LEVELS, Contrast, Protocol
 from study_app.protocol.participants.raters import PUBLISHED, TYPICAL
@@ -120,6 +121,10 @@ def test_two_thresholds_are_compared_once_the_key_is_open(delayed: Path, tmp_pat
         "the liquid was “damper”, with varied damping at the hand (standard: 8 N·s/m) and a visual delay of 60 ms."
     )
     assert f"In the block “Late” (two-interval forced choice, 20 trials per participant), {standard}" in first
+    words, trials = methods(study, results), "(two-interval forced choice, 20 trials per participant)"
+    for title, delay in (("Late", " with a visual delay of 60 ms"), ("Prompt", "")):
+        said = rf"In “{title}” {re.escape(trials)}, damping at the hand was judged at Weber fractions from \S+ to \S+ "
+        assert re.search(rf"{said}for a standard of 8 N·s/m{delay}; levels were chosen by ", words)
     apart = "Late (60 ms of visual delay) than in Prompt (no visual delay)"
     asked = f"Threshold is higher in {apart}, with an equivalence bound of 1.25"
     assert first.index(asked) < first.index("Prompt: ")
@@ -134,8 +139,11 @@ def test_two_thresholds_are_compared_once_the_key_is_open(delayed: Path, tmp_pat
 
 
 def test_methods_name_all_compared_conditions_with_their_delays(guessed: tuple[Study, Results]) -> None:
-    words = methods(*guessed)
-    assert "(two-interval forced choice), damper and damper with a visual delay of 60 ms were compared." in words
+    study, words = guessed[0], methods(*guessed)
+    held = study.trials[study.trials["counted"] & study.trials["block"].isin([level.id for level in study.levels])]
+    (trials,) = set(held.groupby(["participant", "block"]).size())
+    design = f"(two-interval forced choice, {counted(trials, 'trial')} per participant)"
+    assert f"{design}, damper and damper with a visual delay of 60 ms were compared." in words
 
 
 def test_thresholds_of_a_staircase_leave_nobody_out_and_name_who_did_not_do_a_block(tmp_path: Path) -> None:

@@ -1,6 +1,7 @@
 """The answers at each level or to each condition, and the levels that participants set: of all and of each."""
 
 import math
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -34,6 +35,7 @@ from study_app.analysis.levels.statistic import (
 from study_app.analysis.results import LevelsResult, Summary
 from study_app.analysis.statistics.outcome import Array, clopper_pearson, student_interval
 from study_app.analysis.wording import listed
+from study_app.number_text import counted
 from study_app.protocol.trials import Reply, Stimulus
 
 _MOST_NAMED = 6
@@ -41,8 +43,13 @@ _MOST_NAMED = 6
 
 def _condition_words(setting: Setting) -> str:
     """Return the liquid of a condition with its visual delay, if it has one."""
+    return f"{(setting.liquid or '').replace('_', ' ')}{_delay_words(setting)}"
+
+
+def _delay_words(setting: Setting) -> str:
+    """Return the visual delay and the link of a condition as a phrase; "" without any."""
     delay = f" with a visual delay of {setting.delay_ms:g} ms" if setting.delay_ms else ""
-    return f"{(setting.liquid or '').replace('_', ' ')}{delay}{f' ({setting.link})' if setting.link else ''}"
+    return f"{delay}{f' ({setting.link})' if setting.link else ''}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -405,7 +412,14 @@ class Answers(LevelStatistic[LevelAnswers]):
     def methods(self, block: LevelBlock) -> Iterator[str]:
         if not self.rows:
             return
-        stimulus, title, design = block.stimulus, self.found.title, block.design.paper_name
+        stimulus, title = block.stimulus, self.found.title
+        totals = Counter[str]()
+        for row in self.rows:
+            if row.participant is not None:
+                totals[row.participant] += row.n
+        least, most = min(totals.values()), max(totals.values())
+        trials = counted(most, "trial") if least == most else f"{least} to {most} trials"
+        design = f"{block.design.paper_name}, {trials} per participant"
         if stimulus is None:
             known = [] if block.reference is None else [block.reference, *block.settings]
             conditions = listed([*map(_condition_words, known)]) or "conditions"
@@ -413,7 +427,14 @@ class Answers(LevelStatistic[LevelAnswers]):
             return
         kind, (low, high) = KINDS[stimulus.level_kind], stimulus.levels
         chosen = "" if block.method is None else f"; levels were chosen by {block.method.paper_name}"
+        top = f"{high:g}" if stimulus.level_kind == "weber" else with_unit(self.found, high)
+        conditions = dict.fromkeys(_delay_words(setting.of) for setting in block.settings if setting.of is not None)
         yield (
-            f"In “{title}” ({design}), {self.found.quantity} was judged at {kind} from {low:g} to {high:g}"
-            f"{standards_of(self.found, self.rows)}{chosen}."
+            f"In “{title}” ({design}), {self.found.quantity} was judged at {kind} from {low:g} to {top}"
+            f"{standards_of(self.found, self.rows)}{''.join(conditions)}{chosen}."
         )
+        if (modulus := block.design.first) is not None:
+            yield (
+                f"Before these trials, a level of {with_unit(self.found, modulus.level)} was presented as the modulus, "
+                f"to which the number {modulus.number:g} was assigned."
+            )

@@ -61,7 +61,7 @@ def _sentences(study: Study, results: Results) -> Iterator[str]:
     yield from contrast_methods(results)
     if blocks:
         yield from _of_statements(study, results, blocks)
-    if blocks or results.levels:
+    if blocks or results.levels or study.others.questions:
         ran, analysed = (f"liquid-study {listed(them)}" for them in (study.programs or [__version__], [__version__]))
         same = f"The sessions were run and analysed with {ran}."
         yield same if ran == analysed else f"The sessions were run with {ran} and analysed with {analysed}."
@@ -131,6 +131,22 @@ def _exclusions(study: Study) -> str:
     out = [(study.left_out, "unfinished session"), (sessions, "excluded session"), (trials, "excluded trial")]
     parts = [counted(count, noun) for count, noun in out if count]
     sentences = [f"The analysis does not include {listed(parts)}."] if parts else []
+    by_rule = Counter(exclusion.rule_or_person for exclusion in study.exclusions)
+    sentences += [
+        f"{number_text.capitalised(counted(by_rule[rule], 'session'))} "
+        f"{'was' if by_rule[rule] == 1 else 'were'} excluded automatically because of {reason}."
+        for rule, reason in RULES.items()
+        if by_rule[rule]
+    ]
+    caught: dict[float, list[str]] = {}
+    for level in study.levels:
+        if level.wrong_most is not None:
+            caught.setdefault(level.wrong_most, []).append(f"“{level.title}”")
+    sentences += [
+        f"The protocol excludes sessions with more than {100 * most:g} % incorrect answers to the catch trials in "
+        f"{listed(titles)}."
+        for most, titles in caught.items()
+    ]
     if study.late:
         sentences.append(
             f"Some decisions about exclusions were made after the key was opened: {late_exclusions(study)}."
@@ -196,6 +212,7 @@ def _liquids(study: Study) -> str:
     """Return the liquids of the main blocks with their parameters; "" while the key is sealed."""
     settings = [setting for block in study.blocks for setting in block.settings]
     settings += [setting for block in study.levels for setting in (block.reference, *block.settings) if setting]
+    settings += [setting for question in study.others.questions for setting in question.where.settings]
     held = [
         setting.liquid
         for each in settings
@@ -211,15 +228,39 @@ def _liquids(study: Study) -> str:
 
 
 def _design(study: Study, results: Results) -> Iterator[str]:
-    """Yield sentences on the presentation and order of trials in each block of statements, and on block order."""
+    """Yield sentences on the presentation and order of trials in each block with questions, and on block order."""
     blocks = {block.id: block for block in study.blocks}
     for result in results.blocks:
         yield _presented(study, blocks[result.id], result)
         yield from said_of_presentations(result)
-    if results.blocks:
+    others = [*_other_questions(study, results)]
+    yield from others
+    if results.blocks or others:
         opened = "Conditions were identified only by codes until the key was opened."
         yield opened if study.revealed else "Conditions are identified only by codes."
     yield _block_order(study)
+
+
+def _other_questions(study: Study, results: Results) -> Iterator[str]:
+    """Yield the questions other than statements after the trials of each block; without statements, also its design."""
+    designed, rated = {level.id for level in study.levels}, {result.id for result in results.blocks}
+    asked = Counter(question.where.id for question in study.others.questions)
+    for where in {question.where.id: question.where for question in study.others.questions}.values():
+        if where.is_form or where.id in designed:
+            continue
+        if where.id in rated:
+            questions = counted(asked[where.id], "other question")
+            yield f"In “{where.title}”, participants also answered {questions} after each presentation."
+            continue
+        table, names = study.protocol["blocks"][where.id], [setting.condition for setting in where.settings]
+        known = [name.replace("_", " ") for name in names if name is not None]
+        which = counted(len(names), "condition") + (f" ({listed(known)})" if known else "")
+        order = f" {_ORDERS[table['order']]}" if len(names) > 1 else ""
+        times = f", {table['repetitions']} times each" if table["repetitions"] > 1 else ""
+        yield (
+            f"In “{where.title}”, {which} {'was' if len(names) == 1 else 'were'} presented{order}{times}; participants "
+            f"answered {counted(asked[where.id], 'question')} after each presentation."
+        )
 
 
 def _presented(study: Study, block: Block, result: BlockResult) -> str:
@@ -244,6 +285,8 @@ def _block_order(study: Study) -> str:
     """Return the order of the main blocks, by group if these differ; "" with one block."""
     titles = {block.id: block.title for block in study.blocks}
     titles |= {level.id: level.title for level in study.levels if level.phase == "main"}
+    titles |= {question.where.id: question.where.title for question in study.others.questions
+               if not question.where.is_form}  # fmt: skip
     if len(titles) < 2:
         return ""
     order = study.protocol.get("study", {}).get("block_order", "fixed")

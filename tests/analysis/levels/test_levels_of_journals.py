@@ -16,7 +16,7 @@ import pytest
 from study_app.analysis.data.study_tables import load_study
 from study_app.analysis.export.tables import wide_table
 from study_app.analysis.export_study import export
-from study_app.analysis.levels.evaluate import level_results
+from study_app.analysis.levels.evaluate import level_methods, level_results
 from study_app.analysis.levels.statistic import statistics
 from study_app.analysis.levels.tracks import OF_INTERVALS
 from study_app.analysis.report.write_report import report
@@ -195,6 +195,16 @@ def test_a_sealed_study_exports_its_intervals_without_what_tells_a_level(sealed_
         described = [entry[key] for key in ("title", "phase", "design", "item")]
         assert described == [block.capitalize(), "main", design, item]
     assert "vary" not in codebook["levels"][0]
+
+
+def test_the_methods_state_the_trials_the_unit_and_the_modulus(opened_levels: Path) -> None:
+    study = load_study(opened_levels)
+    words = " ".join(level_methods(study.levels, level_results(study)))
+    number, rate = "magnitude estimation, 6 trials per participant", "ratings, 6 trials per participant"
+    for title, design in (("Number", number), ("Rate", rate)):
+        assert re.search(rf"In “{title}” \({design}\), viscosity was judged at values from \S+ to \S+ Pa·s; ", words)
+    modulus = "a level of 2 Pa·s was presented as the modulus, to which the number 10 was assigned."
+    assert words.count(modulus) == 1
 
 
 @pytest.mark.usefixtures("figures_of_the_page")

@@ -13,6 +13,7 @@ import pytest
 from study_app.analysis.data.study_tables import Study, load_study
 from study_app.analysis.evaluate import evaluate
 from study_app.analysis.export.tables import wide_table
+from study_app.analysis.report.methods import methods
 from study_app.analysis.report.write_report import report
 from study_app.protocol import questions
 from study_app.protocol.load import load
@@ -20,6 +21,7 @@ from study_app.protocol.warnings.study_warnings import warnings
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store.exclusions import exclude
 from study_app.store.files.folders import StudyFolder
+from study_app.store.unblinding import unblind
 from study_app.store.verification.reproduction import reproduce_session
 from study_app.store.verification.whole_study import verify_study
 from tests.protocol.forms.mixed import mixed_file
@@ -212,3 +214,26 @@ def test_a_form_after_the_last_of_exchanged_blocks_has_all_its_answers(tmp_path:
     found = next(one for one in evaluate(study).questions if (one.where, one.item) == ("load", "effort"))
     words = {"0": "At the start", "stir": "After Stir", "again": "After Again"}
     assert {group.name: group.numbers["n"] for group in found.groups} == {words[code]: n for code, n in counts.items()}
+
+
+def test_the_methods_describe_a_block_without_statements(tmp_path: Path) -> None:
+    statement = (
+        '[[questionnaires.after.items]]\nid = "feels_liquid"\ntext = "It feels like a liquid."\nshort = "Liquid"\n'
+    )
+    protocol = mixed_file(tmp_path, (statement, ""), ('order = "shuffled"', 'order = "williams"\nrepetitions = 3'))
+    folder = rehearse_answers(
+        protocol, participants=2, seed=1, results=tmp_path / "results", features=made_up(protocol)
+    )
+    unblind(folder, by="AK", reason="test")
+    study = load_study(folder)
+    words = methods(study, evaluate(study, recordings=False))
+    assert (
+        "In “Stir”, two conditions (thin and thick) were presented in orders from a Williams design, 3 times each; "
+        "participants answered two questions after each presentation."
+    ) in words
+    assert "The simulated liquids were thin (" in words
+
+
+def test_the_methods_count_the_questions_beside_statements(study: Study) -> None:
+    words = methods(study, evaluate(study, recordings=False))
+    assert "In “Stir”, participants also answered two other questions after each presentation." in words

@@ -206,7 +206,7 @@ def test_a_rehearsal_names_the_groups_across_which_it_distributes_participants(q
     made = RehearsalDialog(study_facts(str(grouped(tmp_path, "pre-existing"))), results)
     qtbot.addWidget(made)
     texts = [shown.text() for shown in made.findChildren(QLabel)]
-    assert any("evenly across the groups first_thin and first_thick." in text for text in texts), texts
+    assert any("among the groups first_thin and first_thick in the planned ratio." in text for text in texts), texts
 
 
 def test_a_preexisting_group_is_chosen_before_a_session_begins_and_kept_in_the_next_one(
