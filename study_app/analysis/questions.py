@@ -168,6 +168,10 @@ def _question_result(study: Study, asked: PlacedQuestion) -> QuestionResult:
             for of_groups in zip(*(_groups(asked.where, part.answers_to(asked)) for _, part in parts), strict=True)
             for (group, _), (code, name, rows) in zip(parts, of_groups, strict=True)
         ),
+        options=asked.levels,
+        weighs=any(
+            asked.id in score.score.weights_from for score in study.others.scores if score.where.id == asked.where.id
+        ),
     )
 
 

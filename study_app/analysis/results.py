@@ -175,11 +175,16 @@ class GroupAnswers:
     numbers: Mapping[str, Any]
 
 
+_NOT_IN_JSON: Final = {"json": False}
+"""Metadata of a field that `report.json` does not contain."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class QuestionResult:
     """A question after the trials of a block or in a form: ``where`` is the place's id, ``title`` its display name.
 
-    ``measure`` and ``figure`` are the ids of the functions that compute and draw its numbers.
+    ``measure`` and ``figure`` are the ids of the functions that compute and draw its numbers. ``options`` are the texts
+    of possible answers; a question that ``weighs`` only determines the weights of a score.
     """
 
     where: str
@@ -192,6 +197,8 @@ class QuestionResult:
     measure: str
     figure: str | None
     groups: tuple[GroupAnswers, ...]
+    options: Mapping[str, str] = field(default_factory=dict, metadata=_NOT_IN_JSON)
+    weighs: bool = field(default=False, metadata=_NOT_IN_JSON)
 
     @property
     def n(self) -> int:

@@ -371,7 +371,7 @@ def _questions(
             _number_words(entry, presented if place == 0 else _NOT_PRESENTED)
             for place, entry in enumerate(numbers[:MOST_PANELS])
         ]
-        chosen = [result for result in asked if result.measure == "counts"]
+        chosen = [result for result in asked if result.measure == "counts" and not result.weighs]
         sentences += [_choice_words(result) for result in chosen]
         if sentences:
             yield Card(
@@ -424,7 +424,7 @@ def _number_words(numbers: Numbers, presented: Mapping[str, Presented] = _NOT_PR
         values = [*next(held for _, held in numbers.by_setting if held).values()]
         spread = f"SD {number(float(np.std(values, ddof=1)))}, " if n > 1 else ""
         return f"{what} was {number(means[0][1].value)} ({spread}range {min(values):g} to {max(values):g}, n = {n})."
-    scale = "" if numbers.bounds is None else " on a scale from {:g} to {:g}".format(*numbers.bounds)
+    scale = "" if numbers.bounds is None else " on a scale from {:g} to {:g}".format(*numbers.bounds).replace("-", "−")
     text = f"{what} was {listed(parts)}{scale} (95 % confidence interval{'s' * (len(parts) > 1)}, n = {n})."
     if len(means) != 2:
         return text
@@ -460,7 +460,7 @@ def _choice_words(result: QuestionResult) -> str:
         if not n:
             continue
         most = int(max(counts.values()))
-        first, *tied = [f"“{option}”" for option, count in counts.items() if count == most]
+        first, *tied = [f"“{result.options.get(option, option)}”" for option, count in counts.items() if count == most]
         equal = f", and as many chose {listed(tied)}" if tied else ""
         share = clopper_pearson(most, n)
         of = f" ({group.name.lower()})" if len(result.groups) > 1 else ""

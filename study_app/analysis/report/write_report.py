@@ -79,7 +79,7 @@ def as_json_types(value: Any) -> Any:
         entries = {field.name: getattr(value, field.name) for field in fields(value) if field.name != "statistics"}
         return as_json_types(entries | level_entries(value))
     if is_dataclass(value) and not isinstance(value, type):
-        held = {field.name: getattr(value, field.name) for field in fields(value)}
+        held = {field.name: getattr(value, field.name) for field in fields(value) if field.metadata.get("json", True)}
         omitted = _OF_FORMAT_2.get(type(value), frozenset())
         return {name: as_json_types(entry) for name, entry in held.items() if entry or name not in omitted}
     if isinstance(value, Contrast):

@@ -192,7 +192,15 @@ def _check_contrast(protocol: Protocol, contrast: Contrast, place: Path) -> Iter
             continue
         items = [item.id for item in asked.statements] if asked is not None else []
         known = items if block.design is None else protocol.measures_of(block)
-        if contrast.measure not in known:
+        kinds = {} if asked is None else {item.id: item.kind_id for item in asked.items}
+        if contrast.measure not in known and contrast.measure in kinds:
+            yield Fault(
+                (*place, "measure"),
+                f"{contrast.measure} is a {kinds[contrast.measure]}, but a hypothesis about answers after trials needs "
+                "a statement",
+                "choose a statement, or test the exported answers yourself",
+            )
+        elif contrast.measure not in known:
             yield unknown_name(
                 (*place, "measure"), f'block "{name}" does not measure {contrast.measure}', contrast.measure, known
             )

@@ -307,7 +307,10 @@ class YesNo(Design):
     kind: Literal["yesno"] = "yesno"
     noise_share: Annotated[
         float, within(0.05, 0.5, "with fewer noise trials, the false-alarm rate is unknown; 0.5 is balanced")
-    ] = Field(default=0.3, description="Proportion of trials in which the standard is presented.")
+    ] = Field(
+        default=0.3,
+        description="Proportion of trials in which the standard is presented; they are added to the method's trials.",
+    )
     paper_name: ClassVar = "yes–no"
     answers: ClassVar = ("yes", "no")
     arrangements: ClassVar = ((True,), (False,))

@@ -13,6 +13,7 @@ import pytest
 from study_app.analysis.data.study_tables import Study, load_study
 from study_app.analysis.evaluate import evaluate
 from study_app.analysis.export.tables import wide_table
+from study_app.analysis.report.first_page import cards
 from study_app.analysis.report.methods import methods
 from study_app.analysis.report.write_report import report
 from study_app.protocol import questions
@@ -237,3 +238,18 @@ def test_the_methods_describe_a_block_without_statements(tmp_path: Path) -> None
 def test_the_methods_count_the_questions_beside_statements(study: Study) -> None:
     words = methods(study, evaluate(study, recordings=False))
     assert "In “Stir”, participants also answered two other questions after each presentation." in words
+
+
+def test_the_first_page_names_options_as_participants_read_them_and_omits_the_weights_of_a_score(
+    tmp_path: Path,
+) -> None:
+    protocol = mixed_file(tmp_path, ('instrument = "nasa-tlx"', 'instrument = "nasa-tlx-weighted"'))
+    folder = rehearse_answers(
+        protocol, participants=3, seed=1, results=tmp_path / "results", features=made_up(protocol)
+    )
+    results = evaluate(load_study(folder), recordings=False)
+    assert sum(result.weighs for result in results.questions) == 15
+    sentences = [sentence for card in cards(results) for sentence in card.sentences]
+    assert not [sentence for sentence in sentences if "demand or" in sentence]
+    (used,) = [sentence for sentence in sentences if sentence.startswith("“Used”")]
+    assert re.search("participants chose “A (mouse|haptic device)”", used)

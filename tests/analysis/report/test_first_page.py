@@ -504,3 +504,6 @@ def test_a_choice_names_each_of_the_most_frequent_options(counts: dict[str, int]
         measure="counts", figure=None, groups=(answered,),
     )  # fmt: skip
     assert pages._choice_words(result).startswith(f"“Drink”: {sentence}, 95 % confidence interval [")
+    named = replace(result, options={"milk": "Warm milk", "tea": "Green tea", "rum": "Rum"})
+    with_text = sentence.replace("“milk”", "“Warm milk”").replace("“tea”", "“Green tea”").replace("“rum”", "“Rum”")
+    assert pages._choice_words(named).startswith(f"“Drink”: {with_text}, ")
