@@ -428,10 +428,10 @@ class Answers(LevelStatistic[LevelAnswers]):
         kind, (low, high) = KINDS[stimulus.level_kind], stimulus.levels
         chosen = "" if block.method is None else f"; levels were chosen by {block.method.paper_name}"
         top = f"{high:g}" if stimulus.level_kind == "weber" else with_unit(self.found, high)
-        conditions = dict.fromkeys(_delay_words(setting.of) for setting in block.settings if setting.of is not None)
+        delays = dict.fromkeys(_delay_words(setting.of) for setting in block.settings if setting.of is not None)
         yield (
             f"In “{title}” ({design}), {self.found.quantity} was judged at {kind} from {low:g} to {top}"
-            f"{standards_of(self.found, self.rows)}{''.join(conditions)}{chosen}."
+            f"{standards_of(self.found, self.rows)}{''.join(delays)}{chosen}."
         )
         if (modulus := block.design.first) is not None:
             yield (
