@@ -442,6 +442,8 @@ def _facts(study: Study) -> str:
     took_part = rows["participant"].nunique()
     planned = (study.protocol.get("analysis") or {}).get("participants")
     notes = ["all were included"] if study.n == took_part > 1 else []
+    if notes and (out := int((~rows["counted"]).sum())):
+        notes = [f"all were included, but {out} of {len(rows)} sessions {'was' if out == 1 else 'were'} not"]
     if took_part > study.n:
         notes = [f"{took_part - study.n} of {took_part} were not included ({_why_not_included(study)})"]
     notes += [] if planned is None else [f"{planned} were planned"]

@@ -126,6 +126,18 @@ def test_the_page_begins_with_the_number_of_participants_who_were_not_included_b
     assert f"Two participants (2 x). 5 of 7 were not included ({reasons}; see “How" in read(tmp_path / "report")
 
 
+@pytest.mark.usefixtures("figures_of_the_page")
+def test_the_page_begins_with_the_sessions_that_were_not_included_of_included_participants(
+    small: Results, tmp_path: Path
+) -> None:
+    answered_by_two(small)
+    small.add("P002", lambda _condition, _item: 3, session=2)
+    exclude(small.folder, "P002", 1, by="AK", reason="the phone rang")
+    small.open()
+    report(small.folder, tmp_path / "report")
+    assert "Two participants (2 x). All were included, but 1 of 3 sessions was not. " in read(tmp_path / "report")
+
+
 def test_an_exclusion_that_was_reversed_is_told_with_both_persons_and_reasons(small: Results) -> None:
     answered_by_two(small)
     at = datetime(2026, 3, 2, 9, tzinfo=UTC)
