@@ -16,7 +16,7 @@ import pytest
 
 from study_app.devices import driver
 from study_app.devices.descriptors import DEVICES
-from study_app.devices.doctor import DeviceFailure
+from study_app.devices.doctor import DeviceFailure, report_lines
 from study_app.devices.falcon.failures import FAILURES as FALCON
 from study_app.devices.force_dimension.library import FAILURES as FORCE_DIMENSION
 from study_app.devices.force_dimension.library import OPTION
@@ -532,3 +532,7 @@ def test_a_doctor_finds_what_is_wrong_and_nothing_else(name: str, fault: str | N
         assert report.failure is None or report.found[0].cure in report.failure
         order = [one.state for one in report.findings]
         assert "found" not in order[order.index("found") + 1 :]
+        lines = report_lines(report)
+        for finding in report.findings:
+            text = finding.symptom if finding.id == mode else finding.tested
+            assert any(line.startswith(f"{finding.number:>2}  ") and line.endswith(f"  {text}") for line in lines)
