@@ -41,6 +41,7 @@ from study_app.haptics.model.motion import Floats, Motion
 from study_app.haptics.model.scene import Effect, Everywhere, Kalman, Liquid, Scene, Velocity
 from study_app.haptics.runtime.offline import samples_along
 from study_app.lab.identify.measured_force import vectors_x
+from study_app.number_text import counted
 
 _SETTLED: Final = 2 / 3
 """After this share of the strokes the flow no longer depends on their start."""
@@ -85,7 +86,7 @@ def error_report(scene: Scene, delay_ticks: int = ASSUMED_TICKS) -> str:
     error_share, error_n, causes, against = _errors(resolve(scene), delay_ticks)
     split = (f"{name} {f'{100 * it:.2g} %' if it > ROUNDING else 'none'}" for name, it in causes._asdict().items())
     return (
-        f"expected error in the fastest strokes with a delay of {delay_ticks} ticks: {error_n:.2g} N, "
+        f"expected error in the fastest strokes with a delay of {counted(delay_ticks, 'tick')}: {error_n:.2g} N, "
         f"{100 * error_share:.2g} % of the force; causes: {', '.join(split)}; reference: {against}"
     )
 
@@ -105,7 +106,8 @@ def acting_report(scene: Scene) -> str:
         own, of_kalman = (_acting(alone, velocity) for velocity in (scene.velocity, Kalman()))
         better = [ticks for ticks in _LATE_TICKS if of_kalman[ticks].error < own[ticks].error]
         lines.append(
-            f"{liquid.id} on the hand (medium grip, 0.2 kg, {WHOLE}), {scene.velocity.kind}: {_acting_text(own)}"
+            f"delivered force of {liquid.id} (hand: medium grip, 0.2 kg, {WHOLE}; estimator: {scene.velocity.kind}): "
+            f"{_acting_text(own)}"
         )
         if better:
             lines.append(f'  with velocity = {{ kind = "kalman" }}: {_acting_text(of_kalman)}')

@@ -368,15 +368,21 @@ class Published(Table):
     )
     source: Brief = Field(default="", description="The publication that reports the value.")
 
-    def described(self) -> str:
-        """Return the value in words."""
+    def value_words(self, unit: str) -> str:
+        """Return the value with its measure, such as "PSE 3 ms"; ``unit`` is that of the varied parameter."""
+        names = {"weber": "Weber fraction", "pse": "PSE"}
+        of_value = unit if self.measure in ("threshold", "pse") else ""
+        return f"{names.get(self.measure, self.measure)} {self.value:g} {of_value}".rstrip()
+
+    def described(self, unit: str) -> str:
+        """Return the value with its block, standard and source; ``unit`` is that of the varied parameter."""
         about = (
-            "" if self.standard is None else f", standard {self.standard:g}",
+            "" if self.standard is None else f", standard {self.standard:g} {unit}".rstrip(),
             "" if self.percent is None else f", at {self.percent:g} % correct",
             "" if self.n is None else f", n = {self.n}",
             f", {self.source}" if self.source else "",
         )
-        return f"{self.block}: {self.measure} {self.value:g}{''.join(about)}"
+        return f"{self.block}: {self.value_words(unit)}{''.join(about)}"
 
 
 OF_LEVELS: Final = ("threshold", "exponent", "d_prime", "pse")
@@ -630,8 +636,12 @@ class Analysis(Table):
             raise invalid("each look needs more participants than the previous look", "looks")
         return self
 
-    def described(self, named_by: Sequence[str], *, statements: bool) -> Iterator[tuple[str, str]]:
-        """Yield a row for each decision; ``named_by`` maps conditions to the items that name them.
+    def described(
+        self, named_by: Sequence[str], *, units: Mapping[str, str], statements: bool
+    ) -> Iterator[tuple[str, str]]:
+        """Yield a row for each decision.
+
+        ``named_by`` states which item names each condition; ``units`` maps blocks to the unit of the varied parameter.
 
         Decisions about statements are omitted unless the study tests ``statements``.
         """
@@ -648,7 +658,7 @@ class Analysis(Table):
             yield "Precision", f"half-width of the 95 % confidence interval for the group mean: {width}"
         yield from (("Proposes exclusion", rule.words) for rule in self.exclusions)
         yield from (("Hypothesis", contrast.described()) for contrast in self.contrasts)
-        yield from (("Published", value.described()) for value in self.published)
+        yield from (("Published", value.described(units.get(value.block, ""))) for value in self.published)
 
     def _statement_decisions(self, named_by: Sequence[str]) -> Iterator[tuple[str, str]]:
         bound = self.equivalence_bound

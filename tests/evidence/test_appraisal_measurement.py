@@ -159,7 +159,7 @@ def test_scene_states_what_acts_of_each_part_at_two_and_three_ticks_and_offers_k
         r"with 2 ticks of delay, the hand receives \d+ % of the drag and (\d+) % of the wake \(error [\d.]+ %\); "
         r"with 3 ticks of delay, .* % of the wake \(error"
     )
-    assert own.startswith("water on the hand (medium grip, 0.2 kg, 1.6 Hz ±20 mm), ewma: ")
+    assert own.startswith("delivered force of water (hand: medium grip, 0.2 kg, 1.6 Hz ±20 mm; estimator: ewma): ")
     assert offered.startswith('  with velocity = { kind = "kalman" }: ')
     assert int(re.search(pattern, own)[1]) < 20
     assert int(re.search(pattern, offered)[1]) > 70
@@ -217,7 +217,7 @@ def test_each_effect_costs_what_it_adds(monkeypatch):
 def test_a_report_has_the_gates_table_with_costs_and_the_whole(monkeypatch):
     Clock(monkeypatch, lambda scene: 20 + sum(PRICES[it] for liquid in scene.liquids for it in liquid.effects))
     lines = report(Scene(accuracy=STEADY, liquids=(RIVER,)), batches=1).splitlines()
-    assert lines[0].startswith("river: effects named")
+    assert lines[0].startswith("river: effects listed in the file")
     assert [line.split()[3] for line in lines[2:4]] == ["2", "40"]
     assert lines[-1] == "one tick: 62 ns, 0.01 % of the tick period; without liquids, 20 ns"
 

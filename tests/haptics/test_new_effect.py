@@ -88,7 +88,7 @@ for one, stiffness_npm in ((scene, 5.0), (stiffer, 20.0)):
     table = simulate(one, motion)
     assert abs(table.fx_n - plain.fx_n + stiffness_npm * table.x_m).max() < 1e-9
     assert table.x_m.any()
-assert any("spring" in line and "named" in line for line in describe_gate(scene))
+assert any("spring" in line and "listed" in line for line in describe_gate(scene))
 assert any(section.title == "Spring" for section in sections(scene))
 assert with_parameter(scene, "effects.spring", "off").liquids[0].effects == ("drag",)
 assert find_parameters(scene, "thick", ["stiffness_npm"])[0].most == 100

@@ -65,7 +65,7 @@ SHUFFLED = 'order = "shuffled"\nquestionnaire = "feel"'
             {},
             {
                 "Blinding double-blind: the operator does not see the force",
-                "Asked 3 statements (questionnaire feel), in the order of the file",
+                "Questions 3 statements (questionnaire feel), in the order of the file",
                 "Trials 2 trials, a different order for each participant",
             },
         ),
@@ -81,7 +81,7 @@ SHUFFLED = 'order = "shuffled"\nquestionnaire = "feel"'
                 "Force limit 6.5 N",
                 "Servo 2000 Hz",
                 "Tank 130 × 70 × 50 mm in the hand frame, 10 times as large in the scene",
-                "Asked 3 statements (questionnaire feel), in a new order each time",
+                "Questions 3 statements (questionnaire feel), in a new order each time",
             },
         ),
         (
@@ -101,17 +101,17 @@ SHUFFLED = 'order = "shuffled"\nquestionnaire = "feel"'
             "levels",
             {"standards = [1, 2]": "standards = [1, 2.5]"},
             {
-                "Design 2IFC of viscosity_pa_s, standard 1, 2.5: 2 intervals, 0.6 s apart",
+                "Design 2IFC of viscosity_pa_s, standards 1, 2.5 Pa·s: 2 intervals, 0.6 s apart",
                 "Levels Weber fraction 0.2 to 0.8 (constant), 24 trials per standard",
-                "Comparisons viscosity_pa_s from 1.2 to 4.5 Pa·s",
+                "Comparisons viscosity_pa_s 1.2 to 4.5 Pa·s",
             },
         ),
         (  # the pace is 2π · 20 mm · 1 Hz
             "matching",
             {"levels = [2, 18]": "levels = [3, 15]"},
             {
-                "Levels value 3 to 15 (adjustment), 4 trials per standard",
-                "Comparisons damping_nspm from 3 to 15 N·s/m",
+                "Levels value 3 to 15 N·s/m (adjustment), 4 trials per standard",
+                "Comparisons damping_nspm 3 to 15 N·s/m",
                 "Force at the paced speed 0.4 to 1.9 N at 0.126 m/s, and at most 2.3 N at 1.2 times that speed",
             },
         ),

@@ -190,7 +190,7 @@ def test_the_density_counts_where_effects_are_chosen(tmp_path: Path) -> None:
         load_scene(written(tmp_path / "damper.toml", text), "damper")
     scene = load_scene(written(tmp_path / "damper.toml", f"{text}density_kg_m3 = 1000\n"), "damper")
     assert resolve(scene).liquids[0].drag == Drag(law="linear", damping_nspm=12)
-    assert "linear law, as specified in the file" in "\n".join(describe_gate(scene))
+    assert "drag law: linear, as specified in the file" in "\n".join(describe_gate(scene))
 
 
 def test_a_scene_with_a_damper_is_read_as_it_was_written(tmp_path: Path) -> None:

@@ -126,8 +126,8 @@ def _measure_words(protocol: Protocol, contrast: Contrast, language: str) -> str
 
 def hypotheses(protocol: Protocol, language: str) -> Iterator[str]:
     """Yield the contrasts and the questions of each main block; predictions are marked as hypotheses."""
+    stimuli = {block.id: protocol.stimulus_of(block) for block in protocol.main_blocks if block.stimulus}
     for contrast in () if protocol.analysis is None else protocol.analysis.contrasts:
-        stimuli = {block.id: protocol.stimulus_of(block) for block in protocol.main_blocks if block.stimulus}
         titled = contrast.model_copy(update={"blocks": tuple(_title(protocol, block) for block in contrast.blocks)})
         words = titled.words(
             {_title(protocol, block): protocol.condition_of(stimulus) for block, stimulus in stimuli.items()}
@@ -153,7 +153,8 @@ def hypotheses(protocol: Protocol, language: str) -> Iterator[str]:
             yield from _of_statements(protocol, block, language)
     for published in () if protocol.analysis is None else protocol.analysis.published:
         titled_value = published.model_copy(update={"block": _title(protocol, published.block)})
-        yield f"Published value for comparison, block {titled_value.described()}."
+        stimulus = stimuli.get(published.block)
+        yield f"Published value for comparison, block {titled_value.described(stimulus.unit if stimulus else '')}."
 
 
 def _equality_of(protocol: Protocol, contrast: Contrast) -> str:
@@ -244,7 +245,8 @@ def analyses(protocol: Protocol) -> Iterator[str]:
             yield (
                 f"Block {title}, group: we report the random-effects mean of the logarithmic thresholds "
                 f"(Paule–Mandel), with the Hartung–Knapp 95 % interval if there are at least {FEWEST} participants. "
-                "Each participant's variance is replaced by the geometric mean of it and the median variance."
+                "Each participant's variance is replaced by the geometric mean of that variance and the median "
+                "variance."
             )
             if plan.standards > 1:
                 yield (

@@ -116,7 +116,7 @@ class Effect:
     choose : callable, optional
         The table that the gate gives it, and why, in words.
     note : callable, optional
-        Text appended to the reason why it is chosen or named, if it has no ``choose``.
+        Text appended to the reason why it is selected or listed, if it has no ``choose``.
     model : Any
         Type of its table in a liquid; None without a table.
     default : Any
@@ -202,5 +202,5 @@ def smoothing_s(velocity: Any, given_s: float | None, usual_s: float) -> float:
 
 
 def rate_per_s(time_s: float) -> float:
-    """Return the rate [1/s] of a filter of this time [s]."""
+    """Return the rate [1/s] of a filter with this time constant [s]."""
     return math.inf if time_s == 0 else 1 / time_s

@@ -189,12 +189,15 @@ _NEVER_BY_ITSELF: Final = tuple(effect.name for effect in EFFECTS if not effect.
 
 
 class Verdict(NamedTuple):
-    """The verdict on one effect in one liquid: ``share`` is its bound over the sum of the bounds, 0 … 1."""
+    """The verdict on one effect in one liquid.
+
+    ``share`` is its bound divided by the sum of the bounds, 0 … 1; None if another model of the effect is used instead.
+    """
 
     liquid: str
     effect: Effect
     bound_n: float
-    share: float
+    share: float | None
     included: bool
     why: str
 
@@ -233,16 +236,16 @@ def _verdicts(scene: Scene, liquid: Liquid) -> tuple[Verdict, ...]:
     barred = _barred_effects(scene, liquid, bound_of)
     total_n = sum(bound_n for effect, bound_n in bound_of.items() if effect not in barred)
     judged = (
-        _chosen_verdicts(scene, liquid, bound_of, barred, total_n)
+        _verdicts_if_automatic(scene, liquid, bound_of, barred, total_n)
         if liquid.effects == "auto"
-        else _named_verdicts(liquid, bound_of)
+        else _verdicts_if_listed(liquid, bound_of)
     )
     return tuple(
         Verdict(
             liquid=liquid.id,
             effect=effect,
             bound_n=bound_of[effect],
-            share=bound_of[effect] / total_n if total_n > 0 else 0.0,
+            share=None if effect in barred else bound_of[effect] / total_n if total_n > 0 else 0.0,
             included=included,
             why=why,
         )
@@ -270,17 +273,17 @@ def _barred_effects(scene: Scene, liquid: Liquid, bound_of: Mapping[Effect, floa
     )
 
 
-def _named_verdicts(liquid: Liquid, bound_of: Mapping[Effect, float]) -> dict[Effect, tuple[bool, str]]:
-    """Return the verdicts on effects that the file names."""
-    judged: dict[Effect, tuple[bool, str]] = dict.fromkeys(bound_of, (False, "not named"))
+def _verdicts_if_listed(liquid: Liquid, bound_of: Mapping[Effect, float]) -> dict[Effect, tuple[bool, str]]:
+    """Return the verdicts if the file lists the effects."""
+    judged: dict[Effect, tuple[bool, str]] = dict.fromkeys(bound_of, (False, "not listed"))
     for name in bound_of:
         if name in liquid.effects:
             note = NAMED[name].note
-            judged[name] = True, f"named{note(liquid) if note is not None else ''}"
+            judged[name] = True, f"listed{note(liquid) if note is not None else ''}"
     return judged
 
 
-def _chosen_verdicts(
+def _verdicts_if_automatic(
     scene: Scene, liquid: Liquid, bound_of: Mapping[Effect, float], barred: Mapping[Effect, str], total_n: float
 ) -> dict[Effect, tuple[bool, str]]:
     """Omit the smallest effects while their sum stays within the target."""
@@ -333,18 +336,20 @@ def _heading(scene: Scene, liquid: Liquid) -> str:
     if motion.depth_m is not None:
         least, greatest = (f"{depth_m:g}".replace("-", "−") for depth_m in motion.depth_m)
         box += f", ball centre {least} to {greatest} m deep"
-    how = "effects chosen" if liquid.effects == "auto" else "effects named"
+    how = "effects selected automatically" if liquid.effects == "auto" else "effects listed in the file"
     return f"{liquid.id}: {how}; {box}"
 
 
 def _table(verdicts: tuple[Verdict, ...], cost_ns: Mapping[tuple[str, Effect], float] | None) -> list[str]:
-    rows = [["effect", "bound [N]", "share", *(["ns per tick"] if cost_ns is not None else []), "", "why"]]
+    rows = [
+        ["effect", "largest force [N]", "share", *(["ns per tick"] if cost_ns is not None else []), "used", "reason"]
+    ]
     for verdict in verdicts:
-        row = [verdict.effect, _newtons(verdict.bound_n), f"{verdict.share:.1%}"]
+        row = [verdict.effect, _newtons(verdict.bound_n), "–" if verdict.share is None else f"{verdict.share:.1%}"]
         if cost_ns is not None:
             cost = cost_ns.get((verdict.liquid, verdict.effect))
             row.append("–" if cost is None else f"{max(cost, 0.0):.0f}")
-        rows.append([*row, "in" if verdict.included else "out", verdict.why])
+        rows.append([*row, "yes" if verdict.included else "no", verdict.why])
     widths = [max(len(cell) for cell in column) for column in zip(*rows, strict=True)]
     numbers = range(1, len(widths) - 2)
     return [

@@ -11,7 +11,7 @@ from study_app.haptics.model.gate import describe_gate, resolve
 from study_app.haptics.model.overrides import override_value
 from study_app.haptics.model.scene import Scene
 from study_app.haptics.model.slope_limits import slope_limit, steady_force
-from study_app.number_text import counted
+from study_app.number_text import capitalised, counted
 from study_app.protocol.model import Block, Condition, Limits, Protocol
 from study_app.protocol.orders.balance import block_order_words, planned_participants
 from study_app.protocol.orders.block_orders import block_codes, order_of, orders_of
@@ -56,7 +56,8 @@ def describe(protocol: Protocol, delay_ticks: int = ASSUMED_TICKS, without_force
     if protocol.analysis is not None:
         named = [f"{name} by {condition.label}" for name, condition in protocol.conditions.items() if condition.label]
         statements = any(block.design is None and block.questionnaire is not None for block in protocol.main_blocks)
-        decided = list(protocol.analysis.described(named, statements=statements))
+        units = {block.id: protocol.stimulus_of(block).unit for block in protocol.main_blocks if block.stimulus}
+        decided = list(protocol.analysis.described(named, units=units, statements=statements))
     people = protocol.simulated_participants
     sections = (
         _head_lines(protocol, language),
@@ -126,10 +127,10 @@ def _head_lines(protocol: Protocol, language: str) -> Iterable[str]:
     return (f"{protocol.text(study.title, language)} ({study.name}, version {study.version})", *_aligned(rows))
 
 
-def number_range(numbers: Sequence[int]) -> str:
-    """Return the number that all kinds of sessions have in common, or its range."""
-    least, largest = min(numbers), max(numbers)
-    return f"{least}" if least == largest else f"{least} to {largest}"
+def number_range(numbers: Sequence[float], digits: str = "") -> str:
+    """Return the range of the numbers, "4 to 8"; a single number if both ends read alike."""
+    least, largest = f"{min(numbers):{digits}}", f"{max(numbers):{digits}}"
+    return least if least == largest else f"{least} to {largest}"
 
 
 def _session_lines(variant: Variant, planned: int | None, language: str) -> Iterable[str]:
@@ -176,19 +177,21 @@ def _block_lines(protocol: Protocol, block: Block, language: str, delay_ticks: i
         rows.append(("Duration", f"about {expected_duration_s(protocol, block.id) / 60:.0f} min"))
     rows.append(("Task", protocol.tasks[block.task].summary))
     if block.design is None and questionnaire is None:
-        rows.append(("Asked", "no questions"))
+        rows.append(("Questions", "none"))
     elif block.design is None and questionnaire is not None:
         order = "in the order of the file" if questionnaire.item_order == "fixed" else "in a new order each time"
         noun = "statement" if len(questionnaire.statements) == len(questionnaire.items) else "question"
         asked = counted(len(questionnaire.items), noun)
-        rows.append(("Asked", f"{asked} (questionnaire {block.questionnaire}), {order}"))
+        rows.append(("Questions", f"{asked} (questionnaire {block.questionnaire}), {order}"))
     return _titled(f"{part}{protocol.text(block.title, language)} (block {block.id}, {block.phase})", rows)
 
 
 def _design_rows(protocol: Protocol, block: Block, delay_ticks: int) -> Iterator[tuple[str, str]]:
     """Yield the rows about a block's design, levels and comparisons."""
     design = protocol.design_of(block)
-    kind = design.kind.upper()
+    kind = capitalised(design.paper_name.removeprefix("the method of "))
+    if design.kind == "abx" or design.kind.endswith("ifc"):
+        kind = design.kind.upper()
     intervals = "1 interval" if design.intervals == 1 else f"{design.intervals} intervals, {design.pause_s:g} s apart"
     if block.stimulus is None:
         yield "Design", f"{kind} against {block.standard}: {intervals}"
@@ -197,7 +200,11 @@ def _design_rows(protocol: Protocol, block: Block, delay_ticks: int) -> Iterator
     stimulus, method = protocol.stimulus_of(block), protocol.method_of(block)
     standards = [standard for standard in protocol.standards_of(block) if standard is not None]
     levels = sorted(method.levels_of(stimulus))
-    against = f", standard {', '.join(f'{standard:g}' for standard in standards)}" if standards else ""
+    unit = stimulus.unit
+    against = ""
+    if standards:
+        standards_text = ", ".join(f"{standard:g}" for standard in standards)
+        against = f", {'standard' if len(standards) == 1 else 'standards'} {standards_text} {unit}".rstrip()
     yield "Design", f"{kind} of {stimulus.vary}{against}: {intervals}"
     name = _LEVELS[stimulus.level_kind]
     of_each = " per standard" if standards else ""
@@ -209,7 +216,8 @@ def _design_rows(protocol: Protocol, block: Block, delay_ticks: int) -> Iterator
     tracks = "" if method.tracks == 1 else f" in {method.tracks} tracks"
     yield (
         "Levels",
-        f"{name} {levels[0]:.3g} to {levels[-1]:.3g} ({method.kind}{aimed}), {trials} trials{of_each}{tracks}",
+        f"{name} {number_range(levels, '.3g')}{f' {unit}' if unit and stimulus.level_kind != 'weber' else ''} "
+        f"({method.kind}{aimed}), {trials} trials{of_each}{tracks}",
     )
     if isinstance(method, Adjustment):
         low, high = stimulus.domain
@@ -218,8 +226,7 @@ def _design_rows(protocol: Protocol, block: Block, delay_ticks: int) -> Iterator
         yield "Settings", f"{steps} steps from one end to the other, starting near either end, {longest}"
     pairs = product(protocol.standards_of(block), levels)
     compared = [stimulus.comparison(standard, level) for standard, level in pairs]
-    unit = stimulus.unit
-    yield "Comparisons", f"{stimulus.vary} from {min(compared):.4g} to {max(compared):.4g} {unit}".rstrip()
+    yield "Comparisons", f"{stimulus.vary} {number_range(compared, '.4g')} {unit}".rstrip()
     task = protocol.tasks[block.task]
     if isinstance(task, Follow) and stimulus.vary != DELAY:
         pace_mps = task.fastest_stroke(protocol.device.workspace_m).speed_mps
@@ -232,13 +239,13 @@ def _design_rows(protocol: Protocol, block: Block, delay_ticks: int) -> Iterator
         fast_n = max(steady_force(level_scene, FASTER * pace_mps).drag_n for level_scene in scenes[-len(compared) :])
         yield (
             "Force at the paced speed",
-            f"{min(felt_n):.1f} to {max(felt_n):.1f} N at {pace_mps:.3g} m/s, and at most {fast_n:.1f} N at "
+            f"{number_range(felt_n, '.1f')} N at {pace_mps:.3g} m/s, and at most {fast_n:.1f} N at "
             f"{FASTER:g} times that speed",
         )
     if (highest_nspm := highest_damping(protocol, block)) > 0:
         scene = protocol.scene_for(protocol.condition_of(stimulus))
         limit_nspm = slope_limit(1 / scene.rate_hz, delay_ticks, scene.velocity)
-        yield "Damping", f"at most {highest_nspm:.4g} N·s/m at the hand; the slope limit is {limit_nspm:.4g}"
+        yield "Damping", f"at most {highest_nspm:.4g} N·s/m at the hand; the slope limit is {limit_nspm:.4g} N·s/m"
     yield from precision_rows(protocol, block)
 
 

@@ -247,10 +247,11 @@ class Reach(Task):
 
     @property
     def summary(self) -> str:
-        end = f"until {self.count} are reached" if self.count is not None else f"for {self.duration_s:g} s"
+        until_count = f"until {self.count} are reached (at most {self.timeout_s:g} s)"
+        end = until_count if self.count is not None else f"for {self.duration_s:g} s"
         return (
             f"reach for {len(self.targets_mm)} targets with a radius of {self.radius_mm:g} mm in turn, "
-            f"staying {self.dwell_s:g} s in each, {end}, for at most {self.timeout_s:g} s"
+            f"staying {self.dwell_s:g} s in each, {end}"
         )
 
     @property

@@ -61,7 +61,7 @@ def test_the_preset_is_the_fitted_scene(scene, tmp_path):
     assert found.scene != scene
     for command in ("check", "scene"):
         told = CliRunner().invoke(commands, [command, str(file)], catch_exceptions=False)
-        assert (told.exit_code, f"{liquid.id}: effects named" in told.output) == (0, True)
+        assert (told.exit_code, f"{liquid.id}: effects listed in the file" in told.output) == (0, True)
 
 
 @pytest.mark.slow

@@ -103,13 +103,15 @@ def _is_true_enough(extremes: Extremes, law: Law) -> bool:
 
 def _choose(extremes: Extremes) -> tuple[Drag, str]:
     if extremes.liquid.drag.law == "linear":
-        return extremes.liquid.drag, "linear law, as specified in the file"
+        return extremes.liquid.drag, "drag law: linear, as specified in the file"
     law, accuracy = cheapest_law(extremes), extremes.scene.accuracy
     if extremes.liquid.viscosity_pa_s is None:
-        return Drag(law=law), "constant law, because the liquid's viscosity is not specified"
+        return Drag(law=law), "drag law: constant, because the liquid's viscosity is not specified"
     if law == REFERENCE:
-        return Drag(law=law), f"law {law}"
-    return Drag(law=law), f"law {law}, within {100 * accuracy.relative:g} % or {accuracy.absolute_n:g} N of {REFERENCE}"
+        return Drag(law=law), f"drag law: {law}"
+    return Drag(
+        law=law
+    ), f"drag law: {law}, within {100 * accuracy.relative:g} % or {accuracy.absolute_n:g} N of {REFERENCE}"
 
 
 def _problem(liquid: Liquid) -> str | None:
@@ -155,7 +157,7 @@ EFFECT = Effect(
     exerted_n=_exerted_n,
     extent="area",
     choose=_choose,
-    note=lambda liquid: f", law {liquid.drag.law}",
+    note=lambda liquid: f", drag law: {liquid.drag.law}",
     model=Drag,
     default=Drag(),
     problem=_problem,
