@@ -3,6 +3,7 @@
 Nothing in them is NaN or infinite: what does not exist is None.
 """
 
+import re
 import traceback
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
@@ -367,7 +368,7 @@ class Results:
     contrasts: tuple[ContrastResult, ...] = ()
 
 
-SEALED: Final = "computed only after unblinding, because this requires knowing which condition each code stands for"
+SEALED: Final = "computed only after unblinding, because the codes do not show which condition is which"
 """The reason for results that are missing because the key is sealed."""
 
 BADGES: Final = {
@@ -398,8 +399,8 @@ def beyond_phrase(tested: Equivalence) -> str:
 
 
 def settings_noun(found: BlockResult | Block) -> str:
-    """Return the noun for a block's settings."""
-    return found.kind.removesuffix("s") if found.revealed else "setting"
+    """Return the noun for what a block compares: "liquid", "delay" or "view"; "condition" while the key is sealed."""
+    return found.kind.removesuffix("s") if found.revealed else "condition"
 
 
 def short_text(result: BlockResult, item: str) -> str:
@@ -474,9 +475,18 @@ def test_name(outcome: Outcome) -> str:
     return {
         "Friedman": "Friedman's test",
         "Wilcoxon signed ranks": "Wilcoxon's signed-rank test",
-        "trend over participants": "trend test across participants",
+        "trend over participants": "sign-flip permutation test on the participants' rank correlations",
         "t test of slopes": "Student's t test on the participants' slopes",
     }.get(outcome.test, outcome.test)
+
+
+def method_words(methods: Iterable[str]) -> str:
+    """Return the methods of several tests as text; opposite directions become "in the direction stated for each"."""
+    several = dict.fromkeys(methods)
+    if len(several) > 1:
+        stated = "one-sided in the direction stated for each statement"
+        several = dict.fromkeys(re.sub(r"one-sided \((?:in|de)creasing\)", stated, method) for method in several)
+    return "; ".join(several)
 
 
 def incomplete_words(result: BlockResult) -> str:

@@ -96,6 +96,11 @@ def percent(share: float) -> str:
     return "< 0.1 %" if 0 < share < 0.0005 else f"{significant(100 * share)} %"
 
 
+def whole_percent(share: float) -> str:
+    """Return a share in percent without decimals: 0 %, 96 %."""
+    return f"{share:.0%}".replace("%", " %")
+
+
 def listed(words: Sequence[str]) -> str:
     """Join words: "a, b and c"."""
     return " and ".join(words) if len(words) < 3 else f"{', '.join(words[:-1])} and {words[-1]}"

@@ -539,7 +539,7 @@ def test_power_tells_the_smallest_difference_between_groups() -> None:
     text = "\n".join(line for line in DELAYED.splitlines() if not line.startswith("contrasts"))
     error = math.log(1.3) / math.sqrt(2)  # the SD of the two errors is ln 1.3
     found = {("late", 20): PrecisionResult([np.array([[error], [-error]])], [np.full(2, 0.2)])}
-    for share, sizes in (1, "Each group contains 50%"), (2, "The two groups contain 67% and 33%"):
+    for share, sizes in (1, "Each group contains 50 %"), (2, "The two groups contain 67 % and 33 %"):
         protocol = grouped(text, "threshold", "late", '["late", "prompt"]', share)
         precisions = Precisions(protocol=protocol, sizes=(3, 18), studies=10, asked=10, seed=1, found=found)
         told = threshold_markdown(precisions)
@@ -583,14 +583,14 @@ def test_power_says_whether_the_planned_participants_suffice() -> None:
     assert "would detect even a decrease in d′ from 1.3 to 0 in one block of one group (a difference of 1.3)." in few
     assert f"| 20 | 16 (planned) | 90% | ±{half:.2f} | ±{least:.2f} |" in few
     assert "| 20 | 5 | 90% | too few | too few |" in few  # a t test of groups of 2 has one degree of freedom
-    assert "“Too few” means that fewer than 80% of studies would detect even a difference of 3 SD." in few
+    assert "“Too few” means that fewer than 80 % of studies would detect even a difference of 3 SD." in few
     assert "even a decrease" not in told(16, 1.7)
     points = smallest_differences(
         contrast, (16,), 0.06, 2, [("20", "90%", 0.9)], "trials", "SD.", "±{:.2f}".format, (0.5, 0.5), planned=16,
         unit=" points", titles={},
     )  # fmt: skip
-    assert f"find a difference smaller than ±{least:.2f} points with 80% power" in "\n".join(points)
-    assert "**The planned 5 participants are too few to find a difference in d′ of 3 SD with 80% power.**" in told(
+    assert f"find a difference smaller than ±{least:.2f} points with 80 % power" in "\n".join(points)
+    assert "**The planned 5 participants are too few to find a difference in d′ of 3 SD with 80 % power.**" in told(
         5, 1.3
     )
 
@@ -672,7 +672,7 @@ def test_power_plans_differences_and_equality_within_people(
     assert ("(a factor of 1.2), at a mean d′ of 1." if edits else "(a factor of 1.2).") in told
     assert "Equivalence requires at least 14 participants, at α = 0.05. Participants are included if both" in told
     assert "| smallest difference | shown to be equivalent if there is no difference |" in told
-    assert told.strip().endswith(f"| {ends} | {shown_equal(bound / spread, 40, alpha=0.05):.0%} |")
+    assert told.strip().endswith(f"| {ends} | {100 * shown_equal(bound / spread, 40, alpha=0.05):.0f} % |")
 
 
 def test_power_counts_studies_of_statements_that_show_equality() -> None:
@@ -690,7 +690,7 @@ def test_power_counts_studies_of_statements_that_show_equality() -> None:
     away = answers[..., 1] - answers[..., 0]
     shown = sum(tost(one, 1.0).verdict == "equivalent" for one in away - away.mean())
     assert 0 < shown < 20
-    row = f"| *{planned.contrasts[0].described()}, if there is no difference* | 0% | {shown / 20:.0%} ("
+    row = f"| *{planned.contrasts[0].described()}, if there is no difference* | 0 % | {100 * shown / 20:.0f} % ("
     assert row in power_markdown(powers(planned, (12, 24), 20, 20, 1, counts))
 
 

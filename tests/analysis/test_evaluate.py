@@ -109,7 +109,7 @@ def test_what_could_not_have_been_shown_is_out_of_reach() -> None:
 def test_of_five_no_pair_is_there_and_it_says_why(rek: Folder) -> None:
     liquids, delays = blocks(opened(rek, 5))
     assert Pairs.of(liquids) == ()
-    assert [one.what for one in liquids.absent] == ["comparison of two conditions", "cumulative mixed model"]
+    assert [one.what for one in liquids.absent] == ["pairwise comparison of conditions", "cumulative mixed model"]
     why = "5 participants cannot show a difference between two conditions: the smallest attainable p is .062, and .188"
     assert liquids.absent[0].why.startswith(f"{why} after Holm's correction for 3 pairs, which is above 0.05")
     assert [one.what for one in delays.absent] == [

@@ -237,16 +237,16 @@ def _opened(key: Key, block: str, codes: Sequence[str], kind: Kind | None) -> tu
     return tuple(sorted(settings, key=lambda setting: order.index(setting.condition))), kind
 
 
-def published_words(published: Published) -> str:
-    """Return a published value with its conditions as text."""
+def published_words(published: Published, unit: str | None) -> str:
+    """Return a published value with its conditions as text; ``unit`` is that of the varied parameter."""
     known = [
-        *([] if published.standard is None else [f"standard {published.standard:g}"]),
+        *([] if published.standard is None else [f"standard {published.standard:g} {unit or ''}".rstrip()]),
         *([] if published.low is None or published.high is None else [f"{published.low:g} to {published.high:g}"]),
         *([] if published.percent is None else [f"at {published.percent:g} % correct"]),
         *([] if published.n is None else [f"n = {published.n}"]),
     ]
     source = f"{published.source}: " if published.source else ""
-    return f"{source}{published.measure} {published.value:g}" + (f" ({', '.join(known)})" if known else "")
+    return f"{source}{published.value_words(unit or '')}" + (f" ({', '.join(known)})" if known else "")
 
 
 def compared_percent(published: Iterable[Published]) -> float | None:

@@ -268,7 +268,7 @@ class Study:
         if warn is None:
             return
         for doubt in self.doubts:
-            warn(f"warning: {doubt}; the file is used nevertheless")
+            warn(f"warning: {doubt}; the file is still used")
 
     def blocks_of(self, kind: Kind) -> tuple[Block, ...]:
         """Return the blocks that compare liquids, delays or views."""

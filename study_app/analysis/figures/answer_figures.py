@@ -257,8 +257,8 @@ _FILES: Final = 3
 def title(block: Block) -> str:
     """Return the title of a block's figure."""
     if block.kind == "delays":
-        return "Answers as a function of added delay" if block.revealed else "Answers for each delay setting"
-    return f"Agreement for each {_noun(block)}"
+        return "Answers as a function of added delay" if block.revealed else "Answers by condition"
+    return f"Agreement for each {_noun(block)}" if block.revealed else "Agreement by condition"
 
 
 def counts(study: Study, block: Block) -> list[str]:
@@ -349,7 +349,7 @@ def _counted_trials(study: Study, block: Block) -> pd.DataFrame:
 
 
 def _noun(block: Block) -> str:
-    return block.kind.removesuffix("s") if block.revealed else "setting"
+    return block.kind.removesuffix("s") if block.revealed else "condition"
 
 
 _PANELS_A_ROW: Final = 3

@@ -557,7 +557,7 @@ def _percentage_phrase(result: LevelsResult) -> str:
 
 def _weber_picture(study: Study, result: LevelsResult, forms: Sequence[str], name: str, _tracked: _Tracked) -> Picture:
     """Draw the Weber fractions of a block with thresholds at two or more standards."""
-    listed = "; ".join(published_words(published) for published in result.published)
+    listed = "; ".join(published_words(published, result.unit) for published in result.published)
     published = f" Open circles and dotted lines: published values, {listed}." if _published_fractions(result) else ""
     caption = (
         f"{result.title}: Weber fraction for {result.quantity}{_percentage_phrase(result)}, as a function of the "

@@ -10,7 +10,7 @@ from study_app import number_text
 from study_app.analysis.findings.finding import FDR, Absent, BlockAnswers, in_family
 from study_app.analysis.findings.statement_tests import StatementTests
 from study_app.analysis.html_page import heading, paragraph, table_of
-from study_app.analysis.results import BlockResult, NotTested, Tested, short_text
+from study_app.analysis.results import BlockResult, NotTested, Tested, method_words, short_text
 from study_app.analysis.statistics.cumulative_models import CumulativeModel, cumulative_model
 from study_app.analysis.statistics.outcome import false_discovery
 from study_app.analysis.wording import counted, interval, number, p_value
@@ -63,23 +63,25 @@ class _CumulativeModels(StatementTests):
             ("incomplete", lambda test: f"{self._model(test).incomplete}"),
             ("Answers", lambda test: f"{self._model(test).answers}"),
             *[(effect, partial(self._effect, place)) for place, effect in enumerate(effects)],
-            ("SD", lambda test: ", ".join(number(sd) for sd in self._model(test).sds)),
+            (
+                "SDs (intercept, delay)" if delays else "SD",
+                lambda test: ", ".join(number(sd) for sd in self._model(test).sds),
+            ),
             ("LR", lambda test: number(test.outcome.statistic)),
             ("p", lambda test: p_value(test.outcome.p)),
             ("adjusted p", lambda test: p_value(test.p_adjusted)),
             ("Verdict", lambda test: test.verdict),
             last=1,
         )
-        methods = "; ".join(dict.fromkeys(test.outcome.method for test in fitted))
+        methods = method_words(test.outcome.method for test in fitted)
         unit, sign = ("per 100 ms of delay", "answers rise") if delays else ("", "the first of the two is rated higher")
         yield paragraph(
             f"A cumulative logit mixed model was fitted to {self._answers()} to each primary statement, including the "
             f"answers of incomplete participants. Effects are log odds ratios {unit}".rstrip()
             + f" and are positive if {sign}; their 95 % intervals are Wald intervals. The SDs describe the "
             f"participants' intercepts{' and delay effects' if delays else ''}. "
-            f"Effects were tested with likelihood-ratio tests (LR; "
-            f"{methods}), and p values were adjusted ({fitted[0].correction}) across "
-            f"{number_text.counted(fitted[0].members, 'test')}.",
+            f"LR is the likelihood-ratio statistic; p values are based on {methods} and were adjusted "
+            f"({fitted[0].correction}) across {number_text.counted(fitted[0].members, 'test')}.",
             "soft",
         )
         for test in self.value:

@@ -100,7 +100,8 @@ def _about_against(against: Sequence[ContrastWithControl]) -> Iterator[str]:
         f"the mean difference lies within the bounds, and the study has {min_sample_reason(first.alpha, first.bound)}. "
         "Not equivalent: the whole confidence interval lies outside the bounds; this verdict is not corrected for the "
         "number of comparisons. Inconclusive: neither verdict is supported, which is not evidence of a difference. "
-        "Out of reach: with so few participants, no set of answers could have shown equivalence."
+        "Out of reach: with so few participants, no set of answers could have shown equivalence. Intervals for the "
+        "proportion of participants outside the bounds are 95 % Clopper–Pearson intervals."
     )
     disagree = sum(tested.found.checks_agree is False for tested in against)
     if disagree:
@@ -133,9 +134,15 @@ def _said_of(result: BlockResult, delay_ms: float, here: Sequence[ContrastWithCo
     reasons = _evidence_up_to(result, delay_ms)
     if not reasons:
         return f"These data neither support nor refute the claim that delays of up to {ms(delay_ms)} do not matter."
-    is_open = any(tested.verdict in ("inconclusive", "out of reach") for tested in here)
-    beyond = f" They do not show whether the mean differences at {ms(delay_ms)} exceed the bounds." * is_open
-    return f"Delays of up to {ms(delay_ms)} change the answers: {'; '.join(reasons)}.{beyond}"
+    unclear = [
+        f"“{short_text(result, tested.item)}”" for tested in here if tested.verdict in ("inconclusive", "out of reach")
+    ]
+    limit = (
+        f" For {listed(unclear)}, the data do not show whether the mean difference at {ms(delay_ms)} exceeds the bound."
+        if unclear
+        else ""
+    )
+    return f"Delays of up to {ms(delay_ms)} change the answers: {'; '.join(reasons)}.{limit}"
 
 
 def _evidence_up_to(result: BlockResult, delay_ms: float) -> tuple[str, ...]:
@@ -145,22 +152,27 @@ def _evidence_up_to(result: BlockResult, delay_ms: float) -> tuple[str, ...]:
     interval beyond the bound.
     """
     exploratory = {trend.item for trend in DelayTrend.of(result) if not trend.primary}
-    trends = (
-        f"agreement with “{short_text(result, lowest.item)}” shows a trend over delays of up to {ms(shown_ms)}"
-        + (" (exploratory)" if lowest.item in exploratory else "")
-        for lowest in LowestDelay.of(result)
-        if (shown_ms := lowest.over_all_ms) is not None and shown_ms <= delay_ms
-    )
-    beyond: dict[float, list[str]] = {}
+    trends: dict[float, list[str]] = {}
+    for lowest in LowestDelay.of(result):
+        if (shown_ms := lowest.over_all_ms) is not None and shown_ms <= delay_ms:
+            note = " (exploratory)" if lowest.item in exploratory else ""
+            trends.setdefault(shown_ms, []).append(f"“{short_text(result, lowest.item)}”{note}")
+    beyond: dict[str, list[str]] = {}
     for tested in ContrastsWithControl.of(result):
         if tested.verdict == "not equivalent" and tested.delay_ms <= delay_ms:
-            beyond.setdefault(tested.delay_ms, []).append(f"“{short_text(result, tested.item)}”")
-    differing = (
-        f"at {ms(at)}, the mean answers to {listed(items)} differ from those at the shortest delay by more than the "
-        "bound"
-        for at, items in beyond.items()
+            beyond.setdefault(tested.item, []).append(ms(tested.delay_ms))
+    differing = [f"“{short_text(result, item)}” (at {listed(delays)})" for item, delays in beyond.items()]
+    return (
+        *(
+            f"agreement with {listed(items)} shows a trend over delays of up to {ms(at)}"
+            for at, items in sorted(trends.items())
+        ),
+        *(
+            [f"mean answers differ from those at the shortest delay by more than the bound for {listed(differing)}"]
+            if differing
+            else []
+        ),
     )
-    return (*trends, *differing)
 
 
 def common_ms(result: BlockResult) -> float | None:

@@ -174,7 +174,7 @@ def empty_result(block: Block, *absent: NotTested) -> BlockResult:
 
 
 def _presentation_range(single: Iterable[Array]) -> tuple[int, int]:
-    """Return the least and greatest number of answers by a participant to one statement in one setting."""
+    """Return the least and greatest number of answers by a participant to one statement in one condition."""
     counts = np.concatenate([(~np.isnan(values)).sum(axis=2).ravel() for values in single] or [np.zeros(0)])
     given = counts[counts > 0]
     return (int(given.min()), int(given.max())) if len(given) else (0, 0)

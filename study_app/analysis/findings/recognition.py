@@ -88,7 +88,7 @@ class LiquidRecognition(Finding[RecognitionResult | None]):
             sorted(named.found.rates, key=lambda rate: rate.setting),
             ("Liquid", lambda rate: self.found.names[rate.setting]),
             ("correct", lambda rate: str(rate.hits)),
-            ("of", lambda rate: str(rate.n)),
+            ("n", lambda rate: str(rate.n)),
             ("undecided", lambda rate: str(named.found.table[rate.setting][_UNDECIDED_COLUMN])),
             ("proportion", lambda rate: number(rate.rate)),
             *ends_of(lambda rate: rate.interval),

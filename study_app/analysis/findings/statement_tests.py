@@ -34,6 +34,7 @@ from study_app.analysis.results import (
     Failure,
     NotTested,
     Tested,
+    method_words,
     name,
     settings_noun,
     short_text,
@@ -66,12 +67,13 @@ def table_of_tests(
     methods = dict.fromkeys(outcome.method for outcome in outcomes if outcome.p is not None)
     family = dict.fromkeys(
         (f"p adjusted ({test.correction}) across {test.members} tests" if test.members > 1 else "p not adjusted")
-        + f" (“{test.family}”)"
+        + f" (family “{test.family}”)"
         for test in tests
     )
     two = isinstance(first.outcome, Paired) and len(compared) == 2
     above = f", above 0 if {compared[0]} was rated higher than {compared[1]}" if two else ""
-    exact = f" ({'; '.join(methods)})" if methods else ""
+    exact = f" ({method_words(methods)})" if methods else ""
+    l_words = " L is Page's statistic." if statistic_symbol(first.outcome) == "L" else ""
     effect = first.outcome.effect_name
     yield heading(3, title)
     yield table_of(
@@ -93,7 +95,7 @@ def table_of_tests(
     )
     size = f" Effect size: {effect}{above}." if _has(outcomes, "effect") else ""
     ends = f" Confidence intervals (95 %): {'; '.join(intervals)}." if intervals else ""
-    yield paragraph(f"Test: {test_name(first.outcome)}{exact}; {'; '.join(family)}.{size}{ends}", "soft")
+    yield paragraph(f"Test: {test_name(first.outcome)}{exact}; {'; '.join(family)}.{l_words}{size}{ends}", "soft")
     if reasons and size and not intervals:
         yield paragraph(f"{'; '.join(map(number_text.capitalised, reasons))}.", "soft")
 
@@ -502,7 +504,7 @@ class Pairs(Finding[tuple[Pair, ...]]):
     key = "pairs"
     place = 3
     row_place = 7
-    what = "comparison of two conditions"
+    what = "pairwise comparison of conditions"
     kinds = ("liquids", "views")
     waits = ("liquids", "views")
     empty = ()
@@ -537,7 +539,8 @@ class Pairs(Finding[tuple[Pair, ...]]):
             last=1,
         )
         yield paragraph(
-            "Test: Wilcoxon's signed-rank test, only for statements that show a difference between the "
+            "Test: Wilcoxon's signed-rank test (V: sum of the ranks of the positive differences), only for statements "
+            "that show a difference between the "
             f"{settings_noun(self.found)}s ({pairs[0].tested.outcome.method}); p values are Holm-adjusted across the "
             f"{pairs[0].tested.members} pairs in this table. A rank-biserial correlation above 0 means that the first "
             f"{settings_noun(self.found)} in the pair was rated higher. Nominal 95 % confidence intervals use "

@@ -129,7 +129,7 @@ class Delivery(LevelStatistic[_Row]):
             f"{name.rpartition('_')[0].replace('_', ' ') or name} in {counted(count, 'interval')}"
             for name, count in reasons.most_common()
         ]
-        with_estimator = f", using the velocity estimator {self.estimator}" if self.estimator else ""
+        with_estimator = f", using the velocity estimator “{self.estimator}”" if self.estimator else ""
         kept = (
             f"Some intervals exceeded a limit: {listed(named)}." if reasons else "All intervals were within the limits."
         )

@@ -92,7 +92,7 @@ def level_section(result: LevelsResult, pictures: Sequence[Picture], estimator: 
     yield heading(3, "Response times")
     yield table_of(
         result.times,
-        ("Setting" if result.revealed else "Code", lambda answers: answers.name),
+        ("Condition" if result.revealed else "Code", lambda answers: answers.name),
         ("n", lambda answers: str(answers.numbers["n"])),
         ("median [s]", lambda answers: number(answers.numbers["median"])),
         ("quartiles [s]", lambda answers: interval_text(answers.numbers["q1"], answers.numbers["q3"], number)),
@@ -115,7 +115,8 @@ def level_findings(result: LevelsResult) -> Iterator[str]:
     sentences = [line for statistic in statistics() for line in statistic(result).sentences()]
     yield from sentences
     if sentences and result.published:
-        yield f"{result.title}: published values: {'; '.join(map(published_words, result.published))}."
+        published = [published_words(value, result.unit) for value in result.published]
+        yield f"{result.title}: published values: {'; '.join(published)}."
 
 
 def level_limits(result: LevelsResult) -> Iterator[str]:

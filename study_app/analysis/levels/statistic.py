@@ -106,7 +106,9 @@ class LevelStatistic(Generic[_R]):
         if words := self.explained():
             yield paragraph(words, "soft")
         if published := [
-            published_words(published) for published in self.found.published if self.compares(published.measure)
+            published_words(published, self.found.unit)
+            for published in self.found.published
+            if self.compares(published.measure)
         ]:
             yield paragraph(f"Published: {'; '.join(published)}.")
         for name in self.figures:

@@ -449,14 +449,16 @@ def _with_device(result: LevelsResult, estimate: ThresholdEstimate) -> float | N
     return estimate.threshold * estimate.standard / (estimate.standard + result.device.damping_nspm)
 
 
-def _named_people(own: Sequence[ThresholdEstimate], some: Sequence[ThresholdEstimate]) -> str:
+def _named_people(found: LevelsResult, own: Sequence[ThresholdEstimate], some: Sequence[ThresholdEstimate]) -> str:
     """Return a phrase on whose thresholds are meant, with at most `_MOST_NAMED` participants by name."""
     if len(some) > _MOST_NAMED:
         return f"{len(some)} of {len(own)} thresholds"
     several = len({estimate.standard for estimate in own}) > 1
     return listed(
         [
-            f"{estimate.participant} at {estimate.standard:g}" if several else str(estimate.participant)
+            f"{estimate.participant} at {with_unit(found, estimate.standard)}"
+            if several and estimate.standard is not None
+            else str(estimate.participant)
             for estimate in some
         ]
     )
@@ -550,9 +552,9 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
             f"threshold between sessions (one standard deviation is a factor of {10**SESSION_SD:.2f}) and for changes "
             "over the trials. The group value is the random-effects mean (Paule–Mandel), with the Hartung–Knapp "
             "interval if there are at least three participants. Each participant's variance is replaced by the "
-            f"geometric mean of it and the median variance.{level}{reversals} Fit: p value of the deviance, based on "
-            f"{SETS} simulated data sets; for the group, how much more often errors follow one another than expected, "
-            f"in standard errors, marked “!” if above {MOST_CLUSTERED:g}. "
+            f"geometric mean of that variance and the median variance.{level}{reversals} Fit: p value of the deviance, "
+            f"based on {SETS} simulated data sets; for the group, how much more often errors follow one another than "
+            f"expected, in standard errors, marked “!” if above {MOST_CLUSTERED:g}. "
             "Drift: correlation between trial number and deviance residual, marked “!” if the threshold changes over "
             f"the trials by more than {BEYOND_CHANCE:g} standard errors; for the group, the mean change of thresholds "
             "after the first trials, in standard errors. n is the number of "
@@ -613,11 +615,11 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
         yield from self._limits_of_lapses()
         for applies, words in kinds:
             if some := [estimate for estimate in own if applies(estimate)]:
-                yield f"{title}: {words} ({_named_people(own, some)})."
+                yield f"{title}: {words} ({_named_people(self.found, own, some)})."
         if some := [estimate for estimate in own if estimate.open_end]:
             yield (
                 f"{title}: the answers do not determine one or both ends of the 95 % interval, marked “<” or “>” in "
-                f"the table ({_named_people(own, some)})."
+                f"the table ({_named_people(self.found, own, some)})."
             )
         for row in self.rows:
             if row.participant is None and row.learned:
@@ -633,8 +635,8 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
                 [f"{100 * (estimate.change or 0.0):+.0f} %".replace("-", "−") for estimate in some[:_MOST_NAMED]]
             )
             yield (
-                f"{title}: the threshold changed over the trials ({_named_people(own, some)}: {sizes} from the first "
-                "trial to the last); the interval allows for this."
+                f"{title}: the threshold changed over the trials ({_named_people(self.found, own, some)}: {sizes} from "
+                "the first trial to the last); the interval allows for this."
             )
         if (people := len({estimate.participant for estimate in own})) < FEWEST:
             yield (

@@ -37,7 +37,7 @@ from study_app.analysis.planning.simulated_studies import (
 )
 from study_app.analysis.results import min_sample_reason
 from study_app.analysis.statistics.equivalence import STEPS, fewest_participants
-from study_app.analysis.wording import bound_text, listed
+from study_app.analysis.wording import bound_text, listed, whole_percent
 from study_app.protocol.model import Contrast
 from study_app.protocol.participants import CONSISTENT, NOISY, STATED
 from study_app.psychophysics.grid import Z_95
@@ -340,7 +340,7 @@ COLUMNS: Final = (
 _HEADS: Final[dict[Question, tuple[str, str]]] = {
     "settings differ": ("Do the conditions differ?", "statement"),
     "trend": ("Do answers change with the delay?", "statement"),
-    "lowest delay": ("Can a trend be shown over delays up to this one, or over fewer delays?", "statement, delay"),
+    "lowest delay": ("Is a trend found up to this delay or a shorter one?", "statement, delay"),
     "equivalence": ("Can any delay be shown to be equivalent to the shortest one?", "statement, delay"),
     "contrast": ("Can the study support the hypothesis?", "hypothesis"),
 }
@@ -384,11 +384,14 @@ def power_markdown(power: Powers) -> str:
             curves = [curve for curve in power.curves if (curve.block, curve.question) == (block.id, question)]
             if curves:
                 lines += ["", f"## {block.title}: {head[:1].lower()}{head[1:]}", "", *_explained(question, power), ""]
-                lines += _markdown_table(curves, power, first, lambda curve, at: f"{curve.power[at]:.0%}", needed=True)
+                lines += _markdown_table(
+                    curves, power, first, lambda curve, at: whole_percent(curve.power[at]), needed=True
+                )
             if any(curve.detectable for curve in curves):
                 lines += [
                     "",
-                    "The smallest difference between mean answers that 80 % of studies detect, in points:",
+                    "The smallest difference between mean answers that 80 % of studies detect, in points (“none”: "
+                    "fewer than 80 % of studies detect even the largest simulated difference):",
                     "",
                 ]
                 lines += _markdown_table(
@@ -456,7 +459,7 @@ _SOURCES: Final = (
     "effect."
 )
 """Where the values of `raters.PUBLISHED` come from."""
-BEYOND: Final = "beyond"
+_NONE: Final = "none"
 
 
 def _people(kind: str) -> str:
@@ -481,9 +484,9 @@ def _summary(power: Powers) -> Iterator[str]:
             shares = dict(zip(power.kinds, (kind.power[place] for kind in power.among_kinds(curve)), strict=True))
             about = "" if curve.question == "contrast" else f" ({HEADS[curve.question]})"
             lines.append(
-                f"- {_name(curve, power).strip('*')}{about}: {shares[CONSISTENT]:.0%} of studies detect the effect if "
-                f"participants are {CONSISTENT}, {shares[main]:.0%} if they are {main}, and {shares[NOISY]:.0%} if "
-                f"they are {NOISY}."
+                f"- {_name(curve, power).strip('*')}{about}: {whole_percent(shares[CONSISTENT])} of studies detect the "
+                f"effect if participants are {CONSISTENT}, {whole_percent(shares[main])} if they are {main}, and "
+                f"{whole_percent(shares[NOISY])} if they are {NOISY}."
             )
     if lines:
         yield from ("", f"## Power with {planned}{sizes[place]} participants", "", *lines)
@@ -557,9 +560,9 @@ def _bounds(plan: Plan) -> int:
 
 def _group_sizes(first: float, second: float) -> str:
     """Return the sentence on the shares of participants in two groups."""
-    if f"{first:.0%}" == f"{second:.0%}":
-        return f"Each group contains {first:.0%} of the participants."
-    return f"The two groups contain {first:.0%} and {second:.0%} of the participants."
+    if whole_percent(first) == whole_percent(second):
+        return f"Each group contains {whole_percent(first)} of the participants."
+    return f"The two groups contain {whole_percent(first)} and {whole_percent(second)} of the participants."
 
 
 def smallest_differences(
@@ -626,12 +629,12 @@ def smallest_differences(
     )
     has_too_few = any(differences(n, spread) is None for n in sizes for *_, spread in rows)
     unusable = (
-        f"“Too few” means that fewer than {WANTED:.0%} of studies would detect even a difference of {MOST_SD:g} SD. "
-        * has_too_few
+        f"“Too few” means that fewer than {whole_percent(WANTED)} of studies would detect even a difference of "
+        f"{MOST_SD:g} SD. " * has_too_few
     )
     yield (
-        f"{said}{both} The “smallest difference” is the difference that {WANTED:.0%} of studies detect ({at}). "
-        f"{unusable}{within}{inclusion_words([contrast])}"
+        f"{said}{both} The “smallest difference” is the difference that {whole_percent(WANTED)} of studies detect "
+        f"({at}). {unusable}{within}{inclusion_words([contrast])}"
     )
     if planned is not None:
         name, _, spread = rows[0]
@@ -648,7 +651,7 @@ def smallest_differences(
             if bound is not None:
                 enough_people = min(groups) >= fewest_participants(alpha / bounds, bound, largest)
                 share = shown_equal(bound / spread, *groups, alpha=alpha / bounds) if enough_people else 0.0
-                ends.append(f"{share:.0%}")
+                ends.append(whole_percent(share))
             yield f"| {name} | {size_text(n, planned)} | {words} | {' | '.join(ends)} |"
 
 
@@ -664,16 +667,16 @@ def _verdict(
     of = "" if assumed is None else f" in {assumed[0]}"
     too_few = f"The planned {planned} participants{given} are too few to find a difference{of}"
     if reached is None:
-        return f"**{too_few} of {MOST_SD:g} SD with {WANTED:.0%} power.**"
+        return f"**{too_few} of {MOST_SD:g} SD with {whole_percent(WANTED)} power.**"
     _, least = reached
-    verdict = f"**{too_few} smaller than {written(least)} with {WANTED:.0%} power.**"
+    verdict = f"**{too_few} smaller than {written(least)} with {whole_percent(WANTED)} power.**"
     if assumed is None or least <= assumed[1]:
         return verdict
     measure, mean = assumed
     where = "one group" if contrast.within is None else "one block of one group" if contrast.groups else "one block"
     return (
-        f"{verdict} Fewer than {WANTED:.0%} of studies would detect even a decrease in {measure} from {mean:g} to 0 in "
-        f"{where} (a difference of {mean:g})."
+        f"{verdict} Fewer than {whole_percent(WANTED)} of studies would detect even a decrease in {measure} from "
+        f"{mean:g} to 0 in {where} (a difference of {mean:g})."
     )
 
 
@@ -775,7 +778,11 @@ def _markdown_table(
     at least 80 %.
     """
     planned = found.plan.participants
-    heads = [first, *(f"n = {size_text(size, planned)}" for size in found.sizes), *(["80 % from"] if needed else [])]
+    heads = [
+        first,
+        *(f"n = {size_text(size, planned)}" for size in found.sizes),
+        *(["n for 80 % power"] if needed else []),
+    ]
     lines = [f"| {' | '.join(heads)} |", f"|---|{'---:|' * (len(heads) - 1)}"]
     for curve in curves:
         kinds = found.among_kinds(curve)
@@ -790,20 +797,20 @@ def _markdown_table(
 
 
 def _difference_text(points: float | None, decimals: int) -> str:
-    """Return a smallest difference as text; None means beyond those that were simulated."""
-    return BEYOND if points is None else f"{points:.{decimals}f}"
+    """Return a smallest difference as text; None: fewer than 80 % of studies detect any simulated difference."""
+    return _NONE if points is None else f"{points:.{decimals}f}"
 
 
 def _with_range(numbers: Sequence[str]) -> str:
     """Return the first number as text, with the range of all numbers in parentheses if they differ."""
     lowest, *_, highest = sorted(numbers, key=_order)
-    joint = "–" if highest.strip("%").replace(".", "").isdigit() else " to "
-    return numbers[0] if lowest == highest else f"{numbers[0]} ({lowest.strip('%')}{joint}{highest})"
+    joint = "–" if highest.removesuffix(" %").replace(".", "").isdigit() else " to "
+    return numbers[0] if lowest == highest else f"{numbers[0]} ({lowest.removesuffix(' %')}{joint}{highest})"
 
 
 def _order(number: str) -> tuple[bool, float]:
-    """Return the sort key of a number as text; "beyond" comes last."""
-    return number == BEYOND or ">" in number, 0.0 if number == BEYOND else float(number.strip("%> "))
+    """Return the sort key of a number as text; "none" comes last."""
+    return number == _NONE or ">" in number, 0.0 if number == _NONE else float(number.strip("%> "))
 
 
 def _name(curve: Curve, power: Powers) -> str:

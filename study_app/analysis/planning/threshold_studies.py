@@ -27,6 +27,7 @@ from study_app.analysis.planning.power_curves import (
 from study_app.analysis.planning.simulated_studies import group_shares
 from study_app.analysis.statistics.outcome import student_interval
 from study_app.analysis.statistics.thresholds import FEWEST, group_mean
+from study_app.analysis.wording import whole_percent
 from study_app.errors import AnalysisError
 from study_app.protocol.blocks import block_titles, display_language
 from study_app.protocol.model import Contrast, Protocol
@@ -343,13 +344,13 @@ def threshold_markdown(precisions: Precisions) -> str:
             for place, size in enumerate(precisions.sizes):
                 half = found.half(place)
                 unknown |= not math.isfinite(half)
-                share = "–" if math.isnan(half) else f"{found.within(place, precision or 0.0):.0%}"
-                spread = f"{found.spread:.0%}" if math.isfinite(found.spread) else "–"
+                share = "–" if math.isnan(half) else whole_percent(found.within(place, precision or 0.0))
+                spread = whole_percent(found.spread) if math.isfinite(found.spread) else "–"
                 cells = (
                     str(trials),
                     size_text(size, participants),
                     spread,
-                    f"±{half:.0%}" if math.isfinite(half) else "–",
+                    f"±{whole_percent(half)}" if math.isfinite(half) else "–",
                 )
                 lines.append(f"| {' | '.join((*cells, *([share] if wanted else [])))} |")
         if unknown:
@@ -378,8 +379,8 @@ def _of_kinds(precisions: Precisions, block: str) -> Iterator[str]:
         yield ""
         yield (
             f"With {precisions.sizes[-1]} participants and {trials} trials, the precision depends on the type of "
-            f"participant: ±{sorted(medians.values())[len(medians) // 2]:.0%} (median across types), "
-            f"±{medians[worst]:.0%} at worst ({worst})."
+            f"participant: ±{whole_percent(sorted(medians.values())[len(medians) // 2])} (median across types), "
+            f"±{whole_percent(medians[worst])} at worst ({worst})."
         )
 
 

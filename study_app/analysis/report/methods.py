@@ -22,6 +22,12 @@ from study_app.protocol.participants import RecordedSessions
 from study_app.protocol.quantities import liquid_words
 from study_app.store.unblinding import RULES
 
+_FILTERS: Final = {
+    "ewma": "an exponentially weighted moving average of position differences",
+    "kalman": "a Kalman filter",
+    "raw": "position differences",
+}
+"""Velocity estimators by name; a pooled study may have several."""
 _WITHOUT_FORCE: Final = {"mouse", "spacemouse"}
 """The devices without force: reading results must not load their descriptors."""
 
@@ -200,7 +206,7 @@ def _apparatus(study: Study) -> str:
     if _WITHOUT_FORCE.issuperset(names):
         device_words = f"a device without force feedback ({listed(names)})"
     velocity = {None: "", "device": "; its velocity was measured by the device"}.get(
-        study.estimator, f"; its velocity was estimated with the {study.estimator} filter"
+        study.estimator, f"; its velocity was estimated with {_FILTERS.get(study.estimator or '', study.estimator)}"
     )
     return (
         f"Participants used {device_words}. A virtual ball with a diameter of {1000 * scene['body']['diameter_m']:g} "
@@ -265,7 +271,9 @@ def _other_questions(study: Study, results: Results) -> Iterator[str]:
 
 def _presented(study: Study, block: Block, result: BlockResult) -> str:
     order = _ORDERS.get(study.protocol.get("blocks", {}).get(result.id, {}).get("order", ""), "")
-    noun = {"delays": "visual delay"}.get(result.kind, result.kind.removesuffix("s")) if result.revealed else "setting"
+    noun = (
+        {"delays": "visual delay"}.get(result.kind, result.kind.removesuffix("s")) if result.revealed else "condition"
+    )
     names = [f"{delay:g}" for delay in result.delays_ms] or [name.lower() for name in result.names]
     unit = " ms" if result.delays_ms else ""
     which = counted(len(names), noun) + (f" ({listed(names)}{unit})" if result.revealed else "")

@@ -56,6 +56,7 @@ from study_app.protocol.participants import RecordedSessions
 from study_app.store.exclusions import dated_reversals, describe_exclusion
 from study_app.store.merged import folders_of
 from study_app.store.session_progress import MISSING_PERCENT, MissingTrials, broken_limits
+from study_app.store.unblinding import RULES as AUTOMATIC_RULES
 from study_app.store.versions import recorded_contents
 
 
@@ -484,7 +485,7 @@ def question_section(where: str, study: Study, results: Results, drawn_: Sequenc
                 yield bullets(group.numbers["texts"])
             continue
         rows = [(group.name, measure.cells(asked[where, result.item], group.numbers)) for group in result.groups]
-        first = "Answers" if result.is_form else "Setting"
+        first = "Answers" if result.is_form else "Condition"
         yield table((first, *rows[0][1]), [[name, *cells.values()] for name, cells in rows])
         yield from drawn_figure({picture.name: picture for picture in drawn_}, f"question-{where}-{result.item}")
     for level in levels:
@@ -555,7 +556,9 @@ def conduct(study: Study, results: Results) -> Iterator[str]:
         yield paragraph(f"Motors masked: {listed(answers)}.")
     yield heading(3, "Exclusions")
     gone = [
-        f"{describe_exclusion(exclusion)}: {exclusion.reason} ({exclusion.rule_or_person}, {exclusion.excluded_at}"
+        f"{describe_exclusion(exclusion)}: {exclusion.reason} ("
+        f"{'rule ' if exclusion.rule_or_person in AUTOMATIC_RULES else ''}{exclusion.rule_or_person}, "
+        f"{exclusion.excluded_at}"
         f"{', after the key was opened' if exclusion in study.late else ''})"
         for exclusion in study.exclusions
     ]
@@ -695,7 +698,7 @@ def _delivered(study: Study, results: Results) -> Iterator[str]:
         results.delivered,
         ("Block", lambda delivered: blocks[delivered.block].title),
         (
-            "Setting",
+            "Condition",
             lambda delivered: "all" if delivered.code is None else name(blocks[delivered.block], delivered.code),
         ),
         ("requested", shown(lambda one: "–" if one.delay_ms is None else ms(one.delay_ms))),
@@ -800,12 +803,12 @@ def motion(results: Results) -> Iterator[str]:
                 )
             elif not measured.recorded_in(result.id):
                 yield paragraph(
-                    "The recordings of this block could not be read, so reaching measures are not available.", "soft"
+                    "This block has no readable recordings, so reaching measures are not available.", "soft"
                 )
     yield paragraph(_recordings(measured))
-    yield bullets(
-        f"{_label(measure)}: {words}." for measure, words in {**TRIAL_DEFINITIONS, **REACH_DEFINITIONS}.items()
-    )
+    recorded = any(measured.recorded_in(result.id) for result in results.blocks)
+    definitions = TRIAL_DEFINITIONS | (REACH_DEFINITIONS if recorded else {})
+    yield bullets(f"{_label(measure)}: {words}." for measure, words in definitions.items())
     yield paragraph(
         "The tables show the median across participants (with quartiles) of each participant's own median. “Trials "
         "within limits” shows how many of the measured trials met the protocol's timing limits; the other columns "

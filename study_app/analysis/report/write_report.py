@@ -444,8 +444,8 @@ def _facts(study: Study) -> str:
     notes = ["all were included"] if study.n == took_part > 1 else []
     if notes and (out := int((~rows["counted"]).sum())):
         notes = [f"all were included, but {out} of {len(rows)} sessions {'was' if out == 1 else 'were'} not"]
-    if took_part > study.n:
-        notes = [f"{took_part - study.n} of {took_part} were not included ({_why_not_included(study)})"]
+    if out := took_part - study.n:
+        notes = [f"{out} of {took_part} {'was' if out == 1 else 'were'} not included ({_why_not_included(study)})"]
     notes += [] if planned is None else [f"{planned} were planned"]
     others = f" {capitalised('; '.join(notes))}." if notes else ""
     return f"Study {study.name}, {version_words(study)}. {people[:1].upper()}{people[1:]}{of_groups}.{others} {when}"
@@ -487,7 +487,7 @@ def _reproduction_sentences(study: Study, results: Results) -> Iterator[str]:
     decided = results.decided
     bound = decided.equivalence_bound
     rows = [
-        ("Decided before the first session", "yes" if decided.binding else "no; all results are exploratory"),
+        ("Analysis decided before the first session", "yes" if decided.binding else "no; all results are exploratory"),
         ("Alpha", decided.alpha_words()),
         ("Equivalence bound of statements", "none" if bound is None else f"±{bound:g}"),
         ("Primary statements", (", ".join(decided.primary) or "all") if decided.binding else "none"),

@@ -196,7 +196,7 @@ def _kappa(given: Whole, right: Whole, labels: int, seed: int | None) -> tuple[f
     further = weights[:, n] * decided.max()
     all_decided = weights[:, :n] @ decided + further
     lowest, highest = (weights[:, :n] @ correct + more for more in (0.0, further))
-    expected = _expected(tables.sum(axis=0))
+    expected = _chance_agreement(tables.sum(axis=0))
     low, high = (
         (float(np.quantile(shares / all_decided, end)) - expected) / (1.0 - expected)
         for shares, end in ((lowest, 0.025), (highest, 0.975))
@@ -208,8 +208,8 @@ def _kappa(given: Whole, right: Whole, labels: int, seed: int | None) -> tuple[f
     return whole, Interval(low=low, high=high, level=0.95, method=method), ""
 
 
-def _expected(table: Array) -> float:
-    """Return the agreement by chance of a table of counts."""
+def _chance_agreement(table: Array) -> float:
+    """Return the proportion of agreement expected by chance, from a table of counts."""
     shares = table / table.sum()
     return float((shares.sum(axis=0) * shares.sum(axis=1)).sum())
 

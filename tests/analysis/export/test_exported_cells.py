@@ -269,8 +269,8 @@ def test_an_export_warns_of_each_file_that_differs(
     export(results.folder, tmp_path / "out", warn=warnings.append)
     export(results.folder, tmp_path / "out")
     assert warnings == [
-        f"warning: {results.folder / 'b.csv'} has 9 rows: restore b; the file is used nevertheless",
-        f"warning: {results.folder / 'a.csv'} has other values: restore a; the file is used nevertheless",
+        f"warning: {results.folder / 'b.csv'} has 9 rows: restore b; the file is still used",
+        f"warning: {results.folder / 'a.csv'} has other values: restore a; the file is still used",
     ]
     codebook = json.loads((tmp_path / "out" / "codebook.json").read_bytes())
     assert codebook["doubts"] == [

@@ -53,8 +53,8 @@ def found(block: BlockResult) -> Found:
 
 UNCLEAR = "neither support nor refute the claim that delays of up to 50 ms do not matter"
 BEYOND = (
-    "Delays of up to 50 ms change the answers: at 50 ms, the mean answers to “Different” differ from those at the "
-    "shortest delay by more than the bound."
+    "Delays of up to 50 ms change the answers: mean answers differ from those at the shortest delay by more than the "
+    "bound for “Different” (at 50 ms)."
 )
 WITHIN = "The mean answers to these statements stay within the bounds"
 
@@ -74,7 +74,7 @@ def test_a_trend_that_shows_only_within_its_statement_speaks_against_nothing() -
     assert of_five.over_all_ms == 100  # the second step has p = .19, the first .0003
     inconclusive = (
         "Delays of up to 50 ms change the answers: agreement with “Different” shows a trend over delays of up to 50 ms."
-        " They do not show whether the mean differences at 50 ms exceed the bounds."
+        " For “Different”, the data do not show whether the mean difference at 50 ms exceeds the bound."
     )
     assert by_delay(delays({50: SCATTERED}, (alone,)))[0][-1] == inconclusive
     assert "change the answers" not in by_delay(delays({50: SCATTERED}, (of_five,)))[0][-1]

@@ -171,7 +171,7 @@ def test_a_study_of_d_prime_states_only_what_applies_to_it_and_its_precision_onc
     found = swept(protocol, (), (14,), BATCH)
     tables = preregistration(protocol, "0" * 64, threshold_markdown(found))
     assert "for 14 participants" not in tables
-    assert f"| ±{found.found['late', 18].half(0):.0%} |" in tables
+    assert f"| ±{100 * found.found['late', 18].half(0):.0f} % |" in tables
 
 
 def test_limits_of_levels_are_stated_if_levels_vary() -> None:

@@ -884,7 +884,7 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
      r"liquid-study validate-report\)\.", claims),
     (r"No answers are included yet\.", when(lambda told: told.block["n"] == 0)),
     (rf"{LEAD}no answers are included yet\.", when(lambda told: told.block["n"] == 0)),
-    (r"Block presents only one (?:liquid|delay|setting), so its ratings are not compared\.",
+    (r"Block presents only one (?:liquid|delay|condition), so its ratings are not compared\.",
      when(lambda told: len(told.block["settings"]) == 1)),
     (r"The participants were SIMULATED, so this report is not evidence about people\.",
      when(lambda told: told.study.simulated)),

@@ -451,7 +451,7 @@ def test_known_liquids_are_called_recognised(n: int) -> None:
 def test_a_block_without_reaching_measures_says_why(
     reaching: tuple[str, ...], recorded: bool, said: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    sentences = "This block does not contain a reaching task", "The recordings of this block could not be read"
+    sentences = "This block does not contain a reaching task", "This block has no readable recordings"
     measured = SimpleNamespace(reaching=reaching, recorded_in=lambda _block: recorded)
     block = SimpleNamespace(id="reach", title="Reaching")
     results: Any = SimpleNamespace(blocks=[block], performance=measured, delivered=())
@@ -465,6 +465,7 @@ def test_a_block_without_reaching_measures_says_why(
         monkeypatch.setattr(sections, name, lambda *_, value=value, **__: value)
     page = "".join(sections.motion(results))
     assert [sentence in page for sentence in sentences] == [said == 0, said == 1]
+    assert ("overshoot, mm: " in page) is recorded
 
 
 def test_of_successive_short_cards_each_pair_is_side_by_side(monkeypatch: pytest.MonkeyPatch) -> None:

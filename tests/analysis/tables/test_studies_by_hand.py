@@ -53,7 +53,7 @@ def test_a_study_counts_included_sessions_alone(made: Study) -> None:
     doubt: Any = "x.csv differs"
     warned: list[str] = []
     replace(made, doubts=(doubt,)).tell_doubts(warned.append)
-    assert warned == ["warning: x.csv differs; the file is used nevertheless"]
+    assert warned == ["warning: x.csv differs; the file is still used"]
 
 
 def test_presentations_are_those_of_the_block_that_count(made: Study) -> None:
@@ -144,8 +144,10 @@ def test_delays_that_several_conditions_share_have_one_column() -> None:
 def test_published_values_and_decisions_are_read_and_put_in_words() -> None:
     values = {"block": "b", "measure": "weber", "value": 0.2, "standard": 8.0, "low": 0.1, "high": 0.3, "percent": 75.0}
     published = Published(**values, n=17, source="Kox")  # type: ignore[arg-type]
-    assert blocks.published_words(published) == ("Kox: weber 0.2 (standard 8, 0.1 to 0.3, at 75 % correct, n = 17)")
-    assert blocks.published_words(Published(block="b", measure="pse", value=3, source="")) == "pse 3"
+    said = "Kox: Weber fraction 0.2 (standard 8 N·s/m, 0.1 to 0.3, at 75 % correct, n = 17)"
+    assert blocks.published_words(published, "N·s/m") == said
+    equal = Published(block="b", measure="pse", value=3, source="")
+    assert [blocks.published_words(equal, unit) for unit in ("ms", None)] == ["PSE 3 ms", "PSE 3"]
     slope = published.model_copy(update={"measure": "exponent", "percent": 60.0})
     assert blocks.compared_percent([published, slope]) == 75.0
     assert blocks.compared_percent([published, published.model_copy(update={"percent": 60.0})]) is None

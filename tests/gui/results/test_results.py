@@ -127,7 +127,7 @@ def shown(qtbot: QtBot, results: Path) -> Iterator[Opened]:
 def test_a_blinded_study_is_shown_by_code_and_by_name_once_unblinding_is_recorded(shown: Opened, results: Path) -> None:
     assert shown.chips == ["Simulated participants", "Blinded"]
     assert shown.place.hidden.isVisible()
-    assert shown.titles == ["Agreement for each setting", "Answers for each delay setting"]
+    assert shown.titles == ["Agreement by condition", "Answers by condition"]
     drawn = b"".join(card.figure.svg for card in shown.place.figures.cards)
     assert b">L1<" in drawn
     assert b">Thick<" not in drawn
@@ -323,7 +323,7 @@ def test_a_report_by_processes_of_its_own_is_cancelled_then_written_and_none_is_
     qtbot: QtBot, results: Path, tmp_path: Path
 ) -> None:
     opened = Opened(qtbot, results, start_analysis_worker)
-    assert opened.titles == ["Agreement for each setting", "Answers for each delay setting"]
+    assert opened.titles == ["Agreement by condition", "Answers by condition"]
     assert not nobody_left()
     opened.click(opened.place.report)
     dialog: Any = opened.place.writing
