@@ -114,7 +114,7 @@ def capitalised(words: str) -> str:
     return words[:1].upper() + words[1:]
 
 
-def minutes(seconds: float) -> str:
+def clock_text(seconds: float) -> str:
     """Return a duration as on a clock: 68 s as "1:08"; an hour or more as "1:02:03"."""
     whole = max(0, int(seconds))
     hours, rest = divmod(whole, 3600)

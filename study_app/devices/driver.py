@@ -271,9 +271,9 @@ def framed_device(name: str, request: OpenRequest) -> FramedDevice | None:
 def dynamics_of(
     delay_s: float | None, count_m: float | None, mass_kg: float | None, *, name: str, serial: str | None
 ) -> Dynamics:
-    """Return a device's dynamics as reported, else as measured by its latest bench on this computer.
+    """Return a device's dynamics as reported, or otherwise as measured by its latest bench on this computer.
 
-    ``name`` and ``serial`` identify its bench; unreadable settings count as no bench.
+    ``name`` and ``serial`` identify its bench; unreadable settings are ignored.
     """
     with suppress(OSError, ValueError, KeyError, TypeError, AttributeError):
         for bench in json.loads(settings_file().read_bytes())["benches"]:

@@ -14,7 +14,7 @@ from study_app.gui.widgets.boxes import STRETCH, hbox, vbox
 from study_app.gui.widgets.cards import Logo
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import figures, label
-from study_app.number_text import minutes
+from study_app.number_text import clock_text
 
 LONG_AFTER_S = 4.0
 _STEP = "Preparing the device and the force model …"
@@ -57,7 +57,7 @@ class OpeningWindow(QWidget):
 
     def _show_elapsed(self) -> None:
         seconds = self._now_s() - self._since_s
-        self.lasted.setText(minutes(seconds))
+        self.lasted.setText(clock_text(seconds))
         if seconds > LONG_AFTER_S and not self._said:
             self.step.setText(FIRST_TIME)
 

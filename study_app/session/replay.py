@@ -89,8 +89,8 @@ def _steps_of(
     return tuple(steps)
 
 
-def _as_one_scene(samples: Any, steps: Sequence[Step]) -> Any:
-    """Return samples (n,) in which all scenes of an interval have the number of the last one."""
+def _with_last_scene_number(samples: Any, steps: Sequence[Step]) -> Any:
+    """Return the samples (n,) with the number of an interval's last scene in place of its earlier scenes' numbers."""
     if not steps or len(samples) == 0:
         return samples
     out = samples.copy()
@@ -235,7 +235,7 @@ def replay(session_folder: Path) -> Replayed:
         steps = _steps_of(protocol, key, started, interval, lines)
         recorded, checks = recordings.read_samples(path, key.nonce), recordings.read_checks(path, key.nonce)
         start = time.perf_counter()
-        samples = _as_one_scene(recorded, steps)
+        samples = _with_last_scene_number(recorded, steps)
         try:
             before = _recompute_forces(samples, scene, devices[resumed], before, _step_starts(recorded, steps))
         except StudyError as refused:

@@ -203,7 +203,8 @@ def _timed_samples(recorded: Any, own: Sequence[events.Event], *, last: bool) ->
 def _marks(own: Sequence[events.Event], begun: events.Event, ended: Any, until_s: float) -> Iterator[Mark]:
     """Yield the marks of events after ``begun`` and before ``until_s`` [s, session's clock].
 
-    Targets are on the task's own clock. The task begins with its first frame, known to some milliseconds.
+    Targets are on the task's own clock. The task begins with its first frame, whose time is known to a few
+    milliseconds.
     """
     gap_ms = (ended.others.get("first_frame_gap_ms") if ended is not None else None) or 0.0
     for line in own:

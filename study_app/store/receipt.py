@@ -73,7 +73,7 @@ def without_conditions(protocol: Protocol) -> dict[str, Any]:
 
 
 def versions() -> dict[str, str]:
-    """Return the versions of the program, of Python, system and libraries."""
+    """Return the versions of the program, Python, the operating system and the libraries."""
     return {
         "liquid-study": study_app.__version__,
         "python": platform.python_version(),

@@ -195,7 +195,7 @@ def step_of(document: Mapping[str, Any], path: Path) -> Path | None:
 
 
 def position_of(document: Mapping[str, Any], path: Path) -> tuple[int, int] | None:
-    """Return the position of an element among its neighbours, from 1, and their number; None if they have no order."""
+    """Return an element's position in its list (from 1) and the length of the list; None if the order is irrelevant."""
     step = step_of(document, path) if len(path) > 1 else None
     if step is None or not isinstance(step[-1], int):
         return None

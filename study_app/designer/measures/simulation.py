@@ -76,7 +76,7 @@ def start_measure_worker() -> MeasureClient:
 
 
 class _OneProcess(Executor):
-    """Computes cases one after the other, each when its result is asked for; ``check`` is called before each."""
+    """Runs cases in this process, each when its result is requested; ``check`` is called before each."""
 
     def __init__(self, check: Callable[[], None]) -> None:
         self._check = check

@@ -319,7 +319,7 @@ class Service(HandOrders):
 
     def disconnected(self) -> None:
         """Handle the end of the stream: the session is over and the device idle."""
-        inverse3_stream.rest(self.state)
+        inverse3_stream.remove_force(self.state)
         self.state.ended = 1
 
     def work(self) -> None:

@@ -195,7 +195,7 @@ def take_frames(service: Any) -> None:
             service.inbox[at + 4 + k] ^= service.inbox[at + k % 4]
         if first & 0x0F == 8:
             service.close_frames += 1
-            rest(service)
+            remove_force(service)
             put_frame(service, 8, service.inbox[at + 4 : end], size, 0)
             service.ended = 1
             return
@@ -240,7 +240,7 @@ def go_on(service: Any) -> None:
         service.now_ns += _OWN_STEP_NS
     elapsed_ns = service.now_ns - service.last_ns if service.started else 0
     if elapsed_ns > _IDLE_NS:
-        rest(service)
+        remove_force(service)
     service.started = 1
     service.last_ns = service.now_ns
     move_held_handle(service, service.now_ns, elapsed_ns * 1e-9)
@@ -258,7 +258,7 @@ def act(service: Any, x_n: float, y_n: float, z_n: float) -> None:
 
 
 @kernel
-def rest(service: Any) -> None:
+def remove_force(service: Any) -> None:
     """Remove the force: the device becomes idle."""
     release_handle(service.handle)
     for axis in range(3):
@@ -272,7 +272,7 @@ def reply(service: Any) -> None:
         if service.silent == 0:
             put_bytes(service, service.faulty, service.faulty_size)
         if service.ends:
-            rest(service)
+            remove_force(service)
             service.ended = 1
         return
     fill(service, service.text, service.slots)

@@ -337,7 +337,7 @@ COLUMNS: Final = (
 )  # fmt: skip
 
 
-def _values(row: Row) -> tuple[str | float, ...]:
+def _csv_row(row: Row) -> tuple[str | float, ...]:
     ticks_per_s = 1e9 / row.time.median_ns
     error = row.error
     return (
@@ -367,7 +367,7 @@ def accuracy_evidence(accuracy: Accuracy) -> Evidence:
             f"## The force on the hand, {accuracy.acting_liquid}\n\n{Table(headings, acting, left=1).markdown()}"
         )
     text = "\n\n".join(parts) + "\n"
-    cells = [[f"{it:.6g}" if isinstance(it, float) else it for it in _values(row)] for row in accuracy.rows]
+    cells = [[f"{it:.6g}" if isinstance(it, float) else it for it in _csv_row(row)] for row in accuracy.rows]
     files = {"accuracy.csv": Table(COLUMNS, cells).csv(), "accuracy.md": text}
     return Evidence(text, files, plot_files("accuracy", "Accuracy and computation time", draw, accuracy))
 

@@ -269,12 +269,12 @@ def delays_evidence(delays: Delayed) -> Evidence:
     files = {
         "delays.txt": text,
         "delays.md": f"{head} Errors in ms.\n\n{table}\n\n{limits}\n",
-        "delays.csv": Table(COLUMNS, [_values(trial) for trial in delays.shown]).csv(),
+        "delays.csv": Table(COLUMNS, [_csv_row(trial) for trial in delays.shown]).csv(),
     }
     return Evidence(text, files, plot_files("delays", "Accuracy of visual delays", draw, delays))
 
 
-def _values(trial: Shown) -> tuple[object, ...]:
+def _csv_row(trial: Shown) -> tuple[object, ...]:
     errors_ms = (trial.mean_ms, *map(trial.percentile_ms, _PERCENTILES), trial.worst_ms)
     return (
         *(trial.screen, trial.paced, trial.load),

@@ -169,12 +169,12 @@ def timing_evidence(timing: Timed) -> Evidence:
     limits = "\n".join(f"- {limit}" for limit in timing.limits())
     said = " ".join(f"{note[0].upper()}{note[1:]}." for note in notes)
     markdown = f"{head} Lateness in µs.\n\n{table.markdown()}\n\n{limits}\n\n{said}\n"
-    csv = Table(COLUMNS, [_values(timing, loop) for loop in timing.loops]).csv()
+    csv = Table(COLUMNS, [_csv_row(timing, loop) for loop in timing.loops]).csv()
     files = {"timing.txt": text, "timing.md": markdown, "timing.csv": csv}
     return Evidence(text, files, plot_files("timing", "Lateness of ticks", draw, timing))
 
 
-def _values(timing: Timed, loop: LoopTiming) -> tuple[object, ...]:
+def _csv_row(timing: Timed, loop: LoopTiming) -> tuple[object, ...]:
     return (
         *(loop.grant.level, loop.grant.how, loop.name, loop.ticks, loop.overruns, loop.late),
         *(f"{loop.late_us(percent):.3f}" for percent in (*PERCENTILES, 100.0)),

@@ -166,7 +166,7 @@ _NONE = {
 
 
 class SessionsCard(Card):
-    """The sessions table, newest first; rows that need attention come first. An empty one is a single line.
+    """The sessions table, newest first; rows that need attention come first. An empty table is a single line.
 
     ``open_asked`` carries the `SessionFacts` of a session; ``emptied`` is emitted when the table appears or disappears.
     """

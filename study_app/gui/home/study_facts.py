@@ -106,9 +106,9 @@ def known_sources() -> tuple[str, ...]:
 
 
 def file_states(opened: Iterable[str]) -> frozenset[tuple[Path, int, int]]:
-    """Return path, modification time [ns] and size [bytes] of the studies' files, liquid files included.
+    """Return the path, the modification time [ns] and the size [bytes] of each study file, draft and liquid file.
 
-    These are the workspace's files, recent ones and ``opened`` ones, and drafts.
+    The study files are those of the workspace, the recent ones and the ``opened`` ones.
     """
     states = []
     for path in (*workspace().own_protocols(), *map(Path, (*recent_protocols(), *opened)), *draft_files()):

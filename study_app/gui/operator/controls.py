@@ -22,7 +22,7 @@ from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, grid, hb
 from study_app.gui.widgets.cards import Card, Chip, Icon
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import Clamped, Elided, figures, label
-from study_app.number_text import minutes
+from study_app.number_text import clock_text
 
 
 class Actions(Card):
@@ -155,7 +155,7 @@ class NotesCard(Card):
             shown = index < min(len(view.notes), self._shown)
             row.setVisible(shown)
             if shown:
-                row.show_note(view.notes[index].kind, minutes(view.notes[index].t_s), view.notes[index].text)
+                row.show_note(view.notes[index].kind, clock_text(view.notes[index].t_s), view.notes[index].text)
         for button in (self.add, self.mark):
             button.setEnabled(not view.over)
         self.field.setEnabled(not view.over)

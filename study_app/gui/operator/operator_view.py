@@ -13,7 +13,7 @@ from typing import Final, Literal
 from study_app.devices.descriptor import Icon
 from study_app.gui.operator.servo_health import ForceFigures, Tile, Vitals, force_rows, health_tiles
 from study_app.gui.sessions.session_facts import broken_limit_text, operator_language, step_title
-from study_app.number_text import grouped, minutes
+from study_app.number_text import clock_text, grouped
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders import FormStep, Schedule, Step, Trial
 from study_app.protocol.wording import words
@@ -47,8 +47,8 @@ class TrialTime:
     @property
     def words(self) -> str:
         """Return "1:08 of 2:00", or "1:08"."""
-        elapsed = minutes(self.elapsed_s)
-        return f"{elapsed} of {minutes(self.most_s)}" if self.most_s else elapsed
+        elapsed = clock_text(self.elapsed_s)
+        return f"{elapsed} of {clock_text(self.most_s)}" if self.most_s else elapsed
 
 
 @dataclass(frozen=True, slots=True)
@@ -350,7 +350,7 @@ def _step_row(stage: Stage, progress: Progress) -> StepRow:
     many = stage.last - stage.first + 1
     spent = sum(progress.durations_s.get(step, 0.0) for step in range(stage.first, stage.last + 1))
     if progress.here > stage.last or progress.reached_end:
-        return StepRow(stage.label, "done", minutes(spent))
+        return StepRow(stage.label, "done", clock_text(spent))
     if stage.first <= progress.here <= stage.last:
         place = f"{progress.here - stage.first + 1} of {many}" if many > 1 else "now"
         return StepRow(stage.label, "now", "" if progress.ended else place)

@@ -14,7 +14,7 @@ from study_app.gui.widgets.boxes import STRETCH, add_parts, grid, hbox, vbox
 from study_app.gui.widgets.cards import Bar, Card, Chip, Icon, Logo, Rule, scrolled, smooth_painter
 from study_app.gui.widgets.controls import ActionButton, CompactStop, IconButton
 from study_app.gui.widgets.labels import Elided, figures, label, set_ink
-from study_app.number_text import minutes
+from study_app.number_text import clock_text
 
 _STATES: dict[State, tuple[Tone, str]] = {
     "preparing": ("neutral", "clock"),
@@ -92,7 +92,7 @@ class Header(QWidget):
             self.saved.show_state("ok", "check", "All saved to disk")
         else:
             self.saved.show_state("ok", "check", "Just saved to disk")
-        self.clock.setText(minutes(view.elapsed_s))
+        self.clock.setText(clock_text(view.elapsed_s))
         self.expected.setText(f"of about {max(1, round(view.expected_s / 60))} min")
         done, of = view.main_trials
         self.bar.show_share(done / max(1, of))
@@ -226,7 +226,7 @@ class _Now(QWidget):
             self.least.setText("")
             return
         self.bar.show_share(time.elapsed_s / time.most_s, time.least_s / time.most_s if time.least_s else None)
-        self.least.setText(f"at least {minutes(time.least_s)}" if time.least_s else "")
+        self.least.setText(f"at least {clock_text(time.least_s)}" if time.least_s else "")
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)

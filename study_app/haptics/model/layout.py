@@ -21,7 +21,7 @@ Record: TypeAlias = Any  # one row of a recarray: fields as attributes, compiled
 
 
 def record_type(fields: Fields) -> np.dtype[Any]:
-    """Return the type of a record of an effect."""
+    """Return the NumPy type of an effect's record with these fields."""
     return np.dtype(list(fields), align=True)
 
 

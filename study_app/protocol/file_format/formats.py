@@ -55,7 +55,7 @@ def with_omitted_keys(document: Mapping[str, Any]) -> dict[str, Any]:
     if isinstance(liquids := completed.get("liquids", {}), dict):
         completed.setdefault("conditions", {name: {"liquid": name} for name in liquids})
     if isinstance(blocks := completed.get("blocks", {}), dict) and blocks:
-        completed["blocks"] = _with_numbers(blocks, names(completed, "tasks"), _languages(completed))
+        completed["blocks"] = _with_block_defaults(blocks, names(completed, "tasks"), _languages(completed))
         own = {"sequence", "sequences"}  # if each group has one, the study needs none
         groups = [isinstance(group, Mapping) and group.keys() & own for _, group in entries(completed, "groups.*")]
         if "sequences" not in completed and not (groups and all(groups)):
@@ -109,8 +109,10 @@ def _with_density(liquid: Any) -> Any:
     return _with_defaults(liquid, density_kg_m3=_DENSITY_KG_M3) if damper else liquid
 
 
-def _with_numbers(blocks: Mapping[str, Any], tasks: tuple[str, ...], languages: tuple[str, ...]) -> dict[str, Any]:
-    """Return the blocks with numbers and unused code letters for the main ones, and names for all blocks and trials."""
+def _with_block_defaults(
+    blocks: Mapping[str, Any], tasks: tuple[str, ...], languages: tuple[str, ...]
+) -> dict[str, Any]:
+    """Return the blocks with default titles and trial labels, and with parts and code letters for main blocks."""
     taken = [table.get("code_prefix") for table in blocks.values() if isinstance(table, Mapping)]
     letters = (letter for letter in string.ascii_uppercase if letter not in taken)
     numbered: dict[str, Any] = {}

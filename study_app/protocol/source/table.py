@@ -158,9 +158,9 @@ class FormKey(StrEnum):
 def invalid(
     message: str, key: str = "", hint: str = "", use: tuple[str, Any] | None = None, kind: str = ""
 ) -> PydanticCustomError:
-    """Return the error about an invalid table: a sentence, its key, and the remedy.
+    """Return the error for an invalid table: a sentence, the key concerned, and a hint.
 
-    ``use`` is a key of the table with a value that repairs it, ``kind`` that of the `Fault`.
+    ``use`` is a key of the table and a value that repairs it; ``kind`` is the kind of the `Fault`.
     """
     stated = {"message": message, "place": key, "hint": hint, "use": use, "kind": kind}
     return PydanticCustomError("invalid", "{message}", {name: detail for name, detail in stated.items() if detail})

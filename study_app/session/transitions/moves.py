@@ -87,12 +87,11 @@ def choose_language(state: SessionState, event: LanguageChosen) -> Result:
     if event.language == state.plan.language:
         return state, ()
     if event.language not in state.languages:
-        offered = (
-            f"choose {' or '.join(state.languages)}"
+        raise SessionError(
+            f"language {event.language!r} is not available: choose {' or '.join(state.languages)}"
             if state.languages
-            else "the language is chosen before the consent page"
+            else f"language {event.language!r} cannot be chosen now: choose it before the consent page"
         )
-        raise SessionError(f"language {event.language!r} cannot be chosen now: {offered}")
     chosen = replace(state, plan=replace(state.plan, language=event.language))
     return chosen, (Write(journal.LanguageChosen(language=event.language)), WriteTables(), show_page(chosen))
 

@@ -228,7 +228,7 @@ def unreadable_lines(path: Path) -> tuple[int, ...]:
 
 
 def parse_copy(path: Path, text: str) -> Proofs:
-    """Return fingerprint and session or record of every line of a copy; raise StoreError for any other line."""
+    """Return the fingerprint and the session or record in each line of a copy; raise StoreError for other lines."""
     proofs: list[tuple[str, str]] = []
     for number, match in _matches(text):
         if match is None:

@@ -403,7 +403,7 @@ class Journal:
         except OSError as error:
             raise cannot_write(self.path, error) from error
         if not is_same_file or os.path.realpath(self.path) != self._real_path:
-            raise StoreError(f"{self.path} was moved, deleted or replaced while the session was running: put it back")
+            raise StoreError(f"{self.path} was moved, deleted or replaced while the session was running: restore it")
         if status.st_size != self._size and not torn:
             raise StoreError(
                 f"{self.path} was changed by another program while the session was running: end this session"

@@ -217,7 +217,7 @@ class Progress:
         self.trial_since_s = self.trial_lasted_s = None
 
     def _start_trial(self, line: events.TrialStarted) -> None:
-        """Present a trial, perhaps again; an earlier trial means that its whole block is repeated."""
+        """Apply the start of a trial, first or repeated; an earlier trial means that its whole block is repeated."""
         trial = line.trial
         self._go_to(None, trial)
         self._drop_answers()

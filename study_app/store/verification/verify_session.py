@@ -89,8 +89,8 @@ class Findings:
         """Add an error: ``path`` cannot be trusted."""
         self.errors += (Finding(self._name(path), message),)
 
-    def failure(self, path: Path, error: StoreError) -> None:
-        """Add an error raised while ``path`` was read; the path is named once."""
+    def add_failure(self, path: Path, error: StoreError) -> None:
+        """Add the error raised while ``path`` was read, without repeating the path in the message."""
         self.error(path, str(error).removeprefix(str(path)).lstrip(" ,:/"))
 
     def warning(self, path: Path, message: str, *, shares: bool = False) -> None:
@@ -103,7 +103,7 @@ class Findings:
         try:
             yield
         except StoreError as error:
-            self.failure(path, error)
+            self.add_failure(path, error)
 
     def _name(self, path: Path) -> str:
         inside = path.is_relative_to(self.folder) and path != self.folder
@@ -219,7 +219,7 @@ def _check_journal(folder: SessionFolder, findings: Findings, *, running: bool) 
     try:
         contents = journal.scan(folder.journal)
     except StoreError as error:
-        findings.failure(folder.journal, error)
+        findings.add_failure(folder.journal, error)
         return nothing
     if contents.damage is not None:
         findings.error(folder.journal, contents.damage.removeprefix(f"{folder.journal}, "))
@@ -259,7 +259,7 @@ def _check_receipt(folder: SessionFolder, lines: list[events.Event], key: Key | 
     try:
         held = receipt.read(path)
     except StoreError as error:
-        findings.failure(path, error)
+        findings.add_failure(path, error)
         return
     if missing := [name for name in receipt.FIELDS if name not in held]:
         findings.error(path, f"does not contain {', '.join(missing)}")

@@ -239,7 +239,7 @@ def _check_withdrawals(study: StudyFolder, findings: Findings) -> tuple[dict[str
     try:
         withdrawn = tombstones(study)
     except StoreError as error:
-        findings.failure(study.withdrawals, error)
+        findings.add_failure(study.withdrawals, error)
         return {}, unerased
     for participant, tombstone in withdrawn.items():
         left: list[Path] = []

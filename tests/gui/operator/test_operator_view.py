@@ -9,7 +9,7 @@ import pytest
 from study_app.gui.operator.operator_view import stages
 from study_app.gui.operator.servo_health import ForceFigures, ServoHealth
 from study_app.gui.sessions.session_facts import LIMIT_WORDS
-from study_app.number_text import duration, duration_range, duration_words, grouped, minutes
+from study_app.number_text import clock_text, duration, duration_range, duration_words, grouped
 from study_app.protocol.load import load
 from study_app.protocol.model import Limits
 from study_app.protocol.orders.schedule import build_schedule
@@ -214,5 +214,5 @@ def test_durations_are_written_in_one_way() -> None:
         (30, 150, "30 s to 3 min"),
     ):
         assert duration_range(least, most) == words
-    assert (minutes(68), minutes(3723), grouped(45918)) == ("1:08", "1:02:03", "45\u2009918")
+    assert (clock_text(68), clock_text(3723), grouped(45918)) == ("1:08", "1:02:03", "45\u2009918")
     assert (duration_words(62e-6), duration_words(1.4e-3)) == ("62 µs", "1.4 ms")

@@ -184,7 +184,7 @@ def test_a_journal_that_is_no_longer_under_its_name_takes_no_line_until_it_is_ba
             if other is not None:
                 path.write_bytes(other)
             for waits in (True, False):
-                with pytest.raises(StoreError, match=r"journal\.jsonl was moved, deleted or replaced .*: put it back"):
+                with pytest.raises(StoreError, match=r"journal\.jsonl was moved, deleted or replaced .*: restore it"):
                     journal.append(event_of("counted", value=2), waits=waits)
         away.replace(path)
         journal.append(event_of("counted", value=2))
@@ -198,7 +198,7 @@ def test_a_journal_whose_folder_was_replaced_by_a_link_takes_no_line(tmp_path: P
     with Journal.create(folder / "journal.jsonl") as journal:
         folder.rename(away)
         folder.symlink_to(away)
-        with pytest.raises(StoreError, match=r"journal\.jsonl was moved, deleted or replaced .*: put it back"):
+        with pytest.raises(StoreError, match=r"journal\.jsonl was moved, deleted or replaced .*: restore it"):
             journal.append(event_of("counted", value=1))
         folder.unlink()
         away.rename(folder)

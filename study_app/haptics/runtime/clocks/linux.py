@@ -175,12 +175,12 @@ _NICE = -15
 _LOCK_ALL = 1 | 2 | 4  # present and future pages, each when it is used: unused pages are not loaded
 
 _RIGHTS = (
-    'for real-time priority, write "USER - rtprio 70" and "USER - memlock unlimited" (USER is your user name) into '
-    "/etc/security/limits.d/liquid-study.conf and log in again, or install rtkit"
+    'for real-time priority, add the lines "USER - rtprio 70" and "USER - memlock unlimited" (USER is your user name) '
+    "to /etc/security/limits.d/liquid-study.conf and log in again, or install rtkit"
 )
 MEMORY = (
-    'to lock the memory, write "USER - memlock unlimited" into /etc/security/limits.d/liquid-study.conf and log in '
-    "again"
+    'to lock the memory, add the line "USER - memlock unlimited" to /etc/security/limits.d/liquid-study.conf and log '
+    "in again"
 )
 
 
