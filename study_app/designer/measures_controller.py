@@ -8,7 +8,6 @@ from typing import Final
 
 from PySide6.QtCore import QObject, QTimer, Signal
 
-from study_app.analysis.planning import PREREGISTRATION
 from study_app.designer.document.document import Document
 from study_app.designer.document.study import Study
 from study_app.designer.editing import Editing
@@ -101,7 +100,7 @@ class MeasuresController(QObject):
         """Return whether the saved study is another one than its preregistration describes."""
         try:
             study = study_folder(self._editing.results, str(opened.study.document["study"]["name"]))
-            text = (study.path / PREREGISTRATION).read_text(encoding="utf-8")
+            text = study.preregistration.read_text(encoding="utf-8")
             return bool(opened.base) and protocol_hash(opened.saved_source) not in text
         except (StudyError, OSError, UnicodeDecodeError, LookupError, TypeError):
             return False
@@ -132,7 +131,7 @@ class MeasuresController(QObject):
         try:
             text = preregistration.preregistration_of(str(opened.file), power).encode()
             study = study_folder(self._editing.results, str(opened.study.document["study"]["name"]))
-            file = study.path / preregistration.FILE
+            file = study.preregistration
             differs, sessions = file.exists() and file.read_bytes() != text, len(study.sessions())
         except (StudyError, OSError) as error:
             self._place.message.emit(_NOT_WRITTEN, f"{error}.")

@@ -3,8 +3,6 @@
 from typing import Final
 
 MOST_PARTICIPANTS: Final = 1000
-PREREGISTRATION: Final = "preregistration.md"
-"""Its name in a study's folder."""
 SIZES: Final = (5, 8, 12, 16, 20, 24)
 """Numbers of participants of simulated studies, beside the planned one."""
 STUDIES: Final = 1000

@@ -15,7 +15,6 @@ from study_app.analysis.data.blocks import SPENDINGS, TRENDS, Decided, decisions
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.html_page import bullets, heading, paragraph
 from study_app.analysis.levels.thresholds import FAMILIES, REMOVED
-from study_app.analysis.planning import PREREGISTRATION
 from study_app.analysis.planning.simulated_studies import compares_statements
 from study_app.analysis.results import min_sample
 from study_app.analysis.statistics.equivalence import fewest_participants
@@ -32,6 +31,7 @@ from study_app.protocol.source import text_in
 from study_app.protocol.warnings import PRECISION, expected_of, precision_plan, precision_rows, threshold_plan
 from study_app.psychophysics.people import BETWEEN_PEOPLE
 from study_app.store.exclusions import MISSING_RULE, describe_exclusion
+from study_app.store.files import PREREGISTRATION
 from study_app.store.merged import DASH, folders_of
 
 FILE: Final = PREREGISTRATION

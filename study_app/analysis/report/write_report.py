@@ -123,7 +123,7 @@ _MOTION: Final = (
     optional("q3", "number", "Upper quartile across participants."),
     Column("trials", "integer", "Number of analysed trials in the condition.", minimum=0),
     Column("judged", "integer", "Number of these trials in which the limits were checked.", minimum=0),
-    Column("valid", "integer", "Number of these trials that met the protocol's timing limits.", minimum=0),
+    Column("valid", "integer", "Number of these trials that met the protocol's limits.", minimum=0),
 )
 
 
@@ -222,7 +222,7 @@ def files(study: Study) -> dict[str, str]:
     """Return the SHA-256 of every input file; recordings are in their session's checksums."""
     paths = [study.folder / MANIFEST]
     for place in map(StudyFolder, folders_of(study.folder).values()):
-        paths += [place.exclusions, place.key, place.reveals, place.path / PREREGISTRATION]
+        paths += [place.exclusions, place.key, place.reveals, place.preregistration]
         for session in place.sessions():
             tables = [session.table(study.name, name) for name in ("responses", "trials")]
             paths += [session.receipt, session.journal, session.checksums, *tables]

@@ -37,6 +37,7 @@ from study_app.store.files.csv_files import (
 )
 from study_app.store.files.folders import (
     ID_PATTERN,
+    PREREGISTRATION,
     SessionFolder,
     StudyFolder,
     check_study_name,
@@ -53,6 +54,7 @@ __all__ = [
     "INTERVALS",
     "MISSING",
     "PARTICIPANTS",
+    "PREREGISTRATION",
     "RESPONSES",
     "SEALED",
     "TRIALS",

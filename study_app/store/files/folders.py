@@ -32,6 +32,7 @@ ReportProgress: TypeAlias = Callable[[str, float], object]
 """Called with what is being done and the share that is done."""
 REBUILT = "rebuilt.txt"
 FINGERPRINTS = "fingerprints.txt"
+PREREGISTRATION = "preregistration.md"
 
 ID_PATTERN = re.compile(r"[A-Za-z0-9]+")
 PARTICIPANT_ID = re.compile(r"[A-Za-z0-9]{1,32}")
@@ -96,6 +97,8 @@ class StudyFolder:
     """The fingerprint of every session that ended."""
     withdrawals = _Within("withdrawals.jsonl")
     """A tombstone for each participant whose data were erased."""
+    preregistration = _Within(PREREGISTRATION)
+    """The plan of the study, if it was preregistered."""
     blinding = _Within("blinding")
     """The folder of key and reveals."""
     key = _Within("blinding", "key.sealed")

@@ -2,8 +2,8 @@
 
 A condition is revealed by its id, its liquid's id, the liquid's parameters and its delay; what a trial with a design
 presents by its level, standard and comparison. None of them may stand in a file or a name of a study folder, but for
-the sealed key, for the statements (whose words are shown to the participant anyway), for the moments of events and for
-the recordings, where forces and the ages of frames are measured.
+the sealed key, for the preregistration (which contains no codes), for the statements (whose words are shown to the
+participant anyway), for the moments of events and for the recordings, where forces and the ages of frames are measured.
 """
 
 import csv
@@ -114,13 +114,13 @@ def certain_telltales(tables: Tables, published: Any, levels: Iterable[float] = 
 
 
 def find_leaks(folder: Path, telling: Telltales) -> list[Leak]:
-    """Return the ``telling`` words in names and texts of ``folder``, except statements and recordings."""
+    """Return the ``telling`` words in names and texts of ``folder``, except where they may stand (see above)."""
     leaks: list[Leak] = []
-    key = StudyFolder(folder).key
+    study = StudyFolder(folder)
     for path in paths_in(folder):
         name = path.relative_to(folder).as_posix()
         leaks += [Leak(f"the name {name}", word) for word in telling.in_text(name)]
-        if path.is_file() and path != key and path.suffix != ".parquet":
+        if path.is_file() and path not in (study.key, study.preregistration) and path.suffix != ".parquet":
             leaks += _in_file(path, name, telling)
     return leaks
 

@@ -8,6 +8,7 @@ import pytest
 from study_app.protocol.load import load
 from study_app.protocol.model import Protocol
 from study_app.store import receipt
+from study_app.store.files import StudyFolder
 from study_app.store.journals import journal_events
 from study_app.store.verification.leaks import certain_telltales, find_leaks, presented_numbers, telltales
 from tests.journal_lines import event_of
@@ -40,6 +41,15 @@ def test_a_leak_is_found_wherever_it_is(tmp_path: Path, protocol: Protocol, star
         (f"{session}/receipt.json, device, rate_hz", "1013.7"),
         (f"{session}/subject-P007_session-01_task-brackish_description-trials_data.csv, row 2, code", "see_tardy"),
     ]
+
+
+def test_the_preregistration_names_the_conditions(tmp_path: Path, protocol: Protocol, start: Start) -> None:
+    start().finish("completed")
+    folder = StudyFolder(tmp_path / "study")
+    folder.preregistration.write_text("agreement is higher in mildew than in quagmire", encoding="utf-8")
+    assert found(folder.path, protocol) == []
+    folder.preregistration.rename(folder.path / "draft.md")
+    assert found(folder.path, protocol) == [("draft.md, line 1", "mildew"), ("draft.md, line 1", "quagmire")]
 
 
 def test_statements_may_name_what_they_ask(tmp_path: Path, tables_of_study: Tables, start: Start) -> None:
