@@ -14,7 +14,7 @@ import pandas as pd
 
 from study_app.analysis.data.blocks import Block, Item, PlacedQuestion, PlacedScore, Setting
 from study_app.analysis.data.measures import AGREEMENT, LEVELS, QUARTILES
-from study_app.analysis.data.study_tables import Study
+from study_app.analysis.data.study_tables import Study, group_members
 from study_app.analysis.levels.columns import ACHIEVED, JUDGED, OF_TRACKS, OPENED, RESULTS
 from study_app.analysis.levels.evaluate import level_results
 from study_app.analysis.levels.statistic import statistics
@@ -253,6 +253,9 @@ def wide_table(study: Study) -> tuple[Delivered, dict[str, Cells | QuestionCells
         "simulated": pd.array([bool(simulated[person]) for person in people], dtype="boolean"),
     }
     columns = [_BY_NAME["participant"], _BY_NAME["simulated"]]
+    if groups := group_members(study):
+        held["group"] = pd.array([groups.get(person) for person in people], dtype="string")
+        columns.append(_BY_NAME["group"])
     for name, cell in cells.items():
         found = _statement(study, cell, people) if isinstance(cell, Cells) else _question(study, cell, people)
         held[name], description, (least, most) = found

@@ -119,7 +119,10 @@ def _expected(results: Results, rows: dict[str, Rows]) -> dict[str, Rows]:
                 }
             )
     counted = [row for row in tables["responses"] if row["counted"]]
-    return tables | {"aggregate": list(_aggregate(results, counted)), "wide": list(_wide(rows["responses"], counted))}
+    return tables | {
+        "aggregate": list(_aggregate(results, counted)),
+        "wide": list(_wide(rows["responses"], tables["trials"], counted)),
+    }
 
 
 def _aggregate(results: Results, counted: Rows) -> Iterator[dict[str, Any]]:
@@ -143,7 +146,7 @@ def _aggregate(results: Results, counted: Rows) -> Iterator[dict[str, Any]]:
             }
 
 
-def _wide(stored_rows: Rows, counted: Rows) -> Iterator[dict[str, Any]]:
+def _wide(stored_rows: Rows, trials: Rows, counted: Rows) -> Iterator[dict[str, Any]]:
     for participant in sorted({row["participant"] for row in counted}):
         own = [row for row in counted if row["participant"] == participant]
         medians = {}
@@ -153,7 +156,9 @@ def _wide(stored_rows: Rows, counted: Rows) -> Iterator[dict[str, Any]]:
                 given = [answer for answer in answers if answer is not None]
                 medians[f"{item}__{condition}"] = np.median(given) if given else None
         simulated = {row["participant"]: row["simulated"] for row in stored_rows}[participant]
-        yield {"participant": participant, "simulated": simulated, **medians}
+        groups = [row["group"] for row in trials if row["participant"] == participant and row["counted"]]
+        group = next(group for group in reversed(groups) if group is not None)
+        yield {"participant": participant, "simulated": simulated, "group": group, **medians}
 
 
 def _text(cell: str) -> Any:

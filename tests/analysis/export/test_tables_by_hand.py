@@ -134,6 +134,18 @@ def test_each_row_of_the_aggregate_counts_the_answers_on_one_setting(made: Study
         assert row["agree_percent"] == pytest.approx(100 * sum(value >= 5 for value in values) / len(values), abs=0.05)
 
 
+@pytest.mark.parametrize("recorded_in", ["participants", "trials"])
+def test_the_wide_table_states_each_persons_group(made: Study, recorded_in: str) -> None:
+    """Receipts state pre-existing groups; only the opened journal states randomised ones."""
+    of_person = {"A-P001": "zinc", "A-P002": "amber", "B-P001": "zinc", "B-P010": "amber"}
+    tables = {name: getattr(made, name).assign(group=pd.NA) for name in ("participants", "trials")}
+    tables[recorded_in]["group"] = tables[recorded_in]["participant"].map(of_person)
+    table, _ = wide_table(replace(made, **tables))
+    assert header(table.columns)[:4] == ("participant", "site", "simulated", "group")
+    assert list(table.frame["group"].fillna("n/a")) == ["zinc", "amber", "zinc", "n/a"]
+    assert "group" not in wide_table(made)[0].frame
+
+
 def test_the_wide_table_has_the_median_of_each_persons_answers(made: Study, answers: list[Given]) -> None:
     table, cells = wide_table(made)
     wide = table.frame.set_index("participant")
