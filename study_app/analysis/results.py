@@ -34,7 +34,7 @@ class NotTested:
 class Delivered:
     """The differences between delivered and requested delays in one setting, in ms over trials.
 
-    For ``judged`` trials it is known whether they met the protocol's timing limits; ``valid`` ones did.
+    For ``judged`` trials it is known whether they met the protocol's limits; ``valid`` ones did.
     """
 
     block: str

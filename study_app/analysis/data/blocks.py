@@ -4,6 +4,7 @@ While the key is sealed a setting is its code and nothing else. Texts are in Eng
 in its first language.
 """
 
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final, Literal, Self, TypeAlias, get_args
@@ -24,6 +25,8 @@ Kind: TypeAlias = Compared
 
 KINDS: Final[tuple[Kind, ...]] = get_args(Kind)
 
+_CODE: Final = re.compile(r"([A-Za-z0-9]+-)?[A-Z][0-9]+")
+"""A code, in merged studies after its site: L1, Utrecht-L1."""
 _DELAY_PREFIX: Final = "D"
 """Codes of delay settings are D1, D2 …: what tells a block of delays in sealed receipts of earlier versions."""
 
@@ -205,6 +208,11 @@ def setting_name(setting: Setting, others: Sequence[Setting]) -> str:
     if sum(_presented_name(other, others) == name for other in others) < 2:
         return name
     return f"{name}, track {track}" if is_track else f"{name} ({setting.condition})"
+
+
+def name_in_sentence(name: str) -> str:
+    """Return a setting's name as it is written within a sentence: "water", but the code "L1" unchanged."""
+    return name if _CODE.fullmatch(name) else name[:1].lower() + name[1:]
 
 
 def _presented_name(setting: Setting, others: Sequence[Setting]) -> str:

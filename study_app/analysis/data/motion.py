@@ -199,7 +199,7 @@ class Performance:
     """All movement measures; ``reaching`` are the blocks with a reaching task, the only ones with reaches.
 
     Of the valid ``trials`` with reaching, ``recorded`` have a readable recording; ``unread`` gives the reasons for the
-    others, one line each. For ``judged`` trials it is known whether they met the protocol's timing limits; ``invalid``
+    others, one line each. For ``judged`` trials it is known whether they met the protocol's limits; ``invalid``
     ones did not but are included in the measures.
     """
 

@@ -318,7 +318,7 @@ def _sentences(study: Study, block: Block) -> Iterator[str]:
         which = counted(len(rows), "trial is", "trials are")
         yield f"{which} excluded, so {'its' if len(rows) == 1 else 'their'} answers are missing here."
     if invalid := int((~trials["valid"].fillna(value=True)).sum()):
-        yield f"{invalid} of {len(trials)} trials exceeded the protocol's timing limits but are included."
+        yield f"{invalid} of {len(trials)} trials exceeded the protocol's limits but are included."
     if study.doubts:
         names = sorted({doubt.path.relative_to(study.folder).as_posix() for doubt in study.doubts})
         more = f" and {len(names) - _FILES} more" if len(names) > _FILES else ""

@@ -649,12 +649,12 @@ _MEASURES: Final = ("Movement time, s", "Path, mm", "Overshoot, mm", "Submovemen
 
 
 def _kept(block: Block, results: Results) -> str:
-    """Return a sentence on the number of trials within the timing limits."""
+    """Return a sentence on the number of trials within the limits."""
     here = [delivered for delivered in results.delivered if delivered.block == block.id]
     judged, valid = sum(delivered.judged for delivered in here), sum(one.valid for one in here)
     if not judged:
-        return "No data are available on whether trials met the protocol's timing limits."
-    return f"{valid} of {judged} trials met the protocol's timing limits; all trials are included."
+        return "No data are available on whether trials met the protocol's limits."
+    return f"{valid} of {judged} trials met the protocol's limits; all trials are included."
 
 
 class Movement(Finding[None]):

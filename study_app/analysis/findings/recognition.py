@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 
 from study_app import number_text
+from study_app.analysis.data.blocks import name_in_sentence
 from study_app.analysis.figures import answer_figures
 from study_app.analysis.findings.finding import (
     FOUND,
@@ -229,7 +230,8 @@ class _Distinguished(Finding[None]):
         apart: dict[str, list[str]] = {}
         for (first, second), test in pairs:
             if test.verdict == verdict:
-                pair = f"between {name(result, first)} and {name(result, second)}".lower()
+                one, other = (name_in_sentence(name(result, code)) for code in (first, second))
+                pair = f"between {one} and {other}"
                 apart.setdefault(pair, []).append(f"“{short_text(result, test.item)}”")
         items = [f"“{short_text(result, one.item)}”" for one in differing if one.verdict == verdict]
         if apart:
@@ -243,7 +245,7 @@ class _Distinguished(Finding[None]):
             text = f"No statement showed a difference between any two {result.kind}."
         text += self._largest_words({test.item for test in differing if test.verdict == verdict})
         if named is not None and named.found.p is not None:
-            names = listed([result.names[place].lower() for place in known])
+            names = listed([name_in_sentence(result.names[place]) for place in known])
             single = f"Recognised above chance: {names}." if names else _NO_SINGLE_LIQUID
             if named.verdict not in FOUND:
                 single = _NONE_RECOGNISED
@@ -260,7 +262,7 @@ class _Distinguished(Finding[None]):
         if not known:
             return ""
         most = max(known, key=lambda effect: abs(effect.mean or 0.0))
-        first, other = (name(result, code).lower() for code in (result.settings[0].code, most.code))
+        first, other = (name_in_sentence(name(result, code)) for code in (result.settings[0].code, most.code))
         ends = f"[{number(most.low)}, {number(most.high)}]"
         return (
             f" The largest mean difference from {first} is {number(most.mean)} points "

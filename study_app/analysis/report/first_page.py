@@ -11,7 +11,7 @@ from markupsafe import Markup
 
 from study_app import number_text
 from study_app.analysis.contrasts import RATIOS, answer, mean_words, question
-from study_app.analysis.data.blocks import AFTER, Block, LevelBlock, Setting
+from study_app.analysis.data.blocks import AFTER, Block, LevelBlock, Setting, name_in_sentence
 from study_app.analysis.data.measures import AGREEMENT
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.figures.people_figures import Mean, mean_of, panel_rows
@@ -439,7 +439,7 @@ def _number_words(numbers: Numbers, presented: Mapping[str, Presented] = _NOT_PR
 def _setting_words(name: str) -> str:
     """Return the name of a setting in a sentence: "for water", or "after “80 ms late”" for a form after a block."""
     block = name.removeprefix(AFTER)
-    return f"for {name.lower()}" if block == name else f"{AFTER.lower()}{quoted_title(block)}"
+    return f"for {name_in_sentence(name)}" if block == name else f"{AFTER.lower()}{quoted_title(block)}"
 
 
 def _mean_ends(mean: Mean) -> str:
@@ -463,7 +463,7 @@ def _choice_words(result: QuestionResult) -> str:
         first, *tied = [f"“{result.options.get(option, option)}”" for option, count in counts.items() if count == most]
         equal = f", and as many chose {listed(tied)}" if tied else ""
         share = clopper_pearson(most, n)
-        of = f" ({group.name.lower()})" if len(result.groups) > 1 else ""
+        of = f" ({name_in_sentence(group.name)})" if len(result.groups) > 1 else ""
         ends = f"[{100 * share.low:.0f}, {100 * share.high:.0f}] %"
         parts.append(
             f"{most} of {n} participants chose {first}{equal}{of} ({100 * most / n:.0f} %, 95 % confidence interval "

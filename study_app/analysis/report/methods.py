@@ -6,7 +6,7 @@ from typing import Final
 
 from study_app import __version__, number_text
 from study_app.analysis.contrasts import contrast_methods
-from study_app.analysis.data.blocks import SPENDINGS, Block
+from study_app.analysis.data.blocks import SPENDINGS, Block, name_in_sentence
 from study_app.analysis.data.measures import QUARTILES
 from study_app.analysis.data.study_tables import Study, group_assignment, group_counts
 from study_app.analysis.figures.answer_figures import people_a_setting
@@ -274,7 +274,7 @@ def _presented(study: Study, block: Block, result: BlockResult) -> str:
     noun = (
         {"delays": "visual delay"}.get(result.kind, result.kind.removesuffix("s")) if result.revealed else "condition"
     )
-    names = [f"{delay:g}" for delay in result.delays_ms] or [name.lower() for name in result.names]
+    names = [f"{delay:g}" for delay in result.delays_ms] or [name_in_sentence(name) for name in result.names]
     unit = " ms" if result.delays_ms else ""
     which = counted(len(names), noun) + (f" ({listed(names)}{unit})" if result.revealed else "")
     of = (

@@ -114,9 +114,9 @@ def _in_general(study: Study, results: Results) -> Iterator[str]:
     if not study.revealed:
         yield (
             "The key is sealed: conditions appear as codes, and the report shows only counts and comparisons that do "
-            "not depend on their order. Using these numbers to decide whether to continue makes chance findings more "
-            "likely. To open the key, use Unblind in Results or the command liquid-study unblind RESULTS --by NAME "
-            "--reason TEXT."
+            "not depend on their order. Hypotheses are tested after unblinding. Using these numbers to decide whether "
+            "to continue makes chance findings more likely. To open the key, use Unblind in Results or the command "
+            "liquid-study unblind RESULTS --by NAME --reason TEXT."
         )
         if study.own_codes:
             yield "Until unblinding, each participant has a separate set of codes, so conditions cannot be compared."
@@ -727,7 +727,7 @@ def _delivered(study: Study, results: Results) -> Iterator[str]:
 
 
 def _violated_limits(study: Study, limits: Mapping[str, float]) -> str:
-    """Return a sentence on the timing limits that trials violated; "" if there are none."""
+    """Return a sentence on the limits that trials violated; "" if there are none."""
     rows = study.trials[study.trials["counted"] & (study.trials["phase"] == "main")]
     broken = [
         broken_limits({str(name): value for name, value in row.items() if pd.notna(value)}, limits)
@@ -811,7 +811,7 @@ def motion(results: Results) -> Iterator[str]:
     yield bullets(f"{_label(measure)}: {words}." for measure, words in definitions.items())
     yield paragraph(
         "The tables show the median across participants (with quartiles) of each participant's own median. “Trials "
-        "within limits” shows how many of the measured trials met the protocol's timing limits; the other columns "
+        "within limits” shows how many of the measured trials met the protocol's limits; the other columns "
         "include all trials. These measures are not tested.",
         "soft",
     )
@@ -857,9 +857,9 @@ def _recordings(measured: Performance) -> str:
     if measured.unread:
         text += f" (reasons for the others: {'; '.join(measured.unread)})"
     if not measured.judged:
-        return f"{text}. No data are available on whether trials met the protocol's timing limits."
+        return f"{text}. No data are available on whether trials met the protocol's limits."
     if not measured.invalid:
-        return f"{text}. All measured trials met the protocol's timing limits."
+        return f"{text}. All measured trials met the protocol's limits."
     verb = "is" if measured.invalid == 1 else "are"
-    invalid = f"{counted(measured.invalid, 'trial').capitalize()} exceeded the protocol's timing limits but {verb}"
+    invalid = f"{counted(measured.invalid, 'trial').capitalize()} exceeded the protocol's limits but {verb}"
     return f"{text}. {invalid} included."

@@ -261,6 +261,11 @@ def test_a_form_has_a_card_only_if_it_says_more_than_a_hypothesis(blocks: str, p
             "The mean Raw score was 4.00 [−21.4, 29.4] after Oil and 2.00 [−10.7, 14.7] for wax on a scale from 1 to 7 "
             "(95 % confidence intervals, n = 2). The mean difference (after Oil − wax) was 2.00 [−10.7, 14.7].",
         ),
+        (
+            Numbers("Warm", (1.0, 7.0), False, (("L1", {"P1": 2.0, "P2": 6.0}), ("Utrecht-L2", {"P2": 3, "P1": 1}))),
+            "The mean of “Warm” was 4.00 [−21.4, 29.4] for L1 and 2.00 [−10.7, 14.7] for Utrecht-L2 on a scale from 1 "
+            "to 7 (95 % confidence intervals, n = 2). The mean difference (L1 − Utrecht-L2) was 2.00 [−10.7, 14.7].",
+        ),
     ],
 )  # fmt: skip
 def test_numbers_are_told_with_the_mean_of_each_setting_and_the_mean_difference_of_two(
