@@ -32,6 +32,7 @@ from study_app.devices.rig import Rig, open_rig, study_settings
 from study_app.ending_signals import ENDING_SIGNALS
 from study_app.errors import SessionError, StoreError
 from study_app.haptics.runtime.clocks import VirtualClock
+from study_app.number_text import counted
 from study_app.protocol.blocks import Block
 from study_app.protocol.load import parse, source_bytes
 from study_app.protocol.model import Protocol
@@ -82,7 +83,7 @@ from study_app.store.integrity import is_never_begun, place_of, read_list
 from study_app.store.journals import journal
 from study_app.store.journals.journal import SessionClock
 from study_app.store.journals.journal_events import Event as Line
-from study_app.store.journals.journal_events import start_of
+from study_app.store.journals.journal_events import RecordingLost, start_of
 from study_app.store.session_progress import progress_of
 from study_app.store.sessions import SessionStart, SessionStore, begin_session, rebuild_session, reopen_store, used_ids
 from study_app.store.tables import check_study
@@ -603,7 +604,7 @@ def _run_to_end(
     opening: AbstractContextManager[tuple[RehearsedSession, SessionStore]],
     progress: Callable[[str], object] | None,
 ) -> SessionStore:
-    """Run an opened session to its last page; ``progress`` gets a line with its responses and missing trials."""
+    """Run an opened session to its last page; ``progress`` gets a line with its responses and what is missing."""
     began = time.perf_counter()
     with _HeldSignals() as signals, opening as (rehearsal, store):
         rehearsal.signals = signals
@@ -612,6 +613,9 @@ def _run_to_end(
         took_s = time.perf_counter() - began
         held = f"{store.clock.seconds() / 60:.1f} min of session time simulated in {took_s:.1f} s"
         missing = f"; {store.missing_trials}" if store.missing_trials.count else ""
+        lost = [line.reason for line in store.lines if isinstance(line, RecordingLost)]
+        if lost:
+            missing += f"; {counted(len(lost), 'recording')} could not be stored: {', '.join(dict.fromkeys(lost))}"
         answers = sum(progress_of(store.lines).answered.values())
         progress(f"{participant}: {answers} responses, {held}, fingerprint {store.fingerprint}{missing}")
     return store

@@ -256,6 +256,10 @@ def test_a_rehearsed_session_is_told_with_its_answers_its_time_and_what_is_missi
     assert re.fullmatch(f"{sentence}; {re.escape(str(missing))}", said[0])
     assert re.fullmatch(sentence, said[1])
     assert len(said) == 2
+    full, gone = "No space left on device", "Input/output error"
+    store.lines = [*lines, *(event_of("recording_lost", trial=2, attempt=1, reason=why) for why in (full, gone, full))]
+    rehearsal._run_to_end("P009", nullcontext((session, store)), said.append)
+    assert said[2].endswith(f"fingerprint abcd-efgh; 3 recordings could not be stored: {full}, {gone}")
 
 
 @pytest.mark.slow
