@@ -18,6 +18,7 @@ from study_app.cli.options import (
     exit_if,
     printable,
     progress,
+    study_at,
     takes_session,
     takes_study,
 )
@@ -258,7 +259,7 @@ def _parse_sites(_context: click.Context, _parameter: click.Parameter, texts: tu
             raise click.BadParameter(f"{text!r} does not have the form NAME=RESULTS, such as A=results/rek2024")
         if name in sites:
             raise click.BadParameter(f"site {name!r} is specified twice")
-        sites[name] = Path(folder)
+        sites[name] = study_at(folder, None)
     return sites
 
 

@@ -61,7 +61,7 @@ def test_sites_are_merged_and_those_that_were_there_are_kept(labs: Path) -> None
         last,
     ]
     c = f"merged  site C: 2 sessions, key {keys['C']}"
-    assert run("merge", f"C={labs / 'C'}", "--to", pooled)[0] == [f"kept    {a}", f"kept    {b}", c, last]
+    assert run("merge", "C=C", "--to", pooled)[0] == [f"kept    {a}", f"kept    {b}", c, last]
     sites = json.loads((pooled / "sites.json").read_bytes())["sites"]
     assert [(site["name"], site["sessions"], site["withdrawals"]) for site in sites] == [
         ("A", 2, 0), ("B", 1, 1), ("C", 2, 0),
