@@ -146,7 +146,7 @@ def test_the_precision_of_each_type_of_participant_is_that_of_the_largest_group_
     assert [*_of_kinds(precisions, "thicker")] == [
         "",
         "With 12 participants and 40 trials, the precision depends on the type of participant: "
-        f"±{10 + 20 * middle}% (median across types), ±{10 + 20 * worst}% at worst ({kinds[worst]}).",
+        f"±{10 + 20 * middle} % (median across types), ±{10 + 20 * worst} % at worst ({kinds[worst]}).",
     ]
 
 
