@@ -139,8 +139,10 @@ def begin_filter(parameters: Record, filtered: Record) -> None:
 
 
 @part
-def take_force(state: Record, safety: Record) -> None:
-    """Set the mean force that acted since the last sample, delayed by the assumed loop delay."""
+def take_force(parameters: Record, state: Record, safety: Record) -> None:
+    """Give the Kalman filter the mean force that acted since the last sample, delayed by the assumed loop delay."""
+    if parameters.estimator != estimators.KALMAN:
+        return
     passivity, filtered = safety.passivity, state.kalman
     sent_n = passivity.acted_n[passivity.row]
     late = passivity.row - safety.delay_ticks

@@ -74,7 +74,21 @@ from typing import Any
 
 from study_app.haptics.kernels.compiled import kernel, part
 from study_app.haptics.kernels.sample_validation import is_gap
-from study_app.haptics.kernels.vector import clear, copy, distance, dot, is_finite, norm, square, square_distance
+from study_app.haptics.kernels.vector import (
+    Vector,
+    clear,
+    components,
+    copy,
+    difference,
+    distance,
+    dot,
+    is_finite,
+    multiple,
+    norm,
+    square,
+    square_distance,
+    vector_sum,
+)
 from study_app.haptics.model import layout
 from study_app.haptics.model.device_dynamics import MOST_DELAY
 
@@ -132,12 +146,10 @@ def filter_storage(model: Any, passivity: layout.Record) -> float:
     if lag_s == 0.0:
         return 0.0
     sent_n, saturated_n = passivity.sent_n[passivity.row], passivity.saturated_n[passivity.row]
-    power_w = missing_w = 0.0
-    for axis in range(3):
-        v_mps = state.estimate_mps[axis] - state.drift_mps[axis]
-        power_w -= sent_n[axis] * v_mps
-        missing_w -= saturated_n[axis] * v_mps
-    power_w -= max(missing_w, 0.0)
+    v_mps = difference(state.estimate_mps, state.drift_mps)
+    power_w = -dot(sent_n, v_mps)
+    if passivity.saturated_ticks > 0:
+        power_w -= max(-dot(saturated_n, v_mps), 0.0)
     if power_w <= 0.0:
         return 0.0
     share = 1.0 - 2.0 / 3.0 * math.sqrt(passivity.norm_share)
@@ -183,7 +195,7 @@ def reset_observer(passivity: layout.Record) -> None:
     passivity.late_balance_j = 0.0
     passivity.later_balance_j = 0.0
     passivity.reserve_j = 0.0
-    passivity.row = 0
+    passivity.row = passivity.saturated_ticks = 0
     for tick in range(MOST_DELAY + 2):
         clear(passivity.sent_n[tick])
         clear(passivity.saturated_n[tick])
@@ -211,7 +223,6 @@ def reset_observer(passivity: layout.Record) -> None:
     passivity.norm_share = 1.0
     passivity.settling = 0
     clear(passivity.lift_n)
-    clear(passivity.lift_before_n)
 
 
 @part
@@ -221,43 +232,48 @@ def update_observer(model: Any, safety: layout.Record, interval_s: float) -> Non
     Several forces sent between two samples count by their mean over time.
     """
     parameters, state, passivity = model.parameters[0], model.state[0], safety.passivity
-    rules = parameters.rules
-    delay_ticks = max(safety.delay_ticks, 1)
+    tick_s, delay_ticks = safety.tick_s, max(safety.delay_ticks, 1)
     sent_n = _least_favourable(passivity, state, passivity.row, interval_s)
     late_n = _least_favourable(passivity, state, _row_before(passivity, delay_ticks), interval_s)
     later_n = _least_favourable(passivity, state, _row_before(passivity, delay_ticks + 1), interval_s)
-    acted_n = passivity.acted_n[_row_before(passivity, safety.delay_ticks)]
-    for axis in range(3):
-        passivity.acted_impulse_ns[axis] += acted_n[axis] * safety.tick_s
-        passivity.impulse_ns[axis] += sent_n[axis] * safety.tick_s
-        passivity.late_impulse_ns[axis] += late_n[axis] * safety.tick_s
-        passivity.later_impulse_ns[axis] += later_n[axis] * safety.tick_s
-    passivity.impulse_s += safety.tick_s
+    impulse_ns = vector_sum(passivity.impulse_ns, multiple(sent_n, tick_s))
+    late_impulse_ns = vector_sum(passivity.late_impulse_ns, multiple(late_n, tick_s))
+    later_impulse_ns = vector_sum(passivity.later_impulse_ns, multiple(later_n, tick_s))
+    elapsed_s = passivity.impulse_s + tick_s
     if interval_s == 0.0:
+        acted_n = passivity.acted_n[_row_before(passivity, safety.delay_ticks)]
+        copy(vector_sum(passivity.acted_impulse_ns, multiple(acted_n, tick_s)), passivity.acted_impulse_ns)
+        copy(impulse_ns, passivity.impulse_ns)
+        copy(late_impulse_ns, passivity.late_impulse_ns)
+        copy(later_impulse_ns, passivity.later_impulse_ns)
+        passivity.impulse_s = elapsed_s
         return
-    if passivity.impulse_s == 0.0:  # two samples at once: no time to average over
-        passivity.impulse_s = 1.0
-        for axis in range(3):
-            passivity.impulse_ns[axis] = sent_n[axis]
-            passivity.late_impulse_ns[axis] = late_n[axis]
-            passivity.later_impulse_ns[axis] = later_n[axis]
-    share = interval_s / _SMOOTHING_S
-    weight = share / (1.0 + share * (0.5 + share / 12.0))  # 1 - exp(-share), to 1 % over four milliseconds
+    if passivity.impulse_s > 0.0:
+        clear(passivity.acted_impulse_ns)
+        clear(passivity.impulse_ns)
+        clear(passivity.late_impulse_ns)
+        clear(passivity.later_impulse_ns)
+        passivity.impulse_s = 0.0
+    if elapsed_s == 0.0:  # two samples at once: no time to average over
+        elapsed_s, impulse_ns, late_impulse_ns, later_impulse_ns = 1.0, sent_n, late_n, later_n
+    if interval_s != passivity.weighted_s:
+        passivity.weighted_s = interval_s
+        passivity.weight, passivity.hand_weight = (
+            _smoothing_weight(interval_s, _SMOOTHING_S),
+            _smoothing_weight(interval_s, _HAND_S),
+        )
     per_scale, per_s = 1.0 / parameters.scale, 1.0 / interval_s
-    work_j = late_work_j = later_work_j = square_m2 = 0.0
+    moved_m = difference(difference(state.position_m, state.previous_m), multiple(state.drift_mps, interval_s))
+    step_m = multiple(moved_m, per_scale)
+    work_j, late_work_j = -dot(impulse_ns, step_m), -dot(late_impulse_ns, step_m)
+    later_work_j, square_m2 = -dot(later_impulse_ns, step_m), square(step_m)
     for axis in range(3):
-        moved_m = state.position_m[axis] - state.previous_m[axis] - state.drift_mps[axis] * interval_s
-        step_m = moved_m * per_scale
-        square_m2 += step_m * step_m
-        work_j -= passivity.impulse_ns[axis] * step_m
-        late_work_j -= passivity.late_impulse_ns[axis] * step_m
-        later_work_j -= passivity.later_impulse_ns[axis] * step_m
-        passivity.velocity_mps[axis] += weight * (step_m * per_s - passivity.velocity_mps[axis])
-        mean_n = passivity.later_impulse_ns[axis] / passivity.impulse_s
-        observe_incremental(passivity.fast, axis, mean_n, step_m * per_s, interval_s)
+        step_mps = step_m[axis] * per_s
+        passivity.velocity_mps[axis] += passivity.weight * (step_mps - passivity.velocity_mps[axis])
+        observe_incremental(passivity.fast, axis, later_impulse_ns[axis] / elapsed_s, step_mps, interval_s)
     _watch_motion(parameters, passivity, interval_s)
     close_incremental(passivity.fast, interval_s if parameters.link.acts == 0 else 0.0)
-    if is_gap(parameters, interval_s) and rules.trusts_gaps == 0.0:
+    if is_gap(parameters, interval_s) and parameters.rules.trusts_gaps == 0.0:
         work_j, late_work_j, later_work_j = min(work_j, 0.0), min(late_work_j, 0.0), min(later_work_j, 0.0)
     elif square_m2 > passivity.longest_m * passivity.longest_m:
         passivity.longest_m = math.sqrt(square_m2)
@@ -268,7 +284,7 @@ def update_observer(model: Any, safety: layout.Record, interval_s: float) -> Non
     later_j = max(late_j, passivity.stored_j[_row_before(passivity, delay_ticks + 1)])
     most_j = state.returnable_j / parameters.scale
     passivity.reserve_j = most_j + late_j
-    per_time = 1.0 / passivity.impulse_s
+    per_time = 1.0 / elapsed_s
     passivity.balance_j = min(_forgive(passivity.balance_j, forgiven_j) + work_j * per_time, most_j + stored_j)
     passivity.late_balance_j = min(
         _forgive(passivity.late_balance_j, forgiven_j) + late_work_j * per_time, passivity.reserve_j
@@ -276,11 +292,13 @@ def update_observer(model: Any, safety: layout.Record, interval_s: float) -> Non
     passivity.later_balance_j = min(
         _forgive(passivity.later_balance_j, forgiven_j) + later_work_j * per_time, most_j + later_j
     )
-    clear(passivity.impulse_ns)
-    clear(passivity.late_impulse_ns)
-    clear(passivity.later_impulse_ns)
-    clear(passivity.acted_impulse_ns)
-    passivity.impulse_s = 0.0
+
+
+@part
+def _smoothing_weight(interval_s: float, time_s: float) -> float:
+    """Return the weight of the newest value in a filter of first order: 1 - exp(-share), to 1 % up to a share of 2."""
+    share = interval_s / time_s
+    return share / (1.0 + share * (0.5 + share / 12.0))
 
 
 @part
@@ -291,14 +309,14 @@ def _watch_motion(parameters: layout.Record, passivity: layout.Record, interval_
     handle has more kinetic energy than the force can have given to it without a debt; a handle that was let go is so
     for a shorter time than one that is pushed.
     """
-    share = interval_s / _HAND_S
-    weight = share / (1.0 + share * (0.5 + share / 12.0))
+    weight = passivity.hand_weight
     for axis in range(3):
         passivity.slow_mps[axis] += weight * (passivity.velocity_mps[axis] - passivity.slow_mps[axis])
     square_m2ps2 = square_distance(passivity.velocity_mps, passivity.slow_mps)
-    fast_m2ps2 = max(_FAST_MPS * _FAST_MPS, 2.0 * _FAST_J / parameters.mass_kg)
-    lasted_s = interval_s if square_m2ps2 > fast_m2ps2 else 0.0
-    passivity.fast_s = (passivity.fast_s + lasted_s) / (1.0 + interval_s / _PUSHED_S)
+    if square_m2ps2 > _FAST_MPS * _FAST_MPS and square_m2ps2 > 2.0 * _FAST_J / parameters.mass_kg:
+        passivity.fast_s += interval_s
+    if passivity.fast_s > 0.0:
+        passivity.fast_s /= 1.0 + interval_s / _PUSHED_S
     passivity.quiet_s = 0.0 if square_m2ps2 > _QUIET_MPS * _QUIET_MPS else passivity.quiet_s + interval_s
     passivity.gap_s = 0.0 if is_gap(parameters, interval_s) else passivity.gap_s + interval_s
     _count_reversals(parameters, passivity, min(_SWING_WEIGHT * weight, 1.0), interval_s)
@@ -354,6 +372,8 @@ def _least_favourable(
     Without a new sample, ``interval_s`` 0, the last velocity stands for the step.
     """
     sent_n, saturated_n = passivity.sent_n[row], passivity.saturated_n[row]
+    if passivity.saturated_ticks == 0:
+        return components(sent_n)
     power = 0.0
     for axis in range(3):
         step = passivity.velocity_mps[axis]
@@ -376,10 +396,8 @@ def _forgive(balance_j: float, forgiven_j: float) -> float:
 
 
 @part
-def reduce_gain(
-    parameters: layout.Record, state: layout.Record, passivity: layout.Record, sample: layout.Record
-) -> None:
-    """Multiply the force by a gain, which a debt reduces at once and which recovers within seconds."""
+def reduce_gain(parameters: layout.Record, state: layout.Record, passivity: layout.Record) -> float:
+    """Update and return the gain of the force, which a debt reduces at once and which recovers within seconds."""
     left_j = min(_left_j(passivity), INCREMENTAL_ALLOWANCE_J + passivity.fast.balance_j)
     left_j = _judge_debt(parameters, state, passivity, left_j)
     if passivity.reversals >= _REVERSALS:
@@ -397,11 +415,7 @@ def reduce_gain(
             passivity.gain *= max(1.0 - parameters.period_s / _INDEBTED_S, 0.0)
     if left_j < 0.0:
         passivity.gain = min(passivity.gain, HALVING_J / (HALVING_J - left_j))
-    if passivity.gain < 1.0:
-        sample.limiters |= layout.LIMITER_ENERGY
-        for axis in range(3):
-            lift_n = passivity.lift_n[axis]
-            sample.device_force_n[axis] = lift_n + (sample.device_force_n[axis] - lift_n) * passivity.gain
+    return float(passivity.gain)
 
 
 @part
@@ -424,49 +438,43 @@ def _judge_debt(parameters: layout.Record, state: layout.Record, passivity: layo
 
 
 @part
-def apply_controller(parameters: layout.Record, safety: layout.Record, sample: layout.Record) -> None:
-    """Change the force to be sent so that a debt is repaid, and cannot grow by more than one step's work."""
+def apply_controller(
+    parameters: layout.Record, safety: layout.Record, sample: layout.Record, force_n: Vector, lift_n: Vector
+) -> Vector:
+    """Return the force changed so that a debt is repaid, and cannot grow by more than one step's work."""
     passivity = safety.passivity
     left_j = _left_j(passivity)
-    given = _limit_power(parameters, safety, left_j, sample.device_force_n)
-    kept = False
+    force_n, changed = _limit_power(parameters, safety, left_j, force_n, lift_n)
     if left_j < 0.0:
         most_n = passivity.strongest_n + left_j / passivity.longest_m if passivity.longest_m > 0.0 else 0.0
-        kept = _limit_norm(max(most_n, 0.0), passivity, sample.device_force_n)
-    changed = given or kept
+        most_n = max(most_n, 0.0)
+        size_n = distance(force_n, lift_n)
+        if size_n > most_n:
+            changed = True
+            without_n = multiple(difference(force_n, lift_n), most_n)
+            force_n = vector_sum(lift_n, (without_n[0] / size_n, without_n[1] / size_n, without_n[2] / size_n))
     if changed or passivity.settling:  # also the tick after, in which the force returns
         sample.limiters |= layout.LIMITER_ENERGY
     passivity.settling = changed
+    return force_n
 
 
 @part
-def _limit_norm(most_n: float, passivity: layout.Record, force_n: Any) -> bool:
-    """Shorten the force, without buoyancy, to ``most_n``; return whether it was longer."""
-    lift_n = passivity.lift_n
-    size_n = distance(force_n, lift_n)
-    if size_n <= most_n:
-        return False
-    for axis in range(3):
-        force_n[axis] = lift_n[axis] + (force_n[axis] - lift_n[axis]) * most_n / size_n
-    return True
-
-
-@part
-def _limit_power(parameters: layout.Record, safety: layout.Record, left_j: float, force_n: Any) -> bool:
+def _limit_power(
+    parameters: layout.Record, safety: layout.Record, left_j: float, force_n: Vector, lift_n: Vector
+) -> tuple[Vector, bool]:
     """Reduce the force along the motion to the power that the energy left allows; in debt, add damping.
 
-    Return whether the force was changed.
+    Return the force, and whether it was changed.
     """
     passivity = safety.passivity
-    v_mps, lift_n = passivity.velocity_mps, passivity.lift_n
+    v_mps = components(passivity.velocity_mps)
     square_mps2 = square(v_mps)
     if square_mps2 <= SURE_MPS * SURE_MPS:
-        return False
-    power_w = 0.0
-    for axis in range(3):
-        power_w += (force_n[axis] - lift_n[axis]) * v_mps[axis]
+        return force_n, False
+    power_w = dot(difference(force_n, lift_n), v_mps)
     if left_j >= 0.0 and power_w * _SPENDING_S <= left_j:
-        return False
+        return force_n, False
     speed_mps = math.sqrt(square_mps2)
     along_n = power_w / speed_mps
     if left_j >= 0.0:
@@ -476,21 +484,22 @@ def _limit_power(parameters: layout.Record, safety: layout.Record, left_j: float
         brake_n = _BRAKE * passivity.gain * limit_nspm * speed_mps
         wanted_n = -min(-left_j / (parameters.period_s * speed_mps), brake_n)
     if along_n <= wanted_n:
-        return False
+        return force_n, False
     excess_n = min(speed_mps / SURE_MPS - 1.0, 1.0) * (along_n - wanted_n)
-    for axis in range(3):
-        force_n[axis] -= excess_n * v_mps[axis] / speed_mps
-    return True
+    x_n, y_n, z_n = multiple(v_mps, excess_n)
+    return (force_n[0] - x_n / speed_mps, force_n[1] - y_n / speed_mps, force_n[2] - z_n / speed_mps), True
 
 
 @part
-def log_command(passivity: layout.Record, force_n: Any) -> None:
-    """Log the commanded force as the one that the device sends."""
+def log_command(passivity: layout.Record, sent_n: Vector) -> None:
+    """Log the commanded force, without buoyancy, as the one that the device sends."""
     stored_j = passivity.stored_j[passivity.row]
     passivity.row = passivity.row + 1 if passivity.row <= MOST_DELAY else 0
     passivity.stored_j[passivity.row] = stored_j  # until the next sample
-    clear(passivity.saturated_n[passivity.row])
-    _log(passivity, force_n)
+    if passivity.saturated_ticks > 0:
+        passivity.saturated_ticks -= 1
+        clear(passivity.saturated_n[passivity.row])
+    _log(passivity, sent_n)
 
 
 @kernel
@@ -510,7 +519,7 @@ def log_delivery(safety: layout.Record, sample: layout.Record, sent_n: Any) -> N
         return
     for axis in range(3):
         sample.device_force_n[axis] = round(sent_n[axis] * DELIVERY_STEPS_PER_N) / DELIVERY_STEPS_PER_N
-    _log(safety.passivity, sample.device_force_n)
+    _log(safety.passivity, difference(sample.device_force_n, safety.passivity.lift_n))
     sample.withheld_n = distance(safety.requested_n, sample.device_force_n)
 
 
@@ -519,14 +528,13 @@ def log_saturation(safety: layout.Record, sample: layout.Record) -> None:
     """Log that the device's motors may have given only a part of the last force."""
     sample.limiters |= layout.LIMITER_SATURATED
     copy(sample.device_force_n, safety.passivity.saturated_n[safety.passivity.row])
+    safety.passivity.saturated_ticks = MOST_DELAY + 2
 
 
 @part
-def _log(passivity: layout.Record, force_n: Any) -> None:
+def _log(passivity: layout.Record, sent_n: Vector) -> None:
     """Store the force of this tick, without buoyancy."""
-    sent_n = passivity.sent_n[passivity.row]
-    for axis in range(3):
-        sent_n[axis] = force_n[axis] - passivity.lift_n[axis]
+    copy(sent_n, passivity.sent_n[passivity.row])
     copy(sent_n, passivity.acted_n[passivity.row])
     if square(sent_n) > passivity.strongest_n * passivity.strongest_n:
         passivity.strongest_n = norm(sent_n)

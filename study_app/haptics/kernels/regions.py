@@ -28,8 +28,9 @@ def update_volume_fractions(model: Any, interval_s: float) -> None:
         surfaced = liquid.effects & surface.BIT
         local.inside = _contains(liquid.region, state.position_m, local.inside, surfaced)
         target = free if local.inside else 0.0
-        step = interval_s / _FADE_S if state.placed else 1.0
-        local.border += min(max(target - local.border, -step), step)
+        if local.border != target:
+            step = interval_s / _FADE_S if state.placed else 1.0
+            local.border += min(max(target - local.border, -step), step)
         local.share = local.border
         local.frontal = local.border
         if surfaced:

@@ -31,7 +31,21 @@ from study_app.haptics.kernels.passivity import (
     reset_observer,
     update_observer,
 )
-from study_app.haptics.kernels.vector import clear, copy, distance, dot, is_finite, norm, square, square_distance
+from study_app.haptics.kernels.vector import (
+    ZERO,
+    Vector,
+    components,
+    copy,
+    difference,
+    distance,
+    dot,
+    is_finite,
+    multiple,
+    norm,
+    square,
+    square_distance,
+    vector_sum,
+)
 from study_app.haptics.model import layout
 from study_app.haptics.model.device_dynamics import ASSUMED_TICKS
 
@@ -110,52 +124,61 @@ def begin_scene(safety: layout.Record) -> None:
 def guard(model: Any, safety: layout.Record, sample: layout.Record, interval_s: float) -> None:
     """Convert the force of the effects into the force to be sent, ``sample.device_force_n``.
 
-    ``interval_s`` is the time since the last accepted sample, 0 if this tick has none.
+    ``interval_s`` is the time since the last accepted sample, 0 if this tick has none. Vectors are tuples here: they
+    stay in registers from step to step.
     """
-    parameters, state = model.parameters[0], model.state[0]
-    passivity = safety.passivity
-    force_n, lift_n = sample.device_force_n, passivity.lift_n
+    parameters, state, passivity = model.parameters[0], model.state[0], safety.passivity
     update_observer(model, safety, interval_s)
-    copy(lift_n, passivity.lift_before_n)
-    copy(state.force_n, force_n)
-    copy(state.lift_n, lift_n)
-    limit_slope(model, safety, sample)
-    limit_inertia(model, safety, sample)
-    if parameters.link.acts != 0 and not delay_force(parameters.link, state.link, model.forces_n, force_n):
-        clear(lift_n)
-        safety.fade = 0.0  # the first force that arrives fades in
+    asked_n, lift_n, lift_before_n = components(state.force_n), components(state.lift_n), components(passivity.lift_n)
+    force_n = limit_inertia(model, sample, limit_slope(model, safety, sample, asked_n))
+    if parameters.link.acts != 0:
+        copy(force_n, sample.device_force_n)
+        if not delay_force(parameters.link, state.link, model.forces_n, sample.device_force_n):
+            lift_n = ZERO
+            safety.fade = 0.0  # the first force that arrives fades in
+        force_n = components(sample.device_force_n)
     if not (is_finite(force_n) and is_finite(lift_n)):
         sample.limiters |= layout.LIMITER_NON_FINITE
         sample.status = layout.STATUS_NON_FINITE
-        clear(force_n)
-        clear(lift_n)
+        force_n = lift_n = ZERO
     limit_n = min(parameters.force_limit_n, safety.device_limit_n)
-    passivity.norm_share = min(limit_n / max(norm(force_n), limit_n), 1.0) if limit_n > 0.0 else 1.0
-    _limit_norm(force_n, lift_n, limit_n, sample)
-    _fade(force_n, lift_n, parameters, safety, sample)
-    copy(force_n, safety.permitted_n)
-    _log_request(parameters, state, safety, limit_n)
-    reduce_gain(parameters, state, passivity, sample)
-    _limit_slew(force_n, parameters, state, safety, sample)
-    copy(force_n, safety.slewed_n)
-    apply_controller(parameters, safety, sample)
-    _limit_norm(force_n, lift_n, limit_n, sample)
+    norm_share = _norm_share(force_n, limit_n, sample)
+    passivity.norm_share = norm_share if limit_n > 0.0 else 1.0
+    _update_fade(parameters, safety, sample)
+    if norm_share < 1.0:
+        force_n, lift_n = multiple(force_n, norm_share), multiple(lift_n, norm_share)
+    if safety.fade < 1.0:
+        force_n, lift_n = multiple(force_n, safety.fade), multiple(lift_n, safety.fade)
+    permitted_n = force_n
+    requested_n = _requested_force(parameters, safety, asked_n, permitted_n, limit_n)
+    gain = reduce_gain(parameters, state, passivity)
+    if gain < 1.0:
+        sample.limiters |= layout.LIMITER_ENERGY
+        force_n = vector_sum(lift_n, multiple(difference(force_n, lift_n), gain))
+    force_n, lift_n = _limit_slew(force_n, lift_n, lift_before_n, parameters, state, safety, sample)
+    slewed_n = force_n
+    force_n = apply_controller(parameters, safety, sample, force_n, lift_n)
+    norm_share = _norm_share(force_n, limit_n, sample)
+    if norm_share < 1.0:
+        force_n, lift_n = multiple(force_n, norm_share), multiple(lift_n, norm_share)
     if safety.stop != 0 or safety.fault != 0:
-        _zero_force(force_n, safety, sample)
-        clear(lift_n)
-        clear(safety.slewed_n)
-        clear(safety.permitted_n)
-        clear(safety.requested_n)
-    log_command(passivity, force_n)
+        _note_stop(safety, sample)
+        force_n = lift_n = slewed_n = permitted_n = requested_n = ZERO
+    copy(permitted_n, safety.permitted_n)
+    copy(requested_n, safety.requested_n)
+    copy(slewed_n, safety.slewed_n)
+    copy(lift_n, passivity.lift_n)
+    copy(force_n, sample.device_force_n)
     copy(force_n, sample.command_n)
+    log_command(passivity, difference(force_n, lift_n))
     sample.delay_ticks = safety.delay_ticks
-    sample.permitted_n = norm(safety.requested_n)
-    sample.withheld_n = distance(safety.requested_n, force_n)
+    sample.permitted_n = norm(requested_n)
+    sample.withheld_n = distance(requested_n, force_n)
 
 
 @part
-def limit_slope(model: Any, safety: layout.Record, sample: layout.Record) -> None:
-    """Shorten each liquid's damping to F·min(1, B|w|/|F|): the secant of the maximum stable damping.
+def limit_slope(model: Any, safety: layout.Record, sample: layout.Record, force_n: Vector) -> Vector:
+    """Return the force with each liquid's damping shortened to F·min(1, B|w|/|F|), the secant of the maximum one.
 
     Delayed drag is limited by the rest of B at its own, greater speed: in fast strokes it follows so soon that released
     handles of 50 g and less oscillated at scales of 10 and more. The excess ``excess_n`` of a force that is steeper
@@ -170,54 +193,46 @@ def limit_slope(model: Any, safety: layout.Record, sample: layout.Record) -> Non
         if local.share > 0.0:
             if square(local.excess_n) > 0.0:
                 sample.limiters |= layout.LIMITER_SLOPE
-                for axis in range(3):
-                    sample.device_force_n[axis] -= local.excess_n[axis]
+                force_n = difference(force_n, local.excess_n)
             most_nspm = parameters.slope_limit_nspm[safety.delay_ticks] * local.slope_factor * local.share / shares
             if square(local.damping_n) > most_nspm * most_nspm * square(local.relative_mps):
                 sample.limiters |= layout.LIMITER_SLOPE
                 excess = 1.0 - most_nspm * norm(local.relative_mps) / norm(local.damping_n)
-                for axis in range(3):
-                    sample.device_force_n[axis] -= excess * local.damping_n[axis]
+                force_n = difference(force_n, multiple(local.damping_n, excess))
             if local.late_mps > 0.0:
                 most_n = max(most_nspm - local.prompt_nspm, 0.0) * local.late_mps
                 if square(local.late_n) > most_n * most_n:
                     sample.limiters |= layout.LIMITER_SLOPE
                     excess = 1.0 - most_n / norm(local.late_n)
-                    for axis in range(3):
-                        sample.device_force_n[axis] -= excess * local.late_n[axis]
+                    force_n = difference(force_n, multiple(local.late_n, excess))
+    return force_n
 
 
 @part
-def limit_inertia(model: Any, safety: layout.Record, sample: layout.Record) -> None:
-    """Reduce inertial forces to their stable share (`pack`): they also damp fast motion."""
+def limit_inertia(model: Any, sample: layout.Record, force_n: Vector) -> Vector:
+    """Return the force with inertial forces reduced to their stable share (`pack`): they also damp fast motion."""
     for i in range(model.parameters[0].liquids):
         local = model.liquid_states[i]
         excess = 1.0 - local.inertia_share
         if excess > 0.0 and local.share > 0.0:
             sample.limiters |= layout.LIMITER_SLOPE
             for k in range(local.inertial):
-                for axis in range(3):
-                    sample.device_force_n[axis] -= excess * local.inertia_n[k, axis]
+                force_n = difference(force_n, multiple(local.inertia_n[k], excess))
+    return force_n
 
 
 @part
-def _limit_norm(force_n: Any, lift_n: Any, limit_n: float, sample: layout.Record) -> None:
-    """Shorten the force to the limit, keeping its direction."""
+def _norm_share(force_n: Vector, limit_n: float, sample: layout.Record) -> float:
+    """Return the share of the force that the limit permits."""
     if square(force_n) > limit_n * limit_n:
         sample.limiters |= layout.LIMITER_NORM
-        _scale(force_n, lift_n, limit_n / norm(force_n))
+        return limit_n / norm(force_n)
+    return 1.0
 
 
 @part
-def _scale(force_n: Any, lift_n: Any, factor: float) -> None:
-    for axis in range(3):
-        force_n[axis] *= factor
-        lift_n[axis] *= factor
-
-
-@part
-def _fade(force_n: Any, lift_n: Any, parameters: layout.Record, safety: layout.Record, sample: layout.Record) -> None:
-    """Scale the force while it fades in or out (no usable sample, or a late tick).
+def _update_fade(parameters: layout.Record, safety: layout.Record, sample: layout.Record) -> None:
+    """Update the share of the force that is sent while it fades in or out (no usable sample, or a late tick).
 
     The scene sets the fade-in time; after a start it is at least 500 ms.
     """
@@ -227,67 +242,77 @@ def _fade(force_n: Any, lift_n: Any, parameters: layout.Record, safety: layout.R
         safety.fade = max(safety.fade - lasted_s / parameters.rules.fade_out_s, 0.0)
         if safety.late_s >= _LATE_S:
             safety.fade_s = START_FADE_S
-    else:
+    elif safety.fade < 1.0:
         safety.fade = min(safety.fade + safety.tick_s / max(safety.fade_s, parameters.fade_s), 1.0)
     if safety.fade < 1.0:
         sample.limiters |= layout.LIMITER_FADE
-        _scale(force_n, lift_n, safety.fade)
     else:
         safety.fade_s = 0.0
 
 
 @part
+def _requested_force(
+    parameters: layout.Record, safety: layout.Record, asked_n: Vector, permitted_n: Vector, limit_n: float
+) -> Vector:
+    """Return the force of the effects within norm and fade, from which the share withheld counts.
+
+    A force link sends the force of earlier ticks: there the force after its limits counts.
+    """
+    if parameters.link.acts != 0 or limit_n <= 0.0 or not is_finite(asked_n):
+        return permitted_n
+    exceeds = square(asked_n) > limit_n * limit_n
+    if exceeds or safety.fade < 1.0:
+        return multiple(asked_n, safety.fade * limit_n / (norm(asked_n) if exceeds else limit_n))
+    return asked_n
+
+
+@part
 def _limit_slew(
-    force_n: Any, parameters: layout.Record, state: layout.Record, safety: layout.Record, sample: layout.Record
-) -> None:
+    force_n: Vector,
+    lift_n: Vector,
+    lift_before_n: Vector,
+    parameters: layout.Record,
+    state: layout.Record,
+    safety: layout.Record,
+    sample: layout.Record,
+) -> tuple[Vector, Vector]:
     """Limit the change of the force from tick to tick (`slope_limits.slew_limit_n`), without pushing the hand on.
 
     After an energy debt the limit is reduced by the controller's gain; it is least during a fade in. A force that falls
     too slowly at a reversal would do work on the hand: its unwanted part along the motion is dropped at once.
+    Return force and lift.
     """
     of_limit = max(safety.passivity.gain, _LEAST_SLEW)
     if safety.fade < 1.0:
         of_limit = parameters.rules.fade_out_slew if safety.withheld else _LEAST_SLEW
     most_n = parameters.slew_n * of_limit
-    if square_distance(force_n, safety.slewed_n) <= most_n * most_n:
-        return
+    slewed_n = components(safety.slewed_n)
+    if square_distance(force_n, slewed_n) <= most_n * most_n:
+        return force_n, lift_n
     sample.limiters |= layout.LIMITER_SLEW
-    passivity = safety.passivity
-    v_mps, lift_n, before_n = state.estimate_mps, passivity.lift_n, passivity.lift_before_n
+    v_mps = components(state.estimate_mps)
     wanted_nmps = dot(force_n, v_mps)
-    share = most_n / distance(force_n, safety.slewed_n)
-    for axis in range(3):
-        force_n[axis] = safety.slewed_n[axis] + (force_n[axis] - safety.slewed_n[axis]) * share
-        lift_n[axis] = before_n[axis] + (lift_n[axis] - before_n[axis]) * share
+    share = most_n / distance(force_n, slewed_n)
+    force_n = vector_sum(slewed_n, multiple(difference(force_n, slewed_n), share))
+    lift_n = vector_sum(lift_before_n, multiple(difference(lift_n, lift_before_n), share))
     excess_nmps = dot(force_n, v_mps) - max(wanted_nmps, 0.0)
     square_mps2 = square(v_mps)
     if excess_nmps > 0.0 and square_mps2 > 0.0:  # the square of a speed below 1e-162 m/s is 0
-        for axis in range(3):
-            force_n[axis] -= excess_nmps * v_mps[axis] / square_mps2
-        if square_distance(force_n, safety.slewed_n) > most_n * most_n:
+        x_n = force_n[0] - excess_nmps * v_mps[0] / square_mps2
+        y_n = force_n[1] - excess_nmps * v_mps[1] / square_mps2
+        z_n = force_n[2] - excess_nmps * v_mps[2] / square_mps2
+        force_n = (x_n, y_n, z_n)
+        if square_distance(force_n, slewed_n) > most_n * most_n:
             sample.limiters |= layout.LIMITER_ENERGY
+    return force_n, lift_n
 
 
 @part
-def _log_request(parameters: layout.Record, state: layout.Record, safety: layout.Record, limit_n: float) -> None:
-    """Set the force of the effects within norm and fade, from which the share withheld counts.
-
-    A force link sends the force of earlier ticks: there the force after its limits counts.
-    """
-    copy(safety.permitted_n, safety.requested_n)
-    if parameters.link.acts == 0 and limit_n > 0.0 and is_finite(state.force_n):
-        share = safety.fade * limit_n / max(norm(state.force_n), limit_n)
-        for axis in range(3):
-            safety.requested_n[axis] = share * state.force_n[axis]
-
-
-@part
-def _zero_force(force_n: Any, safety: layout.Record, sample: layout.Record) -> None:
-    """Set zero force now; afterwards the force fades in as at the start."""
+def _note_stop(safety: layout.Record, sample: layout.Record) -> None:
+    """Note why the force is zero; afterwards it fades in as at the start."""
     if safety.stop != 0:
         sample.limiters |= layout.LIMITER_STOP
     if safety.fault != 0:
         sample.status = safety.fault
     safety.fade = 0.0
     safety.fade_s = START_FADE_S
-    clear(force_n)

@@ -17,6 +17,8 @@ _FARTHEST_HAND_M = 10.0
 _REFUSALS_IN_A_ROW = 5
 _COUNTS = 2.0
 """Encoder counts by which two steps may differ at rest."""
+_CERTAIN_SHARE = 0.999
+"""Share of the square of a limit up to which no rounding error can exceed the limit."""
 _STALE_NS = 5_000_000
 FAULT_NS = 50_000_000
 
@@ -109,7 +111,7 @@ def _plausible(
     for row in range(safety.passivity.sent_n.shape[0]):
         square_n2 = max(square_n2, square(safety.passivity.sent_n[row]))
     force_n = math.sqrt(square_n2)
-    late_m = 2.0 * state.fastest_mps * parameters.period_s
+    late_m = 2.0 * math.sqrt(state.fastest_m2ps2) * parameters.period_s
     return _within_reach(parameters, state, force_n, late_m, hand_m, interval_s)
 
 
@@ -127,16 +129,16 @@ def _note_step(state: layout.Record, hand_m: Any, interval_s: float) -> None:
     """
     if state.tracking == 0:
         state.steps = 0
-        state.speed_mps = state.fastest_mps = 0.0
+        state.square_m2ps2 = state.fastest_m2ps2 = 0.0
         return
     state.steps = 1
     state.step_s = interval_s
     for axis in range(3):
         state.step_mps[axis] = (hand_m[axis] - state.hand_m[axis]) / interval_s
-    speed_mps = norm(state.step_mps)
-    if speed_mps > 0.0:
-        state.fastest_mps = max(speed_mps, state.speed_mps)
-        state.speed_mps = speed_mps
+    square_m2ps2 = square(state.step_mps)
+    if square_m2ps2 > 0.0:
+        state.fastest_m2ps2 = max(square_m2ps2, state.square_m2ps2)
+        state.square_m2ps2 = square_m2ps2
 
 
 @part
@@ -156,13 +158,16 @@ def _within_reach(
         off_m = hand_m[axis] - state.hand_m[axis] - state.step_mps[axis] * interval_s
         square_m2 += off_m * off_m
         along_m2ps += off_m * state.step_mps[axis]
+    least_m = parameters.rules.hand_mps2 * 0.5 * interval_s * (interval_s + state.step_s) + _COUNTS * parameters.count_m
+    if square_m2 < _CERTAIN_SHARE * least_m * least_m:  # the usual case, without roots
+        return True
     speed_mps = norm(state.step_mps)
     along_m = abs(along_m2ps) / speed_mps if speed_mps > 0.0 else math.sqrt(square_m2)
     most_mps2 = parameters.rules.hand_mps2 + force_n / parameters.mass_kg
     most_m = most_mps2 * 0.5 * interval_s * (interval_s + state.step_s)
     most_m += _COUNTS * parameters.count_m * (1.0 + interval_s / state.step_s)
     if late_m > 0.0:
-        most_m += state.fastest_mps * interval_s
+        most_m += math.sqrt(state.fastest_m2ps2) * interval_s
     return bool(along_m <= most_m + late_m and square_m2 - along_m * along_m <= most_m * most_m)
 
 

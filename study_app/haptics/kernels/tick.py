@@ -40,7 +40,7 @@ def compute_tick(model: Any, safety: Record, sample: Record) -> None:
     interval_s = accept_sample(model.parameters[0], model.state[0], safety, sample)
     watchdog(model.parameters[0], safety, sample)
     if interval_s > 0.0:
-        take_force(model.state[0], safety)
+        take_force(model.parameters[0], model.state[0], safety)
         step_model(model, interval_s, safety.delay_ticks)
     write_sample(model.state[0], sample)
     guard(model, safety, sample, interval_s)

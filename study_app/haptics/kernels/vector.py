@@ -1,11 +1,38 @@
-"""Vectors of three, in place: an array field of a record, shape (3,)."""
+"""Vectors of three: array fields of records, shape (3,), changed in place, and tuples, which stay in registers."""
 
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, Final, TypeAlias
 
 from study_app.haptics.kernels.compiled import part
+
+Vector: TypeAlias = tuple[float, float, float]
+ZERO: Final[Vector] = (0.0, 0.0, 0.0)
+
+
+@part
+def components(vector: Any) -> Vector:
+    """Return its components as a tuple."""
+    return vector[0], vector[1], vector[2]
+
+
+@part
+def vector_sum(a: Any, b: Any) -> Vector:
+    """Return a + b."""
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+@part
+def difference(a: Any, b: Any) -> Vector:
+    """Return a − b."""
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+@part
+def multiple(vector: Any, factor: float) -> Vector:
+    """Return it times a factor."""
+    return factor * vector[0], factor * vector[1], factor * vector[2]
 
 
 @part
@@ -65,4 +92,4 @@ def square_distance(a: Any, b: Any) -> float:
 @part
 def is_finite(vector: Any) -> bool:
     """Return whether all three are finite."""
-    return math.isfinite(vector[0]) and math.isfinite(vector[1]) and math.isfinite(vector[2])
+    return bool(abs(vector[0]) + abs(vector[1]) + abs(vector[2]) < math.inf)

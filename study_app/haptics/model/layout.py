@@ -424,8 +424,8 @@ STATE = np.dtype(
         ("steps", np.int64),  # 1 once a step between two accepted positions is known
         ("step_s", np.float64),  # its duration
         ("step_mps", np.float64, (3,)),  # and mean velocity, hand frame
-        ("speed_mps", np.float64),  # speed of the last step with motion
-        ("fastest_mps", np.float64),  # the greater speed of it and the one before
+        ("square_m2ps2", np.float64),  # squared speed of the last step with motion
+        ("fastest_m2ps2", np.float64),  # the greater one of it and the one before
         ("position_m", np.float64, (3,)),  # the same in the scene
         ("previous_m", np.float64, (3,)),  # the one before
         ("weight", np.float64),  # of the newest difference, for an interval of ``weighted_s``
@@ -494,6 +494,7 @@ PASSIVITY = np.dtype(
         ("row", np.int64),  # the row of the newest force below
         ("sent_n", np.float64, (MOST_DELAY + 2, 3)),  # forces of the last ticks, without buoyancy and weight
         ("saturated_n", np.float64, (MOST_DELAY + 2, 3)),  # the part of them that saturated motors may not have given
+        ("saturated_ticks", np.int64),  # ticks until no row above has such a part
         ("acted_n", np.float64, (MOST_DELAY + 2, 3)),  # the same of the forces on the hand (a shadow's differ)
         ("acted_impulse_ns", np.float64, (3,)),  # of such forces after the assumed loop delay, times time
         ("reserve_j", np.float64),  # greatest energy that liquids and estimator could return at the last sample
@@ -503,6 +504,9 @@ PASSIVITY = np.dtype(
         ("later_impulse_ns", np.float64, (3,)),  # the same of forces another tick later
         ("impulse_s", np.float64),  # the time since then
         ("fast", _INCREMENTAL),
+        ("weighted_s", np.float64),  # time between samples to which the weights below belong
+        ("weight", np.float64),  # of the newest velocity in ``velocity_mps``
+        ("hand_weight", np.float64),  # of the newest of these in ``slow_mps``
         ("velocity_mps", np.float64, (3,)),  # the hand's in the frame of the current, smoothed over 2 ms
         ("slow_mps", np.float64, (3,)),  # the same, smoothed again
         ("fast_s", np.float64),  # for how long the hand moved fast of late
@@ -521,7 +525,6 @@ PASSIVITY = np.dtype(
         ("norm_share", np.float64),  # share of it that the force limit leaves
         ("settling", np.int64),  # 1 if the force of the last tick was changed to repay a debt
         ("lift_n", np.float64, (3,)),  # buoyancy and weight in the force that is sent
-        ("lift_before_n", np.float64, (3,)),  # the same of the tick before
     ],
     align=True,
 )

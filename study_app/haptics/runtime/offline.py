@@ -176,7 +176,7 @@ def _run(model: Any, safety: Record, samples: Any, t_s: Any, before_s: float) ->
             for axis in range(3):
                 state.estimate_mps[axis] = (state.position_m[axis] - state.previous_m[axis]) / interval_s
         safety.tick_s = interval_s
-        take_force(state, safety)
+        take_force(parameters, state, safety)
         step_model(model, interval_s, safety.delay_ticks)
         write_sample(state, sample)
         guard(model, safety, sample, interval_s)

@@ -14,7 +14,7 @@ from study_app.haptics.kernels.passivity import (
     reduce_gain,
     reset_observer,
 )
-from study_app.haptics.model.layout import LIMITER_ENERGY, PARAMETERS, PASSIVITY, SAMPLE, STATE, records
+from study_app.haptics.model.layout import PARAMETERS, PASSIVITY, STATE, records
 from tests.haptics.scenes import HONEY, Hand
 
 
@@ -62,16 +62,12 @@ def test_a_swing_is_owed_for_although_the_motion_pays_more():
 
 def test_a_debt_beyond_the_allowance_lowers_the_gain():
     parameters, state = records(PARAMETERS, 1)[0], records(STATE, 1)[0]
-    passivity, sample = records(PASSIVITY, 1)[0], records(SAMPLE, 1)[0]
+    passivity = records(PASSIVITY, 1)[0]
     reset_observer(passivity)
-    sample.device_force_n[0] = 4.0
     passivity.fast.balance_j = -INCREMENTAL_ALLOWANCE_J
-    reduce_gain(parameters, state, passivity, sample)
-    assert (sample.device_force_n[0], sample.limiters) == (4.0, 0)
+    assert reduce_gain(parameters, state, passivity) == 1.0
     passivity.fast.balance_j = -INCREMENTAL_ALLOWANCE_J - HALVING_J
-    reduce_gain(parameters, state, passivity, sample)
-    assert sample.device_force_n[0] == pytest.approx(2.0)
-    assert sample.limiters == LIMITER_ENERGY
+    assert reduce_gain(parameters, state, passivity) == pytest.approx(0.5)
 
 
 def test_the_tick_observes_the_force_of_one_tick_more_than_the_loop_is_late():

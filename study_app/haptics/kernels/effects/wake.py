@@ -41,20 +41,28 @@ def add(total: float, carry: float, term: float) -> tuple[float, float]:
     return new, carry + lost
 
 
+@part
+def _row(wake: Record, lap: int, number: int) -> int:
+    """Return the row of an element or segment without a division; ``lap`` is the number in the first row."""
+    row: int = wake.row + number - lap
+    return row if number >= lap else row + wake.length
+
+
 @kernel
 def empty(wake: Record, tracks: Record, segments: Any) -> None:
     """Clear the wake: no element is stored."""
-    tracks.stored = 0
+    tracks.stored = tracks.element_lap = 0
     tracks.held = 0
     tracks.arc_m = 0.0
+    tracks.log_decay, tracks.decay = 0.0, 1.0
     _clear_sums(wake, tracks, segments)
 
 
 @part
 def tail(wake: Record, tracks: Record, segments: Any, out_mps: Any) -> None:
     """Write v_tail = (1/S) Σ_i d_i Σ|e| to ``out_mps``, shape (3,)."""
-    first = segments[wake.row + tracks.first_segment % wake.length]
-    last = segments[wake.row + tracks.last_segment % wake.length]
+    first = segments[_row(wake, tracks.segment_lap, tracks.first_segment)]
+    last = segments[_row(wake, tracks.segment_lap, tracks.last_segment)]
     first_mps = first.speed_mps + first.speed_carry_mps
     last_mps = last.speed_mps + last.speed_carry_mps if tracks.first_segment != tracks.last_segment else 0.0
     for axis in range(3):
@@ -74,7 +82,7 @@ def store(
         _evict(wake, tracks, elements, segments)
     if turns:
         _open(wake, tracks, segments)
-    element = elements[wake.row + tracks.stored % wake.length]
+    element = elements[_row(wake, tracks.element_lap, tracks.stored)]
     element.velocity_mps[0] = ex / tracks.scale
     element.velocity_mps[1] = ey / tracks.scale
     element.velocity_mps[2] = ez / tracks.scale
@@ -85,6 +93,8 @@ def store(
         _join(wake, tracks, segments, element)
     tracks.stored += 1
     tracks.held += 1
+    if tracks.stored - tracks.element_lap == wake.length:
+        tracks.element_lap = tracks.stored
 
 
 @part
@@ -96,16 +106,16 @@ def _turns(
     The reference is the youngest element of the current segment at least ``breaking_span`` of arc earlier, or the
     segment's oldest while it is shorter. It never moves backward.
     """
-    if segments[wake.row + tracks.last_segment % wake.length].count == 0:
+    if segments[_row(wake, tracks.segment_lap, tracks.last_segment)].count == 0:
         return False
     while tracks.scanned < tracks.stored:
-        element = elements[wake.row + tracks.scanned % wake.length]
+        element = elements[_row(wake, tracks.element_lap, tracks.scanned)]
         if tracks.arc_m - element.arc_m < wake.breaking_span_m:
             break
         if element.moving:
             tracks.reference = tracks.scanned
         tracks.scanned += 1
-    reference = elements[wake.row + tracks.reference % wake.length]
+    reference = elements[_row(wake, tracks.element_lap, tracks.reference)]
     e = reference.velocity_mps
     along = ex * e[0] + ey * e[1] + ez * e[2]
     least = (wake.breaking_cosine - _COSINE_TOLERANCE) * speed_mps * reference.speed_mps
@@ -115,19 +125,21 @@ def _turns(
 @part
 def _open(wake: Record, tracks: Record, segments: Any) -> None:
     """Start a new segment; add the one before to the interior, unless it is the oldest or empty."""
-    last = segments[wake.row + tracks.last_segment % wake.length]
+    last = segments[_row(wake, tracks.segment_lap, tracks.last_segment)]
     if last.count == 0:
         return
     if tracks.last_segment != tracks.first_segment:
         _add_interior(tracks, last, 1.0)
     tracks.last_segment += 1
-    _clear(segments[wake.row + tracks.last_segment % wake.length])
+    if tracks.last_segment - tracks.segment_lap == wake.length:
+        tracks.segment_lap = tracks.last_segment
+    _clear(segments[_row(wake, tracks.segment_lap, tracks.last_segment)])
 
 
 @part
 def _join(wake: Record, tracks: Record, segments: Any, element: Record) -> None:
     """Add the newest element to the sums and to the newest segment, and set the segment's direction to its own."""
-    segment = segments[wake.row + tracks.last_segment % wake.length]
+    segment = segments[_row(wake, tracks.segment_lap, tracks.last_segment)]
     if segment.count == 0:
         tracks.reference = tracks.stored
         tracks.scanned = tracks.stored + 1
@@ -141,12 +153,12 @@ def _join(wake: Record, tracks: Record, segments: Any, element: Record) -> None:
 def _evict(wake: Record, tracks: Record, elements: Any, segments: Any) -> None:
     """Remove the oldest element from the list."""
     oldest = tracks.stored - tracks.held
-    element = elements[wake.row + oldest % wake.length]
+    element = elements[_row(wake, tracks.element_lap, oldest)]
     tracks.held -= 1
     if not element.moving:
         return
     tracks.evicted += 1
-    segment = segments[wake.row + tracks.first_segment % wake.length]
+    segment = segments[_row(wake, tracks.segment_lap, tracks.first_segment)]
     segment.count -= 1
     _count_speed(tracks, segment, element.speed_mps, -1.0)
     if segment.count > 0:
@@ -157,14 +169,14 @@ def _evict(wake: Record, tracks: Record, elements: Any, segments: Any) -> None:
     else:
         tracks.first_segment += 1
         if tracks.first_segment != tracks.last_segment:
-            _add_interior(tracks, segments[wake.row + tracks.first_segment % wake.length], -1.0)
+            _add_interior(tracks, segments[_row(wake, tracks.segment_lap, tracks.first_segment)], -1.0)
 
 
 @part
 def _move_reference(wake: Record, tracks: Record, elements: Any) -> None:
     """Set the reference to the next moving element, the oldest of its segment: the last one was removed."""
     tracks.reference += 1
-    while elements[wake.row + tracks.reference % wake.length].moving == 0:
+    while elements[_row(wake, tracks.element_lap, tracks.reference)].moving == 0:
         tracks.reference += 1
     tracks.scanned = max(tracks.scanned, tracks.reference + 1)
 
@@ -173,26 +185,26 @@ def _move_reference(wake: Record, tracks: Record, elements: Any) -> None:
 def renew(wake: Record, tracks: Record, elements: Any, segments: Any) -> None:
     """Reset the scale to 1 and recompute all sums from the stored elements: O(N), at most once in N evictions."""
     number = tracks.first_segment
-    left = segments[wake.row + number % wake.length].count
+    left = segments[_row(wake, tracks.segment_lap, number)].count
     scale, first, last = tracks.scale, tracks.first_segment, tracks.last_segment
     for i in range(first, last + 1):
-        segment = segments[wake.row + i % wake.length]
+        segment = segments[_row(wake, tracks.segment_lap, i)]
         segment.speed_mps = 0.0
         segment.speed_carry_mps = 0.0
     _clear_totals(tracks)
     for q in range(tracks.stored - tracks.held, tracks.stored):
-        element = elements[wake.row + q % wake.length]
+        element = elements[_row(wake, tracks.element_lap, q)]
         for axis in range(3):
             element.velocity_mps[axis] *= scale
         element.speed_mps *= scale
         if element.moving:
             if left == 0:
                 number += 1
-                left = segments[wake.row + number % wake.length].count
+                left = segments[_row(wake, tracks.segment_lap, number)].count
             left -= 1
-            _count_speed(tracks, segments[wake.row + number % wake.length], element.speed_mps, 1.0)
+            _count_speed(tracks, segments[_row(wake, tracks.segment_lap, number)], element.speed_mps, 1.0)
     for i in range(first + 1, last):
-        _add_interior(tracks, segments[wake.row + i % wake.length], 1.0)
+        _add_interior(tracks, segments[_row(wake, tracks.segment_lap, i)], 1.0)
 
 
 @part
@@ -218,8 +230,7 @@ def _add_interior(tracks: Record, segment: Record, sign: float) -> None:
 @part
 def _clear_sums(wake: Record, tracks: Record, segments: Any) -> None:
     """Reset all sums to exactly zero, and the scale to 1: no moving element is left."""
-    tracks.first_segment = 0
-    tracks.last_segment = 0
+    tracks.first_segment = tracks.last_segment = tracks.segment_lap = 0
     _clear(segments[wake.row])
     _clear_totals(tracks)
 
@@ -304,7 +315,10 @@ def update_wake(liquid: Record, local: Record, state: Record, elements: Any, seg
     its velocity at each ``resolution`` of distance from its last stored element.
     """
     wake, tracks, h = liquid.wake, local.wake, local.motion_mps
-    tracks.scale *= math.exp(wake.log_decay_per_s * interval_s)
+    if wake.log_decay_per_s * interval_s != tracks.log_decay:
+        tracks.log_decay = wake.log_decay_per_s * interval_s
+        tracks.decay = math.exp(tracks.log_decay)
+    tracks.scale *= tracks.decay
     if tracks.scale < _SMALLEST_SCALE or tracks.evicted >= wake.length:
         renew(wake, tracks, elements, segments)
     hx, hy, hz = h[0], wake.vertical * h[1], h[2]
@@ -312,7 +326,11 @@ def update_wake(liquid: Record, local: Record, state: Record, elements: Any, seg
     tracks.arc_m += speed_mps * interval_s
     if speed_mps < REST_MPS:
         store(wake, tracks, elements, segments, 0.0, 0.0, 0.0, 0.0)
-    elif tracks.stored == 0 or distance(state.position_m, tracks.stored_at_m) >= wake.resolution_m:
+    elif (
+        wake.resolution_m == 0.0
+        or tracks.stored == 0
+        or distance(state.position_m, tracks.stored_at_m) >= wake.resolution_m
+    ):
         store(wake, tracks, elements, segments, hx, hy, hz, speed_mps)
     else:
         return

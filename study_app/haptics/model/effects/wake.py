@@ -145,6 +145,8 @@ _PARAMETERS: Fields = (
 _STATE: Fields = (
     ("stored", INT),  # elements stored since it was empty: the number of the next one
     ("held", INT),  # how many of them are still in the list
+    ("element_lap", INT),  # number of the element in the first row of the ring
+    ("segment_lap", INT),  # number of the segment in the first row of its ring
     ("first_segment", INT),  # number of the oldest segment
     ("last_segment", INT),  # number of the newest, to which elements are added
     ("reference", INT),  # number of the element the next one is compared with
@@ -153,6 +155,8 @@ _STATE: Fields = (
     ("arc_m", FLOAT),  # a: path travelled in this liquid
     ("stored_at_m", FLOAT, (3,)),  # where the body was when an element was last stored
     ("scale", FLOAT),  # speeds and sums are stored divided by this common decay
+    ("log_decay", FLOAT),  # ln λ over the last interval
+    ("decay", FLOAT),  # λ over it
     ("interior_mps", FLOAT, (3,)),  # Σ direction · sum over segments between oldest and newest
     ("interior_carry_mps", FLOAT, (3,)),  # its rounding error
     ("speed_mps", FLOAT),  # Σ|e|

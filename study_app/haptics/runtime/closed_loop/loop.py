@@ -18,7 +18,7 @@ from study_app.haptics.kernels.plant import measure, move, next_tick, push, rand
 from study_app.haptics.kernels.safety import delay_force
 from study_app.haptics.kernels.sample_validation import accept_sample, watchdog
 from study_app.haptics.kernels.tick import compute_tick, step_model, write_sample
-from study_app.haptics.kernels.vector import clear, copy, distance, is_finite, norm
+from study_app.haptics.kernels.vector import clear, copy, difference, distance, is_finite, norm
 from study_app.haptics.model.layout import MEASURED_VELOCITY
 from study_app.haptics.runtime.closed_loop.arm import ARM, advance, write_force
 
@@ -384,7 +384,7 @@ def _answer(model: Any, safety: Any, sample: Any, loop: Any) -> None:
     interval_s = accept_sample(model.parameters[0], model.state[0], safety, sample)
     watchdog(model.parameters[0], safety, sample)
     if interval_s > 0.0:
-        take_force(model.state[0], safety)
+        take_force(model.parameters[0], model.state[0], safety)
         step_model(model, interval_s, safety.delay_ticks)
     write_sample(model.state[0], sample)
     update_observer(model, safety, interval_s)
@@ -393,4 +393,4 @@ def _answer(model: Any, safety: Any, sample: Any, loop: Any) -> None:
     link = model.parameters[0].link
     if link.acts != 0:
         delay_force(link, model.state[0].link, model.forces_n, sample.device_force_n)
-    log_command(safety.passivity, sample.device_force_n)
+    log_command(safety.passivity, difference(sample.device_force_n, safety.passivity.lift_n))
