@@ -114,6 +114,13 @@ _KALMAN_STATE: Fields = (
     ("estimate_mps", FLOAT, (3,)),  # velocity estimated with the force
     ("smoothed_mps", FLOAT, (3,)),  # by EWMA, in the scene: used after a fault of the filter
     ("carried_mps", FLOAT, (3,)),  # in the scene: the remaining difference after a change between the two
+    ("smoothed_before_mps", FLOAT, (3,)),  # ``smoothed_mps`` at the sample before
+    ("samples", INT),  # number of samples since the reset
+    ("elapsed_s", FLOAT),  # their duration
+    ("checked", FLOAT, (2, 10)),  # at the last two checks: position, velocity, lead (by axis, in the scene), time
+    ("lead_m2ps2", FLOAT),  # mean of Σ lead²
+    ("false_lead_m2ps2", FLOAT),  # mean of Σ lead · error of the velocity
+    ("false_share", FLOAT),  # of the lead, times its gain
     ("assumed_ticks", INT),  # delay of the loop assumed at this sample
     ("delay_ticks", INT),  # the same at the sample before
     ("on_ewma", INT),  # 1 while EWMA is used

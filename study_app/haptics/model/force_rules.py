@@ -46,6 +46,8 @@ class ForceRules(NamedTuple):
     ``late_swing_mps`` is ``swing_mps`` for a force that a study delays: a released handle of 50 g oscillated at 13 Hz
     with the 1 mJ that are tolerated. With 0.06, the controller withheld 23 % of thesis water delayed by 20 ms from a
     light hand.
+    ``false_lead_gain`` times the false share of its lead over "ewma" is taken from the velocity of "kalman"
+    (`kernels.estimators`): with 1, the velocity on real encoders was noisier than that of "ewma".
     """
 
     version: int
@@ -74,6 +76,7 @@ class ForceRules(NamedTuple):
     trusts_gaps: float = 1.0
     acting_share: float = math.inf
     late_swing_mps: float = math.inf
+    false_lead_gain: float = 0.0
 
 
 VERSIONS: Final = {
@@ -106,8 +109,9 @@ VERSIONS[6] = VERSIONS[5]._replace(version=6, acting_share=0.25)
 VERSIONS[7] = VERSIONS[6]._replace(version=7, shaken_reversal_s=0.06, trusts_gaps=0.0)
 VERSIONS[8] = VERSIONS[7]._replace(version=8, known_force_ticks=0, unused_s=0.05, regained_s=0.1)
 VERSIONS[9] = VERSIONS[8]._replace(version=9, late_swing_mps=0.1)
+VERSIONS[10] = VERSIONS[9]._replace(version=10, false_lead_gain=1.5)
 
-FORCE_RULES: Final = 9
+FORCE_RULES: Final = 10
 """The version by which this program computes forces. Receipts state it: released numbers never change, new numbers are
 a new version."""
 CURRENT: Final = VERSIONS[FORCE_RULES]

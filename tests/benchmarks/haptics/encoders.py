@@ -2,6 +2,7 @@
 
 ``python tests/benchmarks/haptics/encoders.py [FOLDER]``: a folder of the data set named in
 ``tests/evidence/stability/encoders.md`` (340 recordings, some minutes); without it, the excerpt beside the tests.
+Errors and noise are relative to the velocity of the smoothed counts of the same encoder, and of the finer one.
 """
 
 import sys
@@ -16,9 +17,10 @@ from study_app.protocol.load import load_scene
 from tests.evidence.stability.recorded_encoders import (
     COUNTS_M,
     ESTIMATORS,
-    errors,
+    accuracy,
     excerpt,
     felt,
+    positions_m,
     recordings,
     smoothed_mps,
 )
@@ -33,17 +35,26 @@ def main() -> None:
     names = [name for name, _ in found]
     print(f"{len(found)} recordings, {sum(len(counts) for _, counts in found) / 1000:.0f} s at 1 kHz")
     for column, (encoder, count_m) in enumerate(COUNTS_M.items()):
-        places_m = [count_m * counts[:, column] for _, counts in found]
+        places_m = [positions_m(counts, encoder) for _, counts in found]
         fastest = 1e3 * np.array([np.abs(np.diff(x_m)).max() for x_m in places_m])
         print(f"\n{encoder}, {1e6 * count_m:.2g} µm a count; up to {fastest.max():.2g} m/s")
-        print(f"{'error of v·|v| [%]':<28}{'mean':>8}{'median':>8}{'worst':>8}")
-        wrong = np.array([errors(x_m, count_m) for x_m in places_m])
-        for k, velocity in enumerate(ESTIMATORS):
-            print(f"{velocity.kind:<28}{wrong[:, k].mean():8.1f}{np.median(wrong[:, k]):8.1f}{wrong[:, k].max():8.1f}")
-        other = [_difference(smoothed_mps(x_m), smoothed_mps(x_m, 61)) for x_m in places_m]
-        print(f"{'smoother of 61 samples':<28}{np.mean(other):8.1f}{np.median(other):8.1f}{np.max(other):8.1f}")
+        for finer in list(COUNTS_M)[column:]:
+            pairs = zip(places_m, (counts for _, counts in found), strict=True)
+            measured = np.array(
+                [accuracy(x_m, count_m, smoothed_mps(positions_m(counts, finer))) for x_m, counts in pairs]
+            )
+            for number, name in enumerate(("error of v·|v| [%]", "noise above 20 Hz [mm/s]")):
+                print(f"{f'{name}, {finer}':<36}{'mean':>8}{'median':>8}{'worst':>8}")
+                for k, velocity in enumerate(ESTIMATORS):
+                    _print_row(velocity.kind, measured[:, k, number])
+        longer = np.array([_difference(smoothed_mps(x_m), smoothed_mps(x_m, 61)) for x_m in places_m])
+        _print_row("smoother of 61 samples", longer)
         for study, liquid in LIQUIDS:
             _print_felt(study, liquid, names, [felt(load_scene(study, liquid), x_m, count_m) for x_m in places_m])
+
+
+def _print_row(name: str, values: np.ndarray) -> None:
+    print(f"{name:<36}{values.mean():8.2f}{np.median(values):8.2f}{values.max():8.2f}")
 
 
 def _difference(v_mps: np.ndarray, other_mps: np.ndarray) -> float:

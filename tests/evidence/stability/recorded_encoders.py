@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import savgol_filter
 
+from study_app.evidence.stability.bench import fast_part
 from study_app.haptics.kernels.safety import new_safety
 from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.estimators import Ewma, Kalman, Raw
@@ -33,6 +34,7 @@ SMOOTHED: Final = 41
 SETTLED: Final = 500
 """Samples at both ends of a recording that do not count."""
 DELAY_S: Final = 1e-3
+_NOISE_HZ: Final = 20.0
 
 
 def excerpt() -> dict[str, NDArray[np.int32]]:
@@ -49,18 +51,28 @@ def recordings(folder: Path) -> Iterator[tuple[str, NDArray[np.int32]]]:
         yield f"{path.parent.name}/{path.stem}", counts.astype(np.int32)
 
 
-def errors(x_m: Floats, count_m: float) -> tuple[float, ...]:
-    """Return the error of v·|v| of each of `ESTIMATORS` [%, RMS over RMS] on positions (n,) [m] of an encoder."""
-    smooth_mps = smoothed_mps(x_m)
-    right = smooth_mps * np.abs(smooth_mps)
-    motion = _motion(x_m)
-    found = []
+def positions_m(counts: NDArray[np.int32], encoder: str) -> Floats:
+    """Return the positions (n,) [m] that an encoder counted; the motor turns opposite to the spindle."""
+    sign = 1 if encoder == "spindle" else -1
+    places_m: Floats = sign * COUNTS_M[encoder] * counts[:, list(COUNTS_M).index(encoder)]
+    return places_m
+
+
+def accuracy(x_m: Floats, count_m: float, true_mps: Floats) -> NDArray[np.float64]:
+    """Return error of v·|v| [%, RMS over RMS] and noise above 20 Hz [mm/s, RMS] of each of `ESTIMATORS`, (n, 2).
+
+    ``x_m`` (n,) are positions of an encoder, ``true_mps`` the velocities without `SETTLED` samples at each end.
+    """
+    right, motion, found = true_mps * np.abs(true_mps), _motion(x_m), []
     for velocity in ESTIMATORS:
         scene = Scene(scale=1, velocity=velocity, knee=Knee(law="none"))
         samples = samples_along(scene, motion, Dynamics(delay_s=DELAY_S, count_m=count_m, mass_kg=0.2))
         v_mps = samples.velocity_mps[SETTLED:-SETTLED, 0]
-        found.append(100 * math.sqrt(np.sum((v_mps * np.abs(v_mps) - right) ** 2) / np.sum(right**2)))
-    return tuple(found)
+        error = 100 * math.sqrt(np.sum((v_mps * np.abs(v_mps) - right) ** 2) / np.sum(right**2))
+        wrong_mps = np.zeros((len(v_mps), 3))
+        wrong_mps[:, 0] = v_mps - true_mps
+        found.append((error, 1e3 * fast_part(wrong_mps, 1000, _NOISE_HZ, SETTLED, len(v_mps))))
+    return np.array(found)
 
 
 def smoothed_mps(x_m: Floats, samples: int = SMOOTHED) -> Floats:

@@ -103,19 +103,14 @@ STIRRED = "plant=arm motion=circles speed_mps=1 way_mm=60"
 
 @compiled
 @pytest.mark.parametrize(
-    ("line", "safe", "reasons"),
-    [
-        (f"liquid=water estimator=kalman hand=firm viscous_nspm=0 coulomb_n=0.3 {STIRRED}", True, ("noise",)),
-        (
-            f"liquid=water estimator=kalman hand=firm viscous_nspm=0 coulomb_n=0.3 {STIRRED}",
-            False,
-            ("sustained force",),
-        ),
-    ],
+    ("liquid", "reasons"),
+    [("water", ("noise",)), ("honey", ("sustained force",))],
     ids=["amplified noise", "oscillation"],
 )
-def test_only_an_oscillation_lasts_when_the_encoder_becomes_exact(line, safe, reasons):
-    assert judge(parse_case(line), safe=safe).reasons == reasons
+def test_only_an_oscillation_lasts_when_the_encoder_becomes_exact(liquid, reasons):
+    case = parse_case(f"liquid={liquid} estimator=kalman hand=firm viscous_nspm=0 coulomb_n=0.3 {STIRRED}")
+    assert judge(case, safe=False).reasons == reasons
+    assert judge(case, safe=True).reasons == ()
 
 
 @compiled

@@ -30,6 +30,7 @@ RELEASED = {
     "trusts_gaps": 1.0,
     "acting_share": math.inf,
     "late_swing_mps": math.inf,
+    "false_lead_gain": 0.0,
 }
 
 
@@ -52,6 +53,7 @@ def test_released_versions_keep_their_numbers():
         "regained_s": 0.1,
     }
     assert VERSIONS[9]._asdict() == {**VERSIONS[8]._asdict(), "version": 9, "late_swing_mps": 0.1}
+    assert VERSIONS[10]._asdict() == {**VERSIONS[9]._asdict(), "version": 10, "false_lead_gain": 1.5}
 
 
 def test_the_present_version_is_the_newest_and_has_its_own_numbers():

@@ -47,9 +47,11 @@ def felt(velocity, position_m, interval_s=1e-3):
     return vectors(simulate(Scene(scale=1, velocity=velocity, knee=UNBENT), motion), "velocity")
 
 
-def literal(position_m, interval_s, force_n):
+def literal(position_m, interval_s, force_n, false_lead_gain=CURRENT.false_lead_gain):
     """Return the velocities (n, 3) by the definition: positions (n, 3), intervals (n,), acting forces (n, 3)."""
     x, response, v = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((len(position_m), 3))  # rows of x: axes
+    found, smooth, smooth_before = np.zeros_like(v), np.zeros(3), np.zeros(3)
+    elapsed_s, checks, sums, false_share = 0.0, [], np.zeros(2), 0.0
     p = np.diag([COUNT_M**2 / 2, kalman.FIRST_SPEED_MPS**2, kalman.FIRST_ACCELERATION_MPS2**2])
     theta, spread = kalman.USUAL_PER_KG, kalman.USUAL_PER_KG**2 / 4
     x[:, 0] = position_m[0]
@@ -75,13 +77,26 @@ def literal(position_m, interval_s, force_n):
         spread += -(spread**2) * (s @ s) / d + kalman.LEARNING_PKG2S * t
         theta = min(max(theta + (kalman.USUAL_PER_KG - theta) * t / kalman.FORGETTING_S, 0.0), 10.0)
         v[k] = x[:, 1] + response[:, 1] * theta
-    return v
+        smooth_before = smooth
+        smooth = smooth + (1 - 0.9 ** (t / 1e-3)) * ((place - position_m[max(k - 1, 0)]) / t - smooth)
+        lead = v[k] - (smooth + smooth_before) / 2
+        elapsed_s += t
+        if k % 4 == 3:
+            checks.append((elapsed_s, place, v[k], lead))
+        if k % 4 == 3 and len(checks) > 2:
+            lasted_s, way, (checked, old_lead) = elapsed_s - checks[-3][0], place - checks[-3][1], checks[-2][2:]
+            weight = lasted_s / 2 / (kalman.CHECKED_S + lasted_s / 2)
+            sums += weight * (np.array([old_lead @ old_lead, old_lead @ (checked - way / lasted_s)]) - sums)
+            false_share = np.clip(false_lead_gain * sums[1] / (sums[0] + (COUNT_M / kalman.LEAST_LEAD_S) ** 2), 0, 1)
+        found[k] = v[k] - false_share * lead
+    return found
 
 
+@pytest.mark.parametrize("rules", [VERSIONS[9], CURRENT])
 @pytest.mark.parametrize("delay_ticks", [0, 1, 3])
-def test_it_is_its_definition_with_late_and_missing_samples(delay_ticks):
+def test_it_is_its_definition_with_late_and_missing_samples(delay_ticks, rules):
     random = np.random.default_rng(4)
-    moved = hand(delay_ticks=delay_ticks, felt=HONEY.model_copy(update={"scale": 3.0, "knee": UNBENT}))
+    moved = hand(delay_ticks=delay_ticks, felt=HONEY.model_copy(update={"scale": 3.0, "knee": UNBENT}), rules=rules)
     places, intervals, forces, found = [], [], [], []
     sent = [np.zeros(3)] * (delay_ticks + 1)
     impulse, since_s = np.zeros(3), 0.0
@@ -102,11 +117,52 @@ def test_it_is_its_definition_with_late_and_missing_samples(delay_ticks):
             found.append(np.array(sample.velocity_mps) / 3.0)
             impulse, since_s = np.zeros(3), 0.0
         sent.append(np.array(sample.device_force_n))
-    expected = literal(np.array(places), intervals, forces)
+    expected = literal(np.array(places), intervals, forces, rules.false_lead_gain)
     assert np.array(found) == pytest.approx(expected, abs=1e-4 * np.abs(expected).max())
     assert np.abs(expected).max() > 0.05
-    blind = literal(np.array(places), intervals, np.zeros((len(places), 3)))
+    blind = literal(np.array(places), intervals, np.zeros((len(places), 3)), 0.0)
     assert np.abs(expected - blind).max() > 0.005 * np.abs(expected).max()
+
+
+def measured_mps(position_m, *, rules=CURRENT, velocity=None):
+    """Return velocities (n,) from positions (n,) [m] along x, as an encoder of 38 µm counts them."""
+    moved = hand(velocity, felt=WATER.model_copy(update={"scale": 1.0, "knee": UNBENT}), rules=rules)
+    counted_m = np.round(np.column_stack([position_m, 0 * position_m, 0 * position_m]) / COUNT_M) * COUNT_M
+    return np.array([moved.tick(place).velocity_mps[0] for place in counted_m])
+
+
+@compiled
+def test_encoder_noise_of_some_counts_is_not_noisier_than_with_ewma():
+    """Twice the noise of a count leaves the mean of EWMA's last two: α (1 − z⁻²) / (2T (1 − 0.9 z⁻¹)) of the positions.
+
+    More is a fault at times, so that EWMA is used. Under earlier rules, noise raised the jerk.
+    """
+    weights = 0.9 ** np.arange(200)
+    ewma_per_s, mean_per_s = 100 * weights, 50 * weights
+    ewma_per_s[1:] -= 100 * weights[:-1]
+    mean_per_s[2:] -= 50 * weights[:-2]
+    random = np.random.default_rng(6)
+    for counts, bound_per_s in ((2.1, mean_per_s), (2.9, ewma_per_s)):
+        x_m = random.normal(0, counts * COUNT_M, 20_000)
+        bound_mps = COUNT_M * math.sqrt((counts**2 + 1 / 12) * np.sum(bound_per_s**2))
+        noise_mps = np.std(measured_mps(x_m)[2000:])
+        assert noise_mps < 1.03 * bound_mps
+        assert counts > 2.5 or noise_mps > 0.97 * bound_mps
+        assert np.std(measured_mps(x_m, rules=VERSIONS[9])[2000:]) > 1.5 * noise_mps
+
+
+@compiled
+def test_a_vibration_of_two_counts_leaves_it_as_accurate_as_ewma():
+    t_s, random = np.arange(8000) / 1000, np.random.default_rng(7)
+    for hz in random.uniform(20, 50, 4):
+        true_mps = 0.068 * np.cos(2 * math.pi * 0.9 * t_s)
+        x_m = 0.068 / (2 * math.pi * 0.9) * np.sin(2 * math.pi * 0.9 * t_s)
+        x_m += 2 * COUNT_M * np.sin(2 * math.pi * hz * t_s + random.uniform(0, 6))
+        now, before, ewma = (
+            np.std((measured_mps(x_m, **estimator) - true_mps)[1000:])
+            for estimator in ({}, {"rules": VERSIONS[9]}, {"velocity": Ewma()})
+        )
+        assert now < ewma < before, hz
 
 
 @compiled
