@@ -80,10 +80,9 @@ from study_app.store import receipt
 from study_app.store.blinded import Key, planned_sessions, session_protocol, simulated_groups
 from study_app.store.files import StudyFolder, is_there, locate_session, rehearsal_folder
 from study_app.store.integrity import is_never_begun, place_of, read_list
-from study_app.store.journals import journal
+from study_app.store.journals import journal, journal_events
 from study_app.store.journals.journal import SessionClock
 from study_app.store.journals.journal_events import Event as Line
-from study_app.store.journals.journal_events import RecordingLost, start_of
 from study_app.store.session_progress import progress_of
 from study_app.store.sessions import SessionStart, SessionStore, begin_session, rebuild_session, reopen_store, used_ids
 from study_app.store.tables import check_study
@@ -613,7 +612,7 @@ def _run_to_end(
         took_s = time.perf_counter() - began
         held = f"{store.clock.seconds() / 60:.1f} min of session time simulated in {took_s:.1f} s"
         missing = f"; {store.missing_trials}" if store.missing_trials.count else ""
-        lost = [line.reason for line in store.lines if isinstance(line, RecordingLost)]
+        lost = [line.reason for line in store.lines if isinstance(line, journal_events.RecordingLost)]
         if lost:
             missing += f"; {counted(len(lost), 'recording')} could not be stored: {', '.join(dict.fromkeys(lost))}"
         answers = sum(progress_of(store.lines).answered.values())
@@ -688,7 +687,7 @@ def open_session(
         store = begin_session(results, study, source, start, clock=SessionClock(rig.servo.now_ns))
         own = session_protocol(StudyFolder(results), store.as_recorded(study), participant, session)
         with store:
-            schedule = begun_schedule(own, start_of(store.lines), store.key)
+            schedule = begun_schedule(own, journal_events.start_of(store.lines), store.key)
             rehearsed = RehearsedSession(own, schedule, rig, store, observer=observer, answer=answer, session=session)
             with _updated_tables(store):
                 yield rehearsed, store
@@ -734,7 +733,7 @@ def reopen_session(
         No available protocol is the session's, or the session broke; earlier data are safe.
     """
     lines = journal.read(locate_session(session_folder)[1].journal)
-    begun = start_of(lines)
+    begun = journal_events.start_of(lines)
     if not is_rehearsal(receipt.read(locate_session(session_folder)[1].receipt)):
         raise SessionError(
             f"{session_folder} is a participant's session, not a simulated one: resume it in the program's session "
