@@ -106,7 +106,7 @@ def acting_report(scene: Scene) -> str:
         own, of_kalman = (_acting(alone, velocity) for velocity in (scene.velocity, Kalman()))
         better = [ticks for ticks in _LATE_TICKS if of_kalman[ticks].error < own[ticks].error]
         lines.append(
-            f"delivered force of {liquid.id} (hand: medium grip, 0.2 kg, {WHOLE}; estimator: {scene.velocity.kind}): "
+            f"delivered force of {liquid.id} (hand: medium grip, 0.2 kg, {WHOLE}; estimator {scene.velocity.kind}): "
             f"{_acting_text(own)}"
         )
         if better:

@@ -159,7 +159,7 @@ def test_scene_states_what_acts_of_each_part_at_two_and_three_ticks_and_offers_k
         r"with 2 ticks of delay, the hand receives \d+ % of the drag and (\d+) % of the wake \(error [\d.]+ %\); "
         r"with 3 ticks of delay, .* % of the wake \(error"
     )
-    assert own.startswith("delivered force of water (hand: medium grip, 0.2 kg, 1.6 Hz ±20 mm; estimator: ewma): ")
+    assert own.startswith("delivered force of water (hand: medium grip, 0.2 kg, 1.6 Hz ±20 mm; estimator ewma): ")
     assert offered.startswith('  with velocity = { kind = "kalman" }: ')
     assert int(re.search(pattern, own)[1]) < 20
     assert int(re.search(pattern, offered)[1]) > 70

@@ -803,7 +803,7 @@ def motion(results: Results) -> Iterator[str]:
                 )
             elif not measured.recorded_in(result.id):
                 yield paragraph(
-                    "This block has no readable recordings, so reaching measures are not available.", "soft"
+                    "Without readable recordings of this block, reaching measures are not available.", "soft"
                 )
     yield paragraph(_recordings(measured))
     recorded = any(measured.recorded_in(result.id) for result in results.blocks)

@@ -168,7 +168,7 @@ def test_the_command_adds_the_planned_number_of_participants_and_quotes_it(
     (line,) = (line for line in registered.splitlines() if line.startswith("- Smooth (conditions differ): "))
     assert "## Power with the planned 7 participants" in registered
     assert re.fullmatch(
-        r"- Smooth \(conditions differ\): \d+% of studies detect the effect if participants are consistent, \d+% if "
-        r"they are typical, and \d+% if they are noisy\.",
+        r"- Smooth \(conditions differ\): \d+ % of studies detect the effect if participants are consistent, \d+ % if "
+        r"they are typical, and \d+ % if they are noisy\.",
         line,
     )

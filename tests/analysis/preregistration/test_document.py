@@ -60,7 +60,7 @@ def test_a_study_of_thresholds_states_levels_sample_size_and_catch_rule() -> Non
     text = preregistration(load("viscosityjnd"), "0" * 64)
     assert "Weber fraction for damping at the hand at 4, 8, 16 and 32 N·s/m?" in text
     assert "exponent 1, Weber's law" in text
-    assert "weber 0.19, at 71 % correct, n = 10" in text
+    assert "Weber fraction 0.19, at 71 % correct, n = 10" in text
     assert "We plan to include 20 participants. The study ends when this number of valid sessions is complete" in text
     assert (
         "are the data unblinded and tested. The goal is a 95 % interval for the group mean no wider than ±15 %." in text

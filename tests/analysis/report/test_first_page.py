@@ -456,7 +456,7 @@ def test_known_liquids_are_called_recognised(n: int) -> None:
 def test_a_block_without_reaching_measures_says_why(
     reaching: tuple[str, ...], recorded: bool, said: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    sentences = "This block does not contain a reaching task", "This block has no readable recordings"
+    sentences = "This block does not contain a reaching task", "Without readable recordings of this block"
     measured = SimpleNamespace(reaching=reaching, recorded_in=lambda _block: recorded)
     block = SimpleNamespace(id="reach", title="Reaching")
     results: Any = SimpleNamespace(blocks=[block], performance=measured, delivered=())

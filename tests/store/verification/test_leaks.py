@@ -46,7 +46,7 @@ def test_a_leak_is_found_wherever_it_is(tmp_path: Path, protocol: Protocol, star
 def test_the_preregistration_names_the_conditions(tmp_path: Path, protocol: Protocol, start: Start) -> None:
     start().finish("completed")
     folder = StudyFolder(tmp_path / "study")
-    folder.preregistration.write_text("agreement is higher in mildew than in quagmire", encoding="utf-8")
+    folder.preregistration.write_text("agreement is higher in mildew than in quagmire", encoding="utf-8", newline="\n")
     assert found(folder.path, protocol) == []
     folder.preregistration.rename(folder.path / "draft.md")
     assert found(folder.path, protocol) == [("draft.md, line 1", "mildew"), ("draft.md, line 1", "quagmire")]
