@@ -15,8 +15,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, PercentFormatter
-from scipy.optimize import brentq
-from scipy.special import chdtri, nctdtr, ndtr, stdtrit
+from scipy.special import chdtri, ndtr, stdtrit
 
 from study_app import __version__
 from study_app import figure_style as style
@@ -37,6 +36,7 @@ from study_app.analysis.planning.simulated_studies import (
 )
 from study_app.analysis.results import min_sample_reason
 from study_app.analysis.statistics.equivalence import STEPS, fewest_participants
+from study_app.analysis.statistics.mean_tests import smallest_shift
 from study_app.analysis.wording import bound_text, listed, whole_percent
 from study_app.protocol.model import Contrast
 from study_app.protocol.participants import CONSISTENT, NOISY, STATED
@@ -610,7 +610,7 @@ def smallest_differences(
     def differences(n: int, spread: float) -> tuple[float, float] | None:
         if min(groups := groups_of(n)) < 3:
             return None
-        half, least = detectable(*groups, tail=strictest / (2 if contrast.expected is None else 1))
+        half, least = detectable(*groups, alpha=strictest, expected=contrast.expected)
         return None if least > MOST_SD else (half * spread, least * spread)
 
     equal = [] if bound is None else [f"shown to be equivalent {IF_EQUAL}"]
@@ -685,18 +685,18 @@ def size_text(n: int, planned: int | None) -> str:
     return f"{n} (planned)" if n == planned else str(n)
 
 
-def detectable(n: int, second: int | None = None, *, tail: float) -> tuple[float, float]:
-    """Return half the 95 % interval and the smallest mean difference that 80 % of t tests show [SD].
+def detectable(n: int, second: int | None = None, *, alpha: float, expected: str | None) -> tuple[float, float]:
+    """Return half the 95 % interval and the smallest mean difference that 80 % of studies detect [SD].
 
-    The tests have ``n`` pairs, or two groups of ``n`` and ``second`` participants; ``tail`` is the probability of each
-    significant tail.
+    The studies have ``n`` pairs, or two groups of ``n`` and ``second`` participants; a hypothesis without an
+    ``expected`` direction is tested on both sides.
     """
-    root, freedom = _precision(n, second)
-    tested = min(n, second or n) - 1  # the report's degrees of freedom are those of the smaller group
-    critical = float(-stdtrit(tested, tail))
-    most = (2 * critical + 10) / root  # more than 80 % of studies show such a large difference
-    least = float(brentq(lambda size: 1 - nctdtr(freedom, size * root, critical) - WANTED, 0.0, most))
-    return float(stdtrit(tested, 0.975)) / root, least
+    root, _ = _precision(n, second)
+    sizes, alternative = (n,) if second is None else (n, second), "two-sided" if expected is None else "greater"
+    half = (
+        float(stdtrit(min(sizes) - 1, 0.975)) / root
+    )  # the report's degrees of freedom are those of the smaller group
+    return half, smallest_shift(*sizes, alpha=alpha, alternative=alternative, power=WANTED)
 
 
 def shown_equal(bound: float, n: int, second: int | None = None, *, alpha: float) -> float:

@@ -200,8 +200,10 @@ def _low_power(results: Results) -> Iterator[str]:
             sd = result.standard_error * math.sqrt(result.n)  # that of the test, which may weight the participants
         if not sd:
             continue
-        tail = results.decided.alpha / result.members / (2 if result.contrast.expected is None else 1)
-        least = detectable(*(sizes if grouped else sizes[:1]), tail=tail)[1] if min(sizes) > 2 else math.inf
+        groups, alpha = sizes if grouped else sizes[:1], results.decided.alpha / result.members
+        least = math.inf
+        if min(sizes) > 2:
+            _, least = detectable(*groups, alpha=alpha, expected=result.contrast.expected)
         lead = f"Hypothesis{f' {place}' if len(results.contrasts) > 1 else ''}"
         people, power = counted(result.n, "participant"), f"{100 * WANTED:.0f} % power"
         largest = equality_limits(result.contrast, 1.0, ratio=False)[1] or math.inf
