@@ -15,7 +15,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, PercentFormatter
-from scipy.special import chdtri, ndtr, stdtrit
+from scipy.special import stdtrit
 
 from study_app import __version__
 from study_app import figure_style as style
@@ -36,7 +36,7 @@ from study_app.analysis.planning.simulated_studies import (
 )
 from study_app.analysis.results import min_sample_reason
 from study_app.analysis.statistics.equivalence import STEPS, fewest_participants
-from study_app.analysis.statistics.mean_tests import smallest_shift
+from study_app.analysis.statistics.mean_tests import equivalence_power, smallest_shift
 from study_app.analysis.wording import bound_text, listed, whole_percent
 from study_app.protocol.model import Contrast
 from study_app.protocol.participants import CONSISTENT, NOISY, STATED
@@ -51,7 +51,6 @@ _MANY: Final = 200
 WANTED: Final = 0.8
 """The power that "smallest detectable effect" and "participants needed" are about."""
 
-_SPREADS: Final = 1000
 MOST_SD: Final = 3.0
 """Sample sizes that only find a larger difference, in standard deviations, are too few. [choice]"""
 
@@ -650,7 +649,7 @@ def smallest_differences(
             ends = ["too few", "too few"] if reached is None else [written(reached[0]), directed(reached[1])]
             if bound is not None:
                 enough_people = min(groups) >= fewest_participants(alpha / bounds, bound, largest)
-                share = shown_equal(bound / spread, *groups, alpha=alpha / bounds) if enough_people else 0.0
+                share = equivalence_power(*groups, alpha=alpha / bounds, bound=bound / spread) if enough_people else 0.0
                 ends.append(whole_percent(share))
             yield f"| {name} | {size_text(n, planned)} | {words} | {' | '.join(ends)} |"
 
@@ -688,34 +687,12 @@ def size_text(n: int, planned: int | None) -> str:
 def detectable(n: int, second: int | None = None, *, alpha: float, expected: str | None) -> tuple[float, float]:
     """Return half the 95 % interval and the smallest mean difference that 80 % of studies detect [SD].
 
-    The studies have ``n`` pairs, or two groups of ``n`` and ``second`` participants; a hypothesis without an
-    ``expected`` direction is tested on both sides.
+    The studies have ``n`` pairs, or two groups of ``n`` and ``second`` participants, whose t has the degrees of freedom
+    of the smaller group; a hypothesis without an ``expected`` direction is tested on both sides.
     """
-    root, _ = _precision(n, second)
     sizes, alternative = (n,) if second is None else (n, second), "two-sided" if expected is None else "greater"
-    half = (
-        float(stdtrit(min(sizes) - 1, 0.975)) / root
-    )  # the report's degrees of freedom are those of the smaller group
+    half = float(stdtrit(min(sizes) - 1, 0.975)) * math.sqrt(sum(1 / size for size in sizes))
     return half, smallest_shift(*sizes, alpha=alpha, alternative=alternative, power=WANTED)
-
-
-def shown_equal(bound: float, n: int, second: int | None = None, *, alpha: float) -> float:
-    """Return the power of equivalence t tests for a bound of ± ``bound`` [SD] and no true difference.
-
-    They have ``n`` pairs, or two groups of ``n`` and ``second`` participants; the power is averaged over quantiles of
-    the estimated SD.
-    """
-    root, freedom = _precision(n, second)
-    spreads = np.sqrt(chdtri(freedom, 1 - (np.arange(_SPREADS) + 0.5) / _SPREADS) / freedom)
-    inside = bound * root - float(-stdtrit(min(n, second or n) - 1, alpha)) * spreads
-    return float(np.maximum(2 * ndtr(inside) - 1, 0.0).mean())
-
-
-def _precision(n: int, second: int | None) -> tuple[float, int]:
-    """Return the inverse standard error of a mean difference [1/SD], and the degrees of freedom of its t."""
-    if second is None:
-        return math.sqrt(n), n - 1
-    return math.sqrt(n * second / (n + second)), n + second - 2
 
 
 def _truly_equal(curves: Sequence[Curve]) -> list[Curve]:
