@@ -4,10 +4,10 @@ A force −M dw/dt from past positions acts too late: with a delay of some ticks
 oscillates. But the fast part of the acceleration that the force itself causes is known before a position shows it. Per
 axis a Kalman filter has four states, position, velocity, acceleration and jerk that the hand gives to the handle,
 driven by white snap (the derivative of jerk); all axes share one covariance. The force, delayed by the assumed loop
-delay, passes a high-pass filter of second order, like the acceleration of a mass that a spring and a damper hold; the
-response of the four states to it at 1 kg is computed beside them, and θ, the inverse of the mass that the fast force
-moves, is estimated from the innovations, as in `estimators` (Friedland 1969). When the force F of this tick acts, the
-acceleration will be
+delay, passes a high-pass filter of second order (``rules.fast_radps``, ``rules.fast_damping``), like the acceleration
+of a mass that a spring and a damper hold; the response of the four states to it at 1 kg is computed beside them, and θ,
+the inverse of the mass that the fast force moves, is estimated from the innovations, as in `estimators` (Friedland
+1969). When the force F of this tick acts, the acceleration will be
 
     a = a_hand + θ (a_response + HP(F)),
 
@@ -23,7 +23,6 @@ forces are smoothed and limited for ``rules.unused_s`` as without the known forc
 
 from __future__ import annotations
 
-import math
 from typing import Any, Final
 
 from study_app.haptics.kernels.compiled import part
@@ -33,10 +32,6 @@ from study_app.haptics.model.layout import Record
 STORAGE: Final = 3.0
 """Multiple of ½ M v² that an implicit inertial force may return: less took the force from fast strokes in firm hands,
 where the velocity falls before the force does. [choice]"""
-CORNER_RADPS: Final = 2.0 * math.pi * 5.5
-_DAMPING: Final = 0.5
-"""Corner frequency and damping ratio of the high-pass filter: a handle of 0.2 kg in a middle grip has 7 Hz and 0.3, in
-a light one 4 Hz and 0.2, in a firm one 11 Hz and 0.5. [choice]"""
 JERK_M2PS5: Final = 0.5
 _JERK_OF_SPEED_PS3: Final = 2200.0
 JERK_OF_ACCELERATION_PS: Final = 10.0
@@ -96,30 +91,30 @@ def _begin_motion(parameters: Record, filtered: Record) -> None:
 
 
 @part
-def _feedthrough(interval_s: float) -> float:
+def _feedthrough(rules: Record, interval_s: float) -> float:
     """Return the immediate response of the high-pass filter."""
-    x = CORNER_RADPS * interval_s
-    return 1.0 / (1.0 + x * (2.0 * _DAMPING + x))
+    x = rules.fast_radps * interval_s
+    return 1.0 / (1.0 + x * (2.0 * rules.fast_damping + x))
 
 
 @part
-def _pass_fast(passed: Any, force_n: float, axis: int, interval_s: float) -> float:
+def _pass_fast(rules: Record, passed: Any, force_n: float, axis: int, interval_s: float) -> float:
     """Pass a force through the high-pass filter, whose states are the integrals ``passed`` (2, 3) of its output."""
-    fast_n = _feedthrough(interval_s) * (force_n - _slow_part(passed, axis))
+    fast_n = _feedthrough(rules, interval_s) * (force_n - _slow_part(rules, passed, axis))
     passed[0, axis] = _or_zero(passed[0, axis] + interval_s * fast_n)
     passed[1, axis] = _or_zero(passed[1, axis] + interval_s * passed[0, axis])
     return fast_n
 
 
 @part
-def _slow_part(passed: Any, axis: int) -> float:
-    return float(CORNER_RADPS * (2.0 * _DAMPING * passed[0, axis] + CORNER_RADPS * passed[1, axis]))
+def _slow_part(rules: Record, passed: Any, axis: int) -> float:
+    return float(rules.fast_radps * (2.0 * rules.fast_damping * passed[0, axis] + rules.fast_radps * passed[1, axis]))
 
 
 @part
 def track_motion(parameters: Record, state: Record, interval_s: float) -> float:
     """Predict and correct both motions by the newest position; return Σ innovation² / its variance over the axes."""
-    filtered = state.kalman
+    filtered, rules = state.kalman, parameters.rules
     t, half, third = interval_s, 0.5 * interval_s * interval_s, interval_s * interval_s * interval_s / 6.0
     variance_m2 = _update_covariance(parameters, filtered, t, half, third)
     to_x, to_v, to_a, to_j = filtered.gains[0], filtered.gains[1], filtered.gains[2], filtered.gains[3]
@@ -128,8 +123,8 @@ def track_motion(parameters: Record, state: Record, interval_s: float) -> float:
     for axis in range(3):
         a = filtered.acceleration_mps2[axis] + filtered.response_mps2[axis] * filtered.per_kg
         square_m2ps4 += a * a
-        _pass_fast(filtered.ahead, filtered.sent_n[axis], axis, parameters.period_s)
-        fast_n = _pass_fast(filtered.late, filtered.force_n[axis], axis, interval_s)
+        _pass_fast(rules, filtered.ahead, filtered.sent_n[axis], axis, parameters.period_s)
+        fast_n = _pass_fast(rules, filtered.late, filtered.force_n[axis], axis, interval_s)
         step_m = (state.position_m[axis] - state.previous_m[axis]) * per_m
         v, a, j = hand[1, axis], hand[2, axis], hand[3, axis]
         offset_m = hand[0, axis] + t * v + half * a + third * j - step_m
@@ -156,7 +151,6 @@ def track_motion(parameters: Record, state: Record, interval_s: float) -> float:
     filtered.compliance_per_kg = min(max(per_kg, _LEAST_SHARE / parameters.mass_kg), 1.0 / parameters.mass_kg)
     learned = uncertain - gain * uncertain * responses_m2 + LEARNING_PKG2S * t
     filtered.compliance_variance = min(learned, _MOST_VARIANCE_PKG2)
-    rules = parameters.rules
     if filtered.surprise > _SURPRISED:
         filtered.trust = -rules.unused_s / rules.regained_s
         _begin_motion(parameters, filtered)
@@ -211,13 +205,15 @@ def solve_inertia(
 ) -> None:
     """Set dw/dt (3,) [m/s², scene] when the force of this tick acts: F = F₀ − M dw/dt, with ``others_n`` (3,) F₀."""
     lead_s = _AHEAD * parameters.period_s * (delay_ticks + 0.5)
-    per_kg, passed = filtered.compliance_per_kg, _feedthrough(parameters.period_s)
+    rules, per_kg = parameters.rules, filtered.compliance_per_kg
+    passed = _feedthrough(rules, parameters.period_s)
     hand, response = filtered.hand_motion, filtered.response_motion
     own = parameters.scale * per_kg * passed
     for axis in range(3):
         known_mps2 = hand[2, axis] + lead_s * hand[3, axis]
         response_mps2 = response[2, axis] + lead_s * response[3, axis]
-        response_mps2 += passed * (filtered.sent_n[axis] - filtered.asked_n[axis] - _slow_part(filtered.ahead, axis))
+        changed_n = filtered.sent_n[axis] - filtered.asked_n[axis]
+        response_mps2 += passed * (changed_n - _slow_part(rules, filtered.ahead, axis))
         known_mps2 = parameters.scale * (known_mps2 + per_kg * response_mps2)
         acceleration_mps2[axis] = (known_mps2 + own * others_n[axis]) / (1.0 + own * inertia_kg)
 

@@ -48,6 +48,10 @@ class ForceRules(NamedTuple):
     light hand.
     ``false_lead_gain`` times the false share of its lead over "ewma" is taken from the velocity of "kalman"
     (`kernels.estimators`): with 1, the velocity on real encoders was noisier than that of "ewma".
+    ``fast_radps`` and ``fast_damping`` are the corner frequency and the damping ratio of the high-pass filter of the
+    known force: a handle of 0.2 kg has 7 Hz and 0.3 in a middle grip, 4 Hz and 0.2 in a light one, 11 Hz and 0.5 in a
+    firm one. With 5.5 Hz and 0.5, up to half of the drag in honey and glycerin was lost at 3 Hz; with 8 Hz and 0.5,
+    a light hand lost a third of the inertia of honey at three ticks.
     """
 
     version: int
@@ -77,6 +81,8 @@ class ForceRules(NamedTuple):
     acting_share: float = math.inf
     late_swing_mps: float = math.inf
     false_lead_gain: float = 0.0
+    fast_radps: float = 2.0 * math.pi * 5.5
+    fast_damping: float = 0.5
 
 
 VERSIONS: Final = {
@@ -110,8 +116,9 @@ VERSIONS[7] = VERSIONS[6]._replace(version=7, shaken_reversal_s=0.06, trusts_gap
 VERSIONS[8] = VERSIONS[7]._replace(version=8, known_force_ticks=0, unused_s=0.05, regained_s=0.1)
 VERSIONS[9] = VERSIONS[8]._replace(version=9, late_swing_mps=0.1)
 VERSIONS[10] = VERSIONS[9]._replace(version=10, false_lead_gain=1.5)
+VERSIONS[11] = VERSIONS[10]._replace(version=11, fast_radps=2.0 * math.pi * 7.5, fast_damping=0.3)
 
-FORCE_RULES: Final = 10
+FORCE_RULES: Final = 11
 """The version by which this program computes forces. Receipts state it: released numbers never change, new numbers are
 a new version."""
 CURRENT: Final = VERSIONS[FORCE_RULES]

@@ -31,6 +31,8 @@ RELEASED = {
     "acting_share": math.inf,
     "late_swing_mps": math.inf,
     "false_lead_gain": 0.0,
+    "fast_radps": 34.55751918948772,  # 5.5 Hz
+    "fast_damping": 0.5,
 }
 
 
@@ -54,6 +56,12 @@ def test_released_versions_keep_their_numbers():
     }
     assert VERSIONS[9]._asdict() == {**VERSIONS[8]._asdict(), "version": 9, "late_swing_mps": 0.1}
     assert VERSIONS[10]._asdict() == {**VERSIONS[9]._asdict(), "version": 10, "false_lead_gain": 1.5}
+    assert VERSIONS[11]._asdict() == {
+        **VERSIONS[10]._asdict(),
+        "version": 11,
+        "fast_radps": 47.12388980384689,  # 7.5 Hz
+        "fast_damping": 0.3,
+    }
 
 
 def test_the_present_version_is_the_newest_and_has_its_own_numbers():
