@@ -83,7 +83,8 @@ class Segments(Themed, QWidget):
             super().keyPressEvent(event)
 
 
-FIELD_PX = 34
+FIELD_PX, LABEL_PX = 34, 116
+"""Height of a field, and width of a label beside it, in the form [px]."""
 _W = TypeVar("_W", bound=QWidget)
 
 

@@ -1,4 +1,4 @@
-"""The form: its head, its rows in sections, and help for the focused field at its foot."""
+"""The form of an element: its rows in sections between its head and foot, and the focus in them."""
 
 from __future__ import annotations
 
@@ -8,20 +8,12 @@ from dataclasses import replace
 from functools import cached_property, partial
 from typing import Final
 
-from PySide6.QtCore import QCoreApplication, QEvent, QRectF, Qt, Signal
-from PySide6.QtGui import QColor, QKeyEvent, QPaintEvent, QResizeEvent
-from PySide6.QtWidgets import QAbstractItemView, QApplication, QBoxLayout, QGridLayout, QMenu, QVBoxLayout, QWidget
+from PySide6.QtCore import QCoreApplication, QEvent, Qt, Signal
+from PySide6.QtGui import QKeyEvent, QResizeEvent
+from PySide6.QtWidgets import QAbstractItemView, QApplication, QBoxLayout, QMenu, QVBoxLayout, QWidget
 
 from study_app.designer.document.elements import STUDY_LANGUAGES
-from study_app.designer.document.steps import (
-    AddKey,
-    LeaveText,
-    RemoveKey,
-    RenameElement,
-    SetValue,
-    SwitchKey,
-    UseSource,
-)
+from study_app.designer.document.steps import AddKey, LeaveText, RemoveKey, RenameElement, SwitchKey, UseSource
 from study_app.designer.form.drawn_fields import LEVELS, TRIAL
 from study_app.designer.form.fields import (
     LANGUAGE,
@@ -40,6 +32,7 @@ from study_app.designer.form.fields import (
     remove_button,
     removes_key,
 )
+from study_app.designer.form.head_and_foot import FormFoot, FormHead
 from study_app.designer.form.lists import CONDITIONS, EntriesField, EntryList, LanguageListField, LinesField
 from study_app.designer.form.rows import Form, FormRow, Section, added_row, values_of
 from study_app.designer.form.special import (
@@ -55,29 +48,24 @@ from study_app.designer.form.special import (
     Panel,
     QuestionRows,
 )
-from study_app.designer.parts import FIELD_PX, Segments, cut_text, small_button
+from study_app.designer.parts import FIELD_PX, LABEL_PX, Segments
 from study_app.designer.problems import ProblemRow, RepairButton
-from study_app.gui.kit import choose_protocol, command_tip, with_key
-from study_app.gui.theme import RADIUS_CONTROL, Themed, draw_icon, font, name_scroll_bars, remove_widget
+from study_app.gui.kit import choose_protocol, with_key
+from study_app.gui.theme import Themed, font, name_scroll_bars, remove_widget
 from study_app.gui.widgets import (
-    QWIDGETSIZE_MAX,
     STRETCH,
     Card,
-    Elided,
     Icon,
     IconButton,
     Ink,
     Rule,
     add_layout,
     add_parts,
-    button_text,
-    fill_rounded,
     hbox,
     insert_layout,
     label,
     scrolled,
     set_property,
-    smooth_painter,
     vbox,
 )
 from study_app.gui.widgets import grid as grid_of
@@ -160,7 +148,6 @@ def _field_for(row: FormRow) -> Field:
     return LineField(row) if kind not in {"unknown", "table"} else UnknownField(row)
 
 
-_LABEL_PX = 116
 _MOST_REPAIRS = 3
 _SOURCES = _LIQUID_FILE, _INSTRUMENT = ("liquids", "file"), ("questionnaires", "instrument")
 """Section and key of the sources of a whole element, which are chosen before they are added."""
@@ -183,7 +170,7 @@ class _FaultLine(QWidget):
         self.icon = Icon("warning", "bad", 16)
         self.sentence = label("", "label", "bad", wraps=True)
         icon = (self.icon, 0, Qt.AlignmentFlag.AlignTop)
-        hbox(icon, (self.sentence, 1), spacing=8, margins=(_LABEL_PX + 8, 0, 0, 0), parent=self)
+        hbox(icon, (self.sentence, 1), spacing=8, margins=(LABEL_PX + 8, 0, 0, 0), parent=self)
 
     def show_text(self, text: str, *, is_hint: bool) -> None:
         self.icon.show_icon(*(("info", "text2") if is_hint else ("warning", "bad")))
@@ -211,7 +198,7 @@ class _RowWidget(Themed, QWidget):
         self.keys = Segments("Choose one of the two keys") if row.keys else None
         self.words = label(row.label, "label", wraps=True)
         if not wide:
-            self.words.setFixedWidth(_LABEL_PX)
+            self.words.setFixedWidth(LABEL_PX)
         self.words.setMinimumHeight(FIELD_PX)
         self.words.setAlignment(Qt.AlignmentFlag.AlignVCenter)
         self.words.setBuddy(self.field)
@@ -230,7 +217,7 @@ class _RowWidget(Themed, QWidget):
             across.addWidget(self.remove, 0, top)
         self.repairs: list[RepairButton] = []
         self._offered: dict[ProblemRow, tuple[str, ...]] = {}
-        self._buttons = vbox(spacing=6, margins=(_LABEL_PX + 32, 0, 0, 0))
+        self._buttons = vbox(spacing=6, margins=(LABEL_PX + 32, 0, 0, 0))
         column = vbox(spacing=4, margins=0, parent=self)
         heads = wide and len(row.languages) > 1 and not is_stacked(row)
         labelled = not bare and not (heads and row.required)
@@ -242,7 +229,7 @@ class _RowWidget(Themed, QWidget):
         if self.keys is not None:
             self.keys.show_values(row.keys, row.path[-1])
             self.keys.chosen.connect(self._switch_key)
-            above = hbox((self.keys, 0, Qt.AlignmentFlag.AlignLeft), margins=(0 if wide else _LABEL_PX + 8, 0, 0, 0))
+            above = hbox((self.keys, 0, Qt.AlignmentFlag.AlignLeft), margins=(0 if wide else LABEL_PX + 8, 0, 0, 0))
             insert_layout(column, 0, above)
         if heads:
             of = "" if labelled else f"{row.label}, "
@@ -409,198 +396,11 @@ class _LanguageHeads(QWidget):
         hbox(*heads, spacing=8, margins=(inset[0], 0, inset[1], 0), parent=self)
 
 
-_TILE = 40
-
-
-class _Tile(Themed, QWidget):
-    """An icon on a tinted square."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.icon = "ring"
-        self.setFixedSize(_TILE, _TILE)
-
-    def paintEvent(self, _event: QPaintEvent) -> None:
-        painter = smooth_painter(self)
-        painter.setPen(QColor(self.theme.selected))
-        painter.setBrush(QColor(self.theme.selected))
-        painter.drawRoundedRect(QRectF(self.rect()), RADIUS_CONTROL, RADIUS_CONTROL)
-        draw_icon(painter, self.icon, QRectF(self.rect()).adjusted(10, 10, -10, -10), self.theme.accent, 2.0)
-
-
-class _FormHead(QWidget):
-    """The head of the form. Signals: ``asked`` (a request), ``feel_asked`` (path), ``id_typed`` (path, current text).
-
-    ``unlock_asked`` is emitted if a locked id is to be changed.
-    """
-
-    asked = Signal(object)
-    id_typed = Signal(object, str)
-    unlock_asked = Signal()
-    feel_asked = Signal(object)
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.form: Form | None = None
-        self._faulty = False
-        self.tile = _Tile()
-        self.title = Elided("card")
-        self.kind = Elided("small", "text2")
-        self.used = Elided("small", "text2")
-        self.ask = small_button("list", "When …", height=34)
-        self.ask.hide()
-        self.asks = QMenu(self)
-        self.asks.setFont(font("label"))
-        self.id = TypedLine("ID")
-        self.id.setMinimumWidth(110)
-        self.id.setMaximumWidth(230)
-        self.id.rests = False
-        self.unlock = small_button("lock", "Change anyway …", height=34)
-        self.unlock.hide()
-        self._lock: tuple[object, str] = ((), "")
-        self._read_only = False
-        self.refusal = label("", "label", "bad", wraps=True)
-        self.refusal.hide()
-        self.feel = IconButton("drop", "Feel", size=34)
-        self.series = small_button("bars", "Series …", height=34)
-        self.up = IconButton("arrow_up", "Move up", size=34)
-        self.down = IconButton("arrow_down", "Move down", size=34)
-        self.copy = IconButton("copy", "Duplicate", size=34)
-        self.delete = IconButton("trash", "Delete", f"{command_tip('delete')} in the outline", size=34, role="danger")
-        titles = vbox(self.title, self.kind, spacing=0)
-        grid = QGridLayout(self)
-        grid.setContentsMargins(0, 0, 0, 0)
-        grid.setHorizontalSpacing(8)
-        grid.addWidget(self.tile, 0, 0)
-        add_layout(grid, titles, 0, 1)
-        add_layout(
-            grid, hbox(self.ask, self.feel, self.series, self.up, self.down, self.copy, self.delete, spacing=8), 0, 2
-        )
-        self.id_line = QWidget()
-        words_of_id = label("ID", "label")
-        words_of_id.setFixedWidth(_LABEL_PX)
-        parts = (words_of_id, (self.id, 8), self.unlock, (self.used, 1))
-        hbox(*parts, spacing=8, margins=(0, 4, 0, 0), parent=self.id_line)
-        grid.addWidget(self.id_line, 1, 0, 1, 3)
-        grid.addWidget(self.refusal, 2, 0, 1, 3)
-        grid.setColumnStretch(1, 1)
-        self.id.typed.connect(self._rename)
-        self.id.textEdited.connect(lambda name: self.id_typed.emit(self.path, name))
-        self.unlock.clicked.connect(self.unlock_asked)
-        self.feel.clicked.connect(lambda: self.feel_asked.emit(self.path))
-        self.ask.clicked.connect(lambda: self.asks.popup(self.ask.mapToGlobal(self.ask.rect().bottomLeft())))
-
-    @property
-    def path(self) -> Path:
-        return () if self.form is None else self.form.path
-
-    def show_form(self, form: Form, *, read_only: bool) -> None:
-        if self.form is None or self.form.path != form.path or self.form.id != form.id:
-            self.refuse("")
-        self.form = form
-        self.tile.icon = form.icon
-        self.tile.update()
-        self.title.show_text(form.title)
-        at = "" if form.position is None else f"{form.position[0]} of {form.position[1]}"
-        self.kind.show_text("  ·  ".join(filter(None, (form.kind, at))))
-        self.used.show_text(form.used)
-        self.ask.setVisible(bool(form.asks) and not read_only)
-        self.asks.clear()
-        for sentence, asked in form.asks:
-            self.asks.addAction(button_text(sentence)).triggered.connect(
-                lambda _on=False, asked=asked: self.asked.emit(asked)
-            )
-        self.id_line.setVisible(form.id is not None)
-        self._read_only = read_only
-        self._apply_lock()
-        if form.id_faults:
-            self.refuse("\n".join(form.id_faults))
-        elif self._faulty:
-            self.refuse("")
-        self._faulty = bool(form.id_faults)
-        if not self.refusal.text() or self._faulty:
-            self.id.show_text(form.id or "")
-        self.feel.setVisible(bool(form.feel))
-        self.feel.setAccessibleName(form.feel or "Feel")
-        self.feel.setToolTip(f"{form.feel} in the lab")
-        self.series.setVisible(form.series and not read_only)
-        alone = form.position is not None  # next to the arrows there is only room for the icon
-        self.series.show_action("bars", "" if alone else "Series …")
-        self.series.setMaximumWidth(34 if alone else QWIDGETSIZE_MAX)
-        self.series.setAccessibleName(f"Series of {form.title}")
-        place, count = form.position or (0, 0)
-        for button in (self.up, self.down):
-            button.setVisible(form.position is not None and not read_only)
-        for button in (self.copy, self.delete):
-            button.setVisible(form.id is not None and not read_only)
-        self.up.setEnabled(not read_only and place > 1)
-        self.down.setEnabled(not read_only and 0 < place < count)
-        for button in (self.copy, self.delete):
-            button.setEnabled(not read_only and len(form.path) > 1 and form.id is not None)
-
-    def show_lock(self, path: object, why: str) -> None:
-        self._lock = (path, why)
-        self._apply_lock()
-
-    def _apply_lock(self) -> None:
-        path, why = self._lock
-        locked = bool(why) and self.form is not None and self.form.path == path
-        self.id.setReadOnly(self._read_only or locked)
-        self.id.setToolTip(why if locked else command_tip("rename"))
-        self.unlock.setVisible(locked and not self._read_only)
-        self.unlock.setToolTip(why)
-        self.unlock.setAccessibleDescription(why)
-
-    def edit_id(self) -> None:
-        self.id.setFocus(Qt.FocusReason.ShortcutFocusReason)
-        self.id.selectAll()
-
-    def refuse(self, sentence: str) -> None:
-        self.refusal.setText(capitalised(sentence))
-        self.refusal.setVisible(bool(sentence))
-        self.id.show_refused(bool(sentence))
-
-    def _rename(self, name: str) -> None:
-        if self.form is not None and self.form.id is not None:
-            if name == self.form.id:
-                self.refuse("")
-            elif not self.form.id:
-                self.asked.emit(SetValue((*self.form.path, "id"), name))
-            else:
-                self.asked.emit(RenameElement(self.form.path, name))
-
-
 _ACROSS = 2
 _ADD_PX = 235
 """The greatest width of a button in a column of `_AddKeys` [px]."""
 _FOOT_FROM = 460
 """The height of the form from which it has a foot [px]."""
-_HELP_LINES = 2
-"""The lines of help that always have room, so that another field's help does not move the form under the pointer."""
-
-
-class _FormFoot(Themed, QWidget):
-    """Label, place and description of a field."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.title = label("", "label")
-        self.place = cut_text("", "small", "text2", right=True)
-        self.words = label("", "small", "text2", wraps=True)
-        self.words.setAlignment(Qt.AlignmentFlag.AlignTop)
-        self.words.setMinimumHeight(_HELP_LINES * self.words.fontMetrics().lineSpacing())
-        self.glossary = small_button("info", "Glossary", role="plain", height=26)
-        above = hbox(self.title, (self.place, 1), self.glossary, spacing=8)
-        vbox(above, self.words, spacing=3, margins=(12, 4, 4, 8), parent=self)
-
-    def show_help(self, title: str, place: str, text: str) -> None:
-        self.title.setText(title)
-        self.place.show_text(place)
-        self.words.setText(text)
-
-    def paintEvent(self, _event: QPaintEvent) -> None:
-        painter = smooth_painter(self)
-        fill_rounded(painter, QRectF(self.rect()), RADIUS_CONTROL, self.theme.sunk)
 
 
 class _AddKeys(QWidget):
@@ -643,7 +443,7 @@ class FormCard(Card):
         self._renames = False
         self.instruments = QMenu(self)
         self.instruments.setFont(font("label"))
-        self.head = _FormHead()
+        self.head = FormHead()
         self.head.asked.connect(self._request)
         self.own = label("", "label", "bad", wraps=True)
         self.above, self.panel, self.below = QuestionRows(), Panel(), QuestionRows()
@@ -653,7 +453,7 @@ class FormCard(Card):
         self.inside = QWidget()
         vbox(self.above, self.panel, self.below, STRETCH, spacing=7, margins=(0, 2, 8, 2), parent=self.inside)
         self.area = scrolled(self.inside)
-        self.foot = _FormFoot()
+        self.foot = FormFoot()
         add_parts(self.column, self.head, Rule(), self.own, (self.area, 1), self.foot)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
@@ -763,7 +563,7 @@ class FormCard(Card):
                     names = tuple(language for _, language in beside)
                     yield (
                         ("heads", at, row.path[-1], names),
-                        partial(_LanguageHeads, names, (_LABEL_PX + 8, FIELD_PX + 8)),
+                        partial(_LanguageHeads, names, (LABEL_PX + 8, FIELD_PX + 8)),
                         None,
                     )
                 heads = beside
