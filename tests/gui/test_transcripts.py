@@ -23,7 +23,7 @@ from tests.gui.windows import WINDOWS, two_screens
 SEED = 1234
 SLOW = ("operator, single-blind", "lab", "settings", "home", "results", "diagnosis", "help", "new session")
 """Windows with many states, which the quick circle leaves out."""
-CLOCKS = ("results.view", "home.view", "home.cards", "sessions.sessions_table")
+CLOCKS = ("results.cards", "home.view", "home.cards", "sessions.sessions_table")
 
 
 class FixedTime(datetime):

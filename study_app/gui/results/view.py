@@ -1,17 +1,16 @@
-"""Results: sessions, exclusions, figures, exports."""
+"""The results page: a study, the requests to the process that evaluates it, and the answers of that process."""
 
 import importlib.util
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from dataclasses import replace
-from datetime import datetime
 from functools import partial
 from pathlib import Path
-from typing import Any, Final, NamedTuple, TypeAlias
+from typing import Any, Final, TypeAlias
 
 from PySide6.QtCore import QSignalBlocker, QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QResizeEvent
-from PySide6.QtWidgets import QBoxLayout, QDialog, QLineEdit, QScrollArea, QSizePolicy, QWidget
+from PySide6.QtWidgets import QBoxLayout, QDialog, QWidget
 
 from study_app.analysis.worker_messages import (
     AnalysisClient,
@@ -34,322 +33,25 @@ from study_app.analysis.worker_messages import (
     WriteTables,
     start_analysis_worker,
 )
-from study_app.gui.kit.dialogs import REASON, Question, Work
-from study_app.gui.kit.fields import Field, choice_field
 from study_app.gui.kit.opening import open_here
-from study_app.gui.results.figures import (
-    FiguresPanel,
-    ResultsView,
-    Trouble,
-    exclusion_text,
-    figure_counts,
-    kind_of,
-    time_of,
-    unblinding_text,
-)
-from study_app.gui.sessions.session_facts import (
-    Column,
-    SessionFacts,
-    occurring_states,
-    session_facts,
-    session_filter,
-    start_time_text,
-)
+from study_app.gui.results.cards import ExclusionsCard, SessionsCard
+from study_app.gui.results.dialogs import Extra, LeaveOutDialog, WriteDialog, take_back_question, unblind_question
+from study_app.gui.results.figures import FiguresPanel, ResultsView, Trouble, kind_of, unblinding_text
+from study_app.gui.sessions.session_facts import SessionFacts, session_facts
 from study_app.gui.sessions.session_page import SessionPage
-from study_app.gui.sessions.sessions_table import SessionsTable
-from study_app.gui.theme.theme import SHADOW, Theme, font
+from study_app.gui.theme.theme import SHADOW, font
 from study_app.gui.theme.themed import remove_widget
 from study_app.gui.widgets.accessible import plain_tip
 from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
-from study_app.gui.widgets.cards import QWIDGETSIZE_MAX, Card, Chip, Rule, scrolled
-from study_app.gui.widgets.controls import ActionButton, Choice, IconButton
+from study_app.gui.widgets.cards import QWIDGETSIZE_MAX, Chip, scrolled
+from study_app.gui.widgets.controls import ActionButton, Choice
 from study_app.gui.widgets.labels import label
 from study_app.gui.widgets.main_view import Place
-from study_app.number_text import counted
 from study_app.protocol.participants import EACH_GROUP
 from study_app.store.exclusions import Exclusion
 from study_app.store.files import StudyFolder
 from study_app.store.merged import FOLDER, folders_of
 from study_app.workers.server import Crashed, Refused
-
-WIDTH, QUESTION_PX = 600, 560
-_WARNED = 3
-"""Of so many files that differ from the record each is named."""
-
-
-class _Extra(NamedTuple):
-    """An optional output: its name in the command, its label, and the reason if it is unavailable."""
-
-    name: str
-    words: str
-    why_not: str = ""
-
-
-class WriteDialog(Work):
-    """Asks for a folder and the outputs to write there; Cancel writes nothing.
-
-    Parameters
-    ----------
-    to : the suggested folder
-    extras : the optional outputs
-    opens_file : whether to open the first file instead of the folder
-    """
-
-    def __init__(
-        self, *arguments: Any, go_on: str, to: Path, extras: Sequence[_Extra] = (), opens_file: bool = False
-    ) -> None:
-        checks = (Field(extra.name, extra.words, "check", hint=extra.why_not) for extra in extras)
-        folder = Field("to", "Folder", "folder", hint="Existing files will be overwritten.")
-        super().__init__(
-            *arguments,
-            ActionButton("", go_on, role="primary"),
-            fields=(*checks, folder),
-            needs={"to": "Please choose a folder."},
-            width=WIDTH,
-        )
-        self._opens_file = opens_file
-        self.result_path: Path | None = None
-        self._extras = [extra.name for extra in extras]
-        for extra in extras:
-            self.editors[extra.name].control.setEnabled(not extra.why_not)
-        self.editors["to"].show_value(str(to))
-        self.go_on.setFocus()
-
-    @property
-    def asked(self) -> tuple[Path, tuple[str, ...]]:
-        """The folder, and the names of the chosen extras."""
-        return Path(self.value("to")).expanduser(), tuple(name for name in self._extras if self.value(name))
-
-    def show_written(self, files: Sequence[Path], warnings: Sequence[str]) -> None:
-        self.result_path = files[0] if self._opens_file else self.asked[0]
-        more = f" {len(warnings) - _WARNED} more." if len(warnings) > _WARNED else ""
-        opens = "Open the report" if self._opens_file else "Open the folder"
-        warned = "".join(f"\n{line}" for line in warnings[:_WARNED])
-        self.show_done(f"{counted(len(files), 'file')} in {files[0].parent}.{warned}{more}", opens)
-
-
-_NEEDS: Final = {"by": "Please enter a name. It will be recorded.", "reason": REASON}
-
-
-def _decision_fields(by: str, who: str, example: str) -> tuple[Field, Field]:
-    """Return the fields for name and reason of a decision."""
-    return Field("by", by, placeholder=who), Field("reason", "Reason", placeholder=f"For example: {example}")
-
-
-class LeaveOutDialog(Question):
-    """Asks which session, or which trial of it, to exclude, by whom and why.
-
-    Parameters
-    ----------
-    sessions : the sessions that are not excluded yet
-    trials : the main trials of each session (participant, number) with their labels
-    chosen : the initially selected session
-    proposed : an exclusion that a rule proposes
-    """
-
-    def __init__(
-        self,
-        parent: QWidget,
-        theme: Theme,
-        sessions: Sequence[SessionFacts],
-        trials: Mapping[tuple[str, int], tuple[tuple[int, str], ...]],
-        chosen: SessionFacts | None,
-        proposed: Exclusion | None = None,
-    ) -> None:
-        super().__init__(
-            parent,
-            theme,
-            "Exclude from the analysis",
-            f"{_rule_sentence(proposed)}The chosen session or trial is excluded from measures, figures and tests. No "
-            "data are deleted; exclusions.csv and every report state what was excluded, who excluded it and why.",
-            ActionButton("minus", "Exclude", role="primary"),
-            fields=(
-                choice_field(
-                    "session", "Session", {(facts.participant, facts.session): facts.name for facts in sessions}
-                ),
-                choice_field("trial", "Scope", {}),
-                *_decision_fields("By", "Your name or initials, such as AK", "fell asleep"),
-            ),
-            needs=_NEEDS,
-            width=QUESTION_PX,
-        )
-        self._trials, self._proposed = trials, proposed
-        if chosen is not None:
-            self.editors["session"].show_value((chosen.participant, chosen.session))
-        self.editors["session"].edited.connect(self._show_trials)
-        self._show_trials()
-        if proposed is not None:
-            self.editors["session"].show_value((proposed.participant, proposed.session))
-            self._show_trials()
-            self.editors["reason"].show_value(proposed.reason)
-
-    def _show_trials(self) -> None:
-        trials = self._trials.get(self.value("session"), ())
-        self.editors["trial"].show_options(
-            {None: "Whole session", **{at: f"Trial {at}: {text}" for at, text in trials}}
-        )
-
-    @property
-    def chosen(self) -> tuple[str, int, int | None]:
-        """Participant, session and trial; None for the whole session."""
-        return *self.value("session"), self.value("trial")
-
-    @property
-    def rule(self) -> str:
-        """The rule that proposed the chosen session; "" for a person's own decision."""
-        proposed = self._proposed
-        return "" if proposed is None or self.chosen != proposed.what else proposed.rule_or_person
-
-
-def _rule_sentence(proposed: Exclusion | None) -> str:
-    if proposed is None:
-        return ""
-    return f"{exclusion_text(proposed)} meets the exclusion rule “{proposed.rule_or_person.replace('_', ' ')}”. "
-
-
-COLUMNS = (
-    Column("participant", "Participant", 108, 98),
-    Column("status", "Status", 112, 108),
-    Column("validity", "Validity", 100, 102),
-    Column("version", "Version", 60, 56),
-)
-_EVERY = "All states"
-
-
-class _SessionsCard(Card):
-    """The study's sessions; below, how many are in the figures and why others are not."""
-
-    def __init__(self) -> None:
-        super().__init__(gap=8, padding=14)
-        self.column.setContentsMargins(12, self.column.contentsMargins().top(), 12, 14)
-        self.search = QLineEdit(placeholderText="Participant", clearButtonEnabled=True)
-        self.search.setAccessibleName("Search by participant")
-        self.search.setFont(font("body"))
-        self.state = Choice()
-        self.state.setAccessibleName("State")
-        self.state.setFont(font("body"))
-        self.state.addItem(_EVERY, "")
-        self._none = ""
-        self.rows = SessionsTable(COLUMNS, "")
-        self.head = label("", "label", weight=600, tabular=True)
-        self.why = label("", "small", "text2", wraps=True)
-        self.details = IconButton("file", "Details of the selected session", size=36, role="plain")
-        self.details.setEnabled(False)
-        self.details.clicked.connect(self.rows.open_chosen)
-        tip = "Changes in the study since the selected session"
-        self.version = IconButton("designer", tip, size=36, role="plain")
-        self.version.setEnabled(False)
-        self.version.clicked.connect(self.rows.ask_for_version)
-        self.rows.chosen_changed.connect(self._enable)
-        filters = hbox((self.search, 1), (self.state, 1), self.details, self.version, spacing=8)
-        foot = vbox(self.head, self.why, spacing=2, margins=(10, 2, 10, 0))
-        add_parts(self.column, filters, (self.rows, 1), Rule(), foot)
-        self.search.textChanged.connect(self._apply_filter)
-        self.state.currentIndexChanged.connect(self._apply_filter)
-
-    def _enable(self) -> None:
-        chosen = self.rows.chosen
-        self.details.setEnabled(chosen is not None)
-        self.version.setEnabled(chosen is not None and bool(chosen.version))
-
-    def show_sessions(self, sessions: Sequence[SessionFacts], none: str = "No sessions.") -> None:
-        """Show these sessions, or the text ``none``; the filters stay."""
-        self._none = none
-        self.rows.show_rows(sessions, datetime.now().astimezone())
-        has_groups = any(session.group for session in sessions)
-        self.search.setPlaceholderText("Participant or group" if has_groups else "Participant")
-        chosen = self.state.currentData()
-        with QSignalBlocker(self.state):
-            self.state.clear()
-            self.state.addItem(_EVERY, "")
-            for state, text in occurring_states(sessions):
-                self.state.addItem(text, state)
-            self.state.setCurrentIndex(max(0, self.state.findData(chosen)))
-        head, why = figure_counts(sessions)
-        self.head.setText(head)
-        self.why.setText(why)
-        self.why.setVisible(bool(why))
-        self._apply_filter()
-
-    def _apply_filter(self) -> None:
-        state = str(self.state.currentData() or "")
-        filtered = bool(state or self.search.text().strip())
-        self.rows.none.setText("No session matches." if filtered else self._none)
-        self.rows.show_matching(session_filter(self.search.text(), state))
-
-
-class _ExclusionsCard(Card):
-    """The exclusions with their reasons.
-
-    ``take_back_asked`` carries the `Exclusion` to reverse, or a proposed one to reject; ``exclude_asked`` a proposed
-    one to accept.
-    """
-
-    take_back_asked = Signal(object)
-    exclude_asked = Signal(object)
-
-    def __init__(self) -> None:
-        self.leave_out = ActionButton("minus", "Exclude …", height=36)
-        super().__init__("Excluded", self.leave_out, padding=14, gap=6)
-        self.summary = label("", "label", "text2", wraps=True, weight=400)
-        self.open = ActionButton("file", "Open the list", role="plain", height=30)
-        inside = QWidget()
-        self._rows = vbox(STRETCH, spacing=8, margins=0, parent=inside)
-        self.area = QScrollArea(widgetResizable=True)
-        self.area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        self.area.setWidget(inside)
-        self.area.setAccessibleName("Excluded")
-        self.area.setMinimumHeight(96)
-        self.lines: list[QWidget] = []
-        add_parts(self.column, self.summary, (self.area, 1), hbox(STRETCH, self.open))
-        self.show_left_out(())
-
-    def show_left_out(
-        self, listed: Sequence[Exclusion], proposed: Sequence[Exclusion] = (), rules: Sequence[str] = ()
-    ) -> None:
-        """Show the exclusions, proposed ones first, then the latest, below the sentences on planned rules.
-
-        The focus survives a removed line.
-        """
-        self.open.setVisible(bool(listed))
-        listed = (*listed, *reversed(proposed))
-        at = self.window().focusWidget()
-        if at is not None and any(line.isAncestorOf(at) for line in self.lines):
-            self.leave_out.setFocus()
-        for line in self.lines:
-            remove_widget(line)
-        self.lines = [self._exclusion_row(exclusion) for exclusion in reversed(listed)]
-        for place, line in enumerate(self.lines):
-            self._rows.insertWidget(place, line)
-        none = () if listed else ("Nothing is excluded from the analysis.",)
-        self.summary.setText("\n".join((*none, *rules)))
-        self.summary.setVisible(bool(self.summary.text()))
-        self.area.setVisible(bool(listed))
-        grows = QSizePolicy.Policy.Preferred if listed else QSizePolicy.Policy.Maximum
-        self.setSizePolicy(QSizePolicy.Policy.Preferred, grows)
-
-    def _exclusion_row(self, exclusion: Exclusion) -> QWidget:
-        """Return the row of one exclusion: what, why, who and when; or the rule that proposes it."""
-        proposed = not exclusion.excluded_at
-        back = ActionButton("undo", "Keep …" if proposed else "Include again …", role="plain", height=30)
-        back.setAccessibleName(f"{'Keep' if proposed else 'Include again'}: {exclusion_text(exclusion)}")
-        back.clicked.connect(lambda: self.take_back_asked.emit(exclusion))
-        buttons = [back]
-        if proposed:
-            out = ActionButton("minus", "Exclude …", role="plain", height=30)
-            out.setAccessibleName(f"Exclude: {exclusion_text(exclusion)}")
-            out.clicked.connect(lambda: self.exclude_asked.emit(exclusion))
-            buttons.insert(0, out)
-        made = QWidget()
-        what = label(exclusion_text(exclusion), "label", wraps=True, weight=600)
-        why = label(exclusion.reason, "label", "text2", wraps=True, weight=400)
-        now, at = datetime.now().astimezone(), time_of(exclusion.excluded_at)
-        by = exclusion.rule_or_person + ("" if at is None else f", {start_time_text(at, now)}")
-        by = f"Proposed by the rule “{by.replace('_', ' ')}”; not yet decided" if proposed else by
-        who = label(by, "small", "text2")
-        vbox(hbox((what, 1), *buttons), why, who, spacing=0, margins=(0, 0, 6, 0), parent=made)
-        made.setAccessibleName(f"{exclusion_text(exclusion)}: {exclusion.reason} ({by})")
-        return made
 
 
 def _exclusions_at(study: Path) -> Path:
@@ -363,10 +65,10 @@ PANEL_PX, PANEL_WIDE_PX, WIDE_FROM = 400, 430, 1700
 STACKED_HEIGHT, EXCLUSIONS = 330, 360
 _REASON_SIGNS = 40
 _EXTRAS: Final = (
-    _Extra("wide", "Wide table: one row per participant"),
-    _Extra("parquet", "Every table also as Parquet"),
-    _Extra("sav", "Answers for SPSS, jamovi and JASP (.sav)"),
-    _Extra("psych-ds", "A Psych-DS folder with all tables, for sharing"),
+    Extra("wide", "Wide table: one row per participant"),
+    Extra("parquet", "Every table also as Parquet"),
+    Extra("sav", "Answers for SPSS, jamovi and JASP (.sav)"),
+    Extra("psych-ds", "A Psych-DS folder with all tables, for sharing"),
 )
 
 
@@ -443,8 +145,8 @@ class ResultsPlace(Place):
         self.unblind = ActionButton("eye", "Unblind …", height=44)
         self.export = ActionButton("download", "Export …", height=44)
         self.report = ActionButton("file", "Report …", role="primary", height=44)
-        self.sessions = _SessionsCard()
-        self.exclusions = _ExclusionsCard()
+        self.sessions = SessionsCard()
+        self.exclusions = ExclusionsCard()
         self.split = Choice()
         self.split.setAccessibleName("Groups")
         self.split.setFont(font("body"))
@@ -581,23 +283,7 @@ class ResultsPlace(Place):
 
     def _ask_unblind(self) -> None:
         running = sum(session.needs_care for session in self.view.sessions)
-        many = "1 session is" if running == 1 else f"{running} sessions are"
-        later = (
-            f"{many} not complete. Operators of the remaining sessions will no longer be blinded." if running else ""
-        )
-        dialog = Question(
-            self,
-            self.theme,
-            f"Unblind {self._study_name()}?",
-            "Everyone who opens this study will see which condition each code stands for, here and in every "
-            "table, figure and report. This cannot be undone. Your name, the reason and the time are stored "
-            "with the data.",
-            ActionButton("eye", "Unblind", role="danger"),
-            fields=_decision_fields("Name", "Your name or initials, such as AK", "collection closed"),
-            needs=_NEEDS,
-            warning=later,
-            width=QUESTION_PX,
-        )
+        dialog = unblind_question(self, self.theme, self._study_name(), running)
         decide = partial(self._order_decision, "unblinding the study", OpenKey)
         dialog.accepted.connect(lambda: decide(by=dialog.value("by"), reason=dialog.value("reason")))
         self._open_dialog(dialog)
@@ -625,26 +311,9 @@ class ResultsPlace(Place):
         self._open_dialog(dialog)
 
     def _ask_take_back(self, exclusion: Exclusion) -> None:
-        proposed = not exclusion.excluded_at
-        done = "Keep" if proposed else "Include again"
-        why = (
-            f"A rule proposed this exclusion: {exclusion.reason}. The data will remain in measures, figures and tests."
-            if proposed
-            else f"Reason for the exclusion: “{exclusion.reason}”. The data will be included again in measures, "
-            "figures and tests."
-        )
-        dialog = Question(
-            self,
-            self.theme,
-            f"{done}: {exclusion_text(exclusion)}",
-            f"{why} Your name, the reason and the time are stored in exclusions_reversed.jsonl.",
-            ActionButton("undo", done, role="primary"),
-            fields=_decision_fields("By", "Your name or initials, such as AK", "wrong participant"),
-            needs=_NEEDS,
-            width=QUESTION_PX,
-        )
+        dialog = take_back_question(self, self.theme, exclusion)
         which = {"participant": exclusion.participant, "session": exclusion.session, "trial": exclusion.trial}
-        which |= {"rule": exclusion.rule_or_person} if proposed else {}
+        which |= {"rule": exclusion.rule_or_person} if not exclusion.excluded_at else {}
         decide = partial(self._order_decision, "reversing the exclusion", TakeBack, **which)
         dialog.accepted.connect(lambda: decide(by=dialog.value("by"), reason=dialog.value("reason")))
         self._open_dialog(dialog)
