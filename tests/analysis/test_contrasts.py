@@ -22,9 +22,10 @@ from study_app.analysis.figures.level_figures import level_figure_tasks
 from study_app.analysis.levels.thresholds import Thresholds, thresholds_compared
 from study_app.analysis.levels.tracks import tracks
 from study_app.analysis.page_layout import draw_figures
-from study_app.analysis.planning.power_curves import Powers, detectable, power_markdown, powers, smallest_differences
+from study_app.analysis.planning.power_curves import Powers, power_markdown, powers
 from study_app.analysis.planning.preregistration import preregistration
 from study_app.analysis.planning.simulated_studies import count_findings, draw_opinions, plan, stacked_answers
+from study_app.analysis.planning.smallest_differences import detectable, smallest_differences
 from study_app.analysis.planning.threshold_studies import PrecisionResult, Precisions, threshold_markdown
 from study_app.analysis.report import write_report
 from study_app.analysis.report.first_page import Presented, cards, first_page

@@ -15,7 +15,6 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, PercentFormatter
-from scipy.special import stdtrit
 
 from study_app import __version__
 from study_app import figure_style as style
@@ -23,6 +22,7 @@ from study_app.analysis.contrasts import equality_limits, inclusion_words
 from study_app.analysis.data.blocks import TRENDS
 from study_app.analysis.data.measures import Array
 from study_app.analysis.page_layout import SMALL, Style
+from study_app.analysis.planning import WANTED
 from study_app.analysis.planning.simulated_studies import (
     EFFECTS,
     FULL,
@@ -34,11 +34,10 @@ from study_app.analysis.planning.simulated_studies import (
     contrast_sides,
     draw_opinions,
 )
+from study_app.analysis.planning.smallest_differences import form_differences, size_text, smallest_differences
 from study_app.analysis.results import min_sample_reason
-from study_app.analysis.statistics.equivalence import STEPS, fewest_participants
-from study_app.analysis.statistics.mean_tests import equivalence_power, smallest_shift
+from study_app.analysis.statistics.equivalence import STEPS
 from study_app.analysis.wording import bound_text, listed, whole_percent
-from study_app.protocol.model import Contrast
 from study_app.protocol.participants import CONSISTENT, NOISY, STATED
 from study_app.psychophysics.grid import Z_95
 from study_app.store.files import Column, csv_bytes, optional, write_files
@@ -47,12 +46,6 @@ Question: TypeAlias = Literal["settings differ", "trend", "lowest delay", "equiv
 
 _MANY: Final = 200
 """So many simulated participants tell how far people differ."""
-
-WANTED: Final = 0.8
-"""The power that "smallest detectable effect" and "participants needed" are about."""
-
-MOST_SD: Final = 3.0
-"""Sample sizes that only find a larger difference, in standard deviations, are too few. [choice]"""
 
 _OVER_ALL: Final = "all statements at once"
 
@@ -518,181 +511,9 @@ def _between(power: Powers) -> Iterator[str]:
         yield from form_differences(contrast, power.sizes, alpha, members, of_groups, planned, titles)
 
 
-def form_differences(
-    contrast: Contrast,
-    sizes: Sequence[int],
-    alpha: float,
-    members: int,
-    shares: tuple[float, float] | None,
-    planned: int | None,
-    titles: Mapping[str, str],
-) -> Iterator[str]:
-    """Yield the table of a contrast of a form in standard deviations, which no answer model predicts.
-
-    The parameters are those of `smallest_differences`.
-    """
-    of = "answers or scores" if contrast.within is None else "within-participant differences"
-    said = (
-        f"Answers to this form are not simulated. Differences are expressed in standard deviations (SD) of the {of}; "
-        "you can obtain the SD from pilot sessions or published data."
-    )
-    rows = [(contrast.measure, "1", 1.0)]
-    yield from smallest_differences(
-        contrast,
-        sizes,
-        alpha,
-        members,
-        rows,
-        "question or score",
-        said,
-        "±{:.2f} SD".format,
-        shares,
-        planned=planned,
-        titles=titles,
-    )
-
-
 def _bounds(plan: Plan) -> int:
     """Return the number of hypotheses with an equivalence bound."""
     return sum(contrast.bound is not None for contrast in plan.contrasts) + plan.untested_bounds
-
-
-def _group_sizes(first: float, second: float) -> str:
-    """Return the sentence on the shares of participants in two groups."""
-    if whole_percent(first) == whole_percent(second):
-        return f"Each group contains {whole_percent(first)} of the participants."
-    return f"The two groups contain {whole_percent(first)} and {whole_percent(second)} of the participants."
-
-
-def smallest_differences(
-    contrast: Contrast,
-    sizes: Sequence[int],
-    alpha: float,
-    members: int,
-    rows: Sequence[tuple[str, str, float]],
-    first: str,
-    said: str,
-    written: Callable[[float], str],
-    shares: tuple[float, float] | None = None,
-    bound: float | None = None,
-    *,
-    bounds: int = 1,
-    largest: float | None = None,
-    planned: int | None = None,
-    assumed: tuple[str, float] | None = None,
-    unit: str = "",
-    titles: Mapping[str, str],
-) -> Iterator[str]:
-    """Yield a Markdown table of the smallest difference in a contrast that 80 % of studies show.
-
-    It is one of ``members`` hypotheses, tested at the strictest p of Holm's correction. ``rows`` are its first cell,
-    below the heading ``first``, and the standard deviation as text and as a number; ``said`` describes it. ``shares``
-    are the shares of participants in the two groups; None: within participants. ``bound`` is the equivalence bound, on
-    the scale of the standard deviation, which ``bounds`` hypotheses state; ``largest`` is the largest difference of a
-    participant that the scale permits, None without a limit. ``planned`` participants have a verdict before the table;
-    ``assumed`` is a measure that can fall to 0 with its simulated mean; ``unit`` follows the difference in the verdict;
-    ``titles`` are those of the blocks.
-    """
-
-    def titled(names: tuple[str, str] | None) -> tuple[str, str] | None:
-        return None if names is None else (titles.get(names[0], names[0]), titles.get(names[1], names[1]))
-
-    def directed(end: float) -> str:
-        """Return a difference without the sign of the other direction, which a one-sided test cannot detect."""
-        if contrast.expected is None:
-            return written(end)
-        return written(end).replace("×/÷", "×" if contrast.expected == "higher" else "÷").removeprefix("±")
-
-    def groups_of(n: int) -> list[int]:
-        return [n] if shares is None else [int(n * share + 1e-9) for share in shares]
-
-    def differences(n: int, spread: float) -> tuple[float, float] | None:
-        if min(groups := groups_of(n)) < 3:
-            return None
-        half, least = detectable(*groups, alpha=strictest, expected=contrast.expected)
-        return None if least > MOST_SD else (half * spread, least * spread)
-
-    equal = [] if bound is None else [f"shown to be equivalent {IF_EQUAL}"]
-    heads = (first, "participants", "SD", "half-width of the 95 % interval", "smallest difference", *equal)
-    sides, strictest = "two-sided" if contrast.expected is None else "one-sided", alpha / members
-    corrected = "" if members == 1 else f" ({alpha:.2g} divided by {members} hypotheses)"
-    both = "" if shares is None else f" {_group_sizes(*shares)}"
-    named = contrast.described(titled(contrast.compared), titled(contrast.within))
-    yield from ("", f"## Contrast: {named}", "")
-    at = f"{sides}, α = {strictest:.2g}{corrected}"
-    within = (
-        ""
-        if bound is None
-        else f"Equivalence requires at least {fewest_participants(alpha / bounds, bound, largest)} "
-        f"participants{' in each group' if shares else ''}, at α = {alpha / bounds:.2g}. "
-    )
-    has_too_few = any(differences(n, spread) is None for n in sizes for *_, spread in rows)
-    unusable = (
-        f"“Too few” means that fewer than {whole_percent(WANTED)} of studies would detect even a difference of "
-        f"{MOST_SD:g} SD. " * has_too_few
-    )
-    yield (
-        f"{said}{both} The “smallest difference” is the difference that {whole_percent(WANTED)} of studies detect "
-        f"({at}). {unusable}{within}{inclusion_words([contrast])}"
-    )
-    if planned is not None:
-        name, _, spread = rows[0]
-        given = f" ({first}: {name})" if len(rows) > 1 else ""
-        yield from (
-            "",
-            _verdict(contrast, planned, given, differences(planned, spread), lambda end: directed(end) + unit, assumed),
-        )
-    yield from ("", f"| {' | '.join(heads)} |", "|---:" * len(heads) + "|")
-    for name, words, spread in rows:
-        for n in sizes:
-            reached, groups = differences(n, spread), groups_of(n)
-            ends = ["too few", "too few"] if reached is None else [written(reached[0]), directed(reached[1])]
-            if bound is not None:
-                enough_people = min(groups) >= fewest_participants(alpha / bounds, bound, largest)
-                share = equivalence_power(*groups, alpha=alpha / bounds, bound=bound / spread) if enough_people else 0.0
-                ends.append(whole_percent(share))
-            yield f"| {name} | {size_text(n, planned)} | {words} | {' | '.join(ends)} |"
-
-
-def _verdict(
-    contrast: Contrast,
-    planned: int,
-    given: str,
-    reached: tuple[float, float] | None,
-    written: Callable[[float], str],
-    assumed: tuple[str, float] | None,
-) -> str:
-    """Return the smallest difference that the planned sample finds, compared with a measure that falls to 0."""
-    of = "" if assumed is None else f" in {assumed[0]}"
-    too_few = f"The planned {planned} participants{given} are too few to find a difference{of}"
-    if reached is None:
-        return f"**{too_few} of {MOST_SD:g} SD with {whole_percent(WANTED)} power.**"
-    _, least = reached
-    verdict = f"**{too_few} smaller than {written(least)} with {whole_percent(WANTED)} power.**"
-    if assumed is None or least <= assumed[1]:
-        return verdict
-    measure, mean = assumed
-    where = "one group" if contrast.within is None else "one block of one group" if contrast.groups else "one block"
-    return (
-        f"{verdict} Fewer than {whole_percent(WANTED)} of studies would detect even a decrease in {measure} from "
-        f"{mean:g} to 0 in {where} (a difference of {mean:g})."
-    )
-
-
-def size_text(n: int, planned: int | None) -> str:
-    """Return a number of participants in a table, marked if it is the planned one."""
-    return f"{n} (planned)" if n == planned else str(n)
-
-
-def detectable(n: int, second: int | None = None, *, alpha: float, expected: str | None) -> tuple[float, float]:
-    """Return half the 95 % interval and the smallest mean difference that 80 % of studies detect [SD].
-
-    The studies have ``n`` pairs, or two groups of ``n`` and ``second`` participants, whose t has the degrees of freedom
-    of the smaller group; a hypothesis without an ``expected`` direction is tested on both sides.
-    """
-    sizes, alternative = (n,) if second is None else (n, second), "two-sided" if expected is None else "greater"
-    half = float(stdtrit(min(sizes) - 1, 0.975)) * math.sqrt(sum(1 / size for size in sizes))
-    return half, smallest_shift(*sizes, alpha=alpha, alternative=alternative, power=WANTED)
 
 
 def _truly_equal(curves: Sequence[Curve]) -> list[Curve]:

@@ -16,15 +16,9 @@ import numpy as np
 from study_app import __version__
 from study_app.analysis.data.blocks import decisions
 from study_app.analysis.data.measures import Array
-from study_app.analysis.planning.power_curves import (
-    OF_BLOCK,
-    OF_STUDIES,
-    form_differences,
-    interval,
-    size_text,
-    smallest_differences,
-)
+from study_app.analysis.planning.power_curves import OF_BLOCK, OF_STUDIES, interval
 from study_app.analysis.planning.simulated_studies import group_shares
+from study_app.analysis.planning.smallest_differences import form_differences, size_text, smallest_differences
 from study_app.analysis.statistics.outcome import student_interval
 from study_app.analysis.statistics.thresholds import FEWEST, group_mean
 from study_app.analysis.wording import whole_percent

@@ -26,8 +26,9 @@ from study_app.analysis.html_page import bullets, drawn_figure, heading, paragra
 from study_app.analysis.levels.evaluate import level_findings, level_limits, level_section
 from study_app.analysis.page_layout import Picture
 from study_app.analysis.planned_exclusions import PlannedExclusions, rule_sentences
-from study_app.analysis.planning.power_curves import MOST_SD, WANTED, detectable
+from study_app.analysis.planning import WANTED
 from study_app.analysis.planning.power_curves import interval as share_interval
+from study_app.analysis.planning.smallest_differences import MOST_SD, detectable
 from study_app.analysis.questions import MEASURES
 from study_app.analysis.report.methods import late_exclusions
 from study_app.analysis.report.questions_in_full import changed_questions

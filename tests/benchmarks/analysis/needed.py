@@ -14,7 +14,8 @@ import numpy as np
 
 from study_app.analysis.findings.finding import FOUND
 from study_app.analysis.findings.statement_tests import DelayTrend, SettingsDiffer
-from study_app.analysis.planning.power_curves import WANTED, interval, powers
+from study_app.analysis.planning import WANTED
+from study_app.analysis.planning.power_curves import interval, powers
 from study_app.analysis.planning.simulated_studies import draw_opinions, plan, sweep
 from study_app.analysis.results import Failures
 from study_app.evidence.report_rates.simulation import report
