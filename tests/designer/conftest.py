@@ -7,8 +7,9 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from PySide6.QtWidgets import QFileDialog
 
-from tests.designer.support.designer import Designer
+from tests.designer.support.designer import DEMO, Designer
 from tests.designer.support.story import NEVER_MS, Story
 
 
@@ -33,6 +34,19 @@ def story(designer: Designer, monkeypatch: pytest.MonkeyPatch) -> Callable[..., 
     for module in ("header", "window"):
         monkeypatch.setattr(f"study_app.designer.{module}.announce", lambda _by, words: spoken.append(words))
     return partial(Story, designer, spoken)
+
+
+@pytest.fixture
+def tell_story(story: Callable[..., Story], monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
+    """Return the function that tells a story about the demo or another study, and then undoes and redoes every step."""
+
+    def tell_and_undo(tell: Callable[[Story], None], text: str = DEMO) -> None:
+        begun = story(text)
+        monkeypatch.setattr(QFileDialog, "getOpenFileName", lambda *_: (str(begun.designer.file), ""))
+        tell(begun)
+        begun.undo_and_redo()
+
+    return tell_and_undo
 
 
 @pytest.fixture(params=["special editors", "no special editors"])
