@@ -95,8 +95,22 @@ def test_a_merged_study_names_each_participant_and_exclusion_with_the_site(sites
         merged.refuse_merged(sites)
 
 
+SITE = {"name": "north", "merged_at": AT, "key_hash": "a" * 64, "sessions": 7, "withdrawals": 1}
+
+
 @pytest.mark.parametrize(
-    "change", [{"sites": []}, {"protocol_hash": 7}, {"study": "../x"}, {"sites": [{"name": "north"}]}, {"study": 7}]
+    "change",
+    [
+        {"sites": []},
+        {"protocol_hash": 7},
+        {"study": "../x"},
+        {"sites": [{"name": "north"}]},
+        {"study": 7},
+        *(
+            {"sites": [SITE | {name: wrong}]}
+            for name, wrong in (("name", "a-b"), ("merged_at", "noon"), ("key_hash", 7), ("sessions", "7"))
+        ),
+    ],
 )
 def test_an_invalid_list_of_sites_is_refused(sites: Path, change: dict[str, Any]) -> None:
     path = sites / "sites.json"
@@ -115,7 +129,7 @@ def test_a_site_that_is_a_link_is_named_with_its_place(sites: Path, tmp_path: Pa
 
 def test_a_decision_of_a_person_or_a_rule_is_reversed_with_its_own_words(tmp_path: Path) -> None:
     """Missing trials exclude no session that a person included again; what was kept despite another rule they do."""
-    for participant in ("P007", "P008", "P009"):
+    for participant in ("P007", "P008", "P009", "P011"):
         (tmp_path / "data" / f"sub-{participant}" / "ses-02").mkdir(parents=True)
     for participant in ("P007", "P008"):
         exclusions.exclude_incomplete(tmp_path, participant, 2, f"{participant} lacks trials")
@@ -142,8 +156,20 @@ def test_a_decision_of_a_person_or_a_rule_is_reversed_with_its_own_words(tmp_pat
         exclusions.include(tmp_path, "P010", 2, trial=4, by="AB", reason="no")
     with pytest.raises(StoreError, match=r"session 1 of participant P007; sessions of that participant: 2$"):
         exclusions.exclude(tmp_path, "P007", 1, by="AB", reason="no")
-    with pytest.raises(StoreError, match=r"session 1 of participant P1; participants: P007, P008, P009$"):
+    with pytest.raises(StoreError, match=r"session 1 of participant P1; participants: P007, P008, P009, P011$"):
         exclusions.exclude(tmp_path, "P1", 1, by="AB", reason="no")
+    with pytest.raises(StoreError, match=r"^fast_answers is an exclusion rule, not a person"):
+        exclusions.exclude(tmp_path, "P011", 2, by="fast_answers", reason="no")
+    with pytest.raises(StoreError, match="does not contain session 3 of participant P009"):
+        exclusions.keep(tmp_path, "P009", 3, rule="fast_answers", by="CD", reason="no")
+    (tmp_path / "blinding").mkdir()
+    opened = {"at": AT, "by": "GH", "reason": "analysis", "key_hash": "a" * 64}
+    (tmp_path / "blinding" / "reveals.jsonl").write_text(f"{json.dumps(opened)}\n", encoding="utf-8", newline="\n")
+    exclusions.keep(tmp_path, "P011", 2, rule="fast_answers", by="IJ", reason="read twice")
+    decisions = exclusions.dated_reversals(tmp_path)
+    assert [(it.exclusion.participant, it.by, it.reason, it.key_open) for it in decisions] == [
+        ("P007", "AB", "enough trials", False), ("P009", "CD", "read aloud", False), ("P011", "IJ", "read twice", True),
+    ]  # fmt: skip
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 import json
 import logging
+import os
 import zipfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -72,6 +73,11 @@ def test_nothing_of_a_study_is_in_it(
     (session / "journal.jsonl").write_text(
         f'{{"participant": "{ID}", "value": "{ANSWER}"}}\n', encoding="utf-8", newline="\n"
     )
+    for number in (2, 3, 4, 5):
+        path = session.with_name(f"ses-0{number}") / "crash.txt"
+        path.parent.mkdir()
+        path.write_text(f'  File "/x/study_app/a.py", line {number} in b\n', encoding="utf-8", newline="\n")
+        os.utime(path, (1000 * number, 1000 * number))
     (session / "crash.txt").write_text(
         "Fatal Python error: Segmentation fault\n\nCurrent thread 0x00007f (most recent call first):\n"
         f'  File "/opt/tester-home/study_app/app/session/bridge.py", line 12 in start\n{ID} {DENSITY}\n',
@@ -89,6 +95,9 @@ def test_nothing_of_a_study_is_in_it(
             recent=("/x/tester-home/own.toml",),
             camera=CAMERA,
             benches=(bench,),
+            proofs="/x/tester-home/proofs",
+            stamps="https://camerist:se@cr/3t@stamps.example.org",
+            stamp_root="/x/tester-home/root.pem",
         )
     )
     plant(caplog)
@@ -99,7 +108,8 @@ def test_nothing_of_a_study_is_in_it(
     everything = "\n".join((*found, *found.values()))
     assert [word for word in PLANTED if word in everything] == []
     assert set(found) == {
-        *("README.txt", "versions.json", "settings.json", "log.txt", "last-error.txt", "diagnosis.txt", "crash-1.txt")
+        *("README.txt", "versions.json", "settings.json", "log.txt", "last-error.txt", "diagnosis.txt"),
+        *(f"crash-{number}.txt" for number in (1, 2, 3)),
     }
     assert "tests/store/test_support.py" not in everything  # outside the package: the file's name alone
     assert "the session failed: ValueError" in found["log.txt"]
@@ -108,9 +118,11 @@ def test_nothing_of_a_study_is_in_it(
     assert "in fails" in found["last-error.txt"]
     assert found["diagnosis.txt"] == f"1  FOUND  no reply, see {Path('~/results/bench.md')}\n"
     assert '"study_app/app/session/bridge.py"' in found["crash-1.txt"]
+    older = [found[f"crash-{number}.txt"] for number in (2, 3)]
+    assert older == [f'  File "study_app/a.py", line {number} in b' for number in (5, 4)]
     settings = json.loads(found["settings.json"])
-    private = [settings[name] for name in ("operator", "workspace", "firmware", "recent", "camera")]
-    assert (private, settings["device"]) == ([True] * 5, "mouse")
+    names = ("operator", "workspace", "firmware", "recent", "camera", "proofs", "stamps", "stamp_root")
+    assert ({settings[name] for name in names}, settings["device"], "problem" in settings) == ({True}, "mouse", False)
     assert settings["benches"][0]["mass_kg"] == list(axes)
     assert json.loads(found["versions.json"]).keys() >= {"liquid-study", "python", "system", "numba", "pyusb"}
 

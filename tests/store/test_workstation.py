@@ -4,6 +4,7 @@ import json
 import math
 import os
 import sys
+from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -14,6 +15,7 @@ from study_app.store.workstation import (
     DEFAULTS,
     LEAST_X_HEIGHT_DEG,
     STATEMENT_X_HEIGHT_PX,
+    DeviceBench,
     DisplayOffset,
     MachineSettings,
     keep_workspace,
@@ -22,7 +24,7 @@ from study_app.store.workstation import (
     remember_protocol,
     save_settings,
 )
-from study_app.workspace import Workspace
+from study_app.workspace import Workspace, workspace
 
 OFFSET = DisplayOffset(mean_ms=23.5, spread_ms=1.2, how="photodiode", measured="2026-11-20", screen="DP-1")
 ALL = MachineSettings(
@@ -76,6 +78,32 @@ def test_recent_protocols_are_those_that_still_exist_newest_first(tmp_path):
     assert recent_protocols() == (str(files[2]), str(files[0]))
 
 
+def test_only_the_newest_eight_protocols_outside_the_workspace_are_recent(tmp_path):
+    inside = workspace().protocols / "inside.toml"
+    for file in (*(tmp_path / f"{number}.toml" for number in (*range(10), 4)), inside):
+        remember_protocol(file)
+    assert [Path(name).stem for name in load_settings().recent] == ["4", "9", "8", "7", "6", "5", "3", "2"]
+
+
+def test_a_measurement_replaces_that_of_the_same_device_alone():
+    zeros = dict.fromkeys(("mass_kg", "damping_nspm", "friction_n", "delay_ms", "stable_nspm"), (0.0, 0.0, 0.0))
+    made = (("falcon", "7", "Monday"), ("falcon", "8", "Tuesday"), ("mouse", "", "Friday"), ("falcon", "7", "Sunday"))
+    settings = DEFAULTS
+    for name, serial, day in made:
+        settings = settings.with_bench(DeviceBench(name=name, serial=serial, measured=day, **zeros))
+    assert [bench.measured for bench in settings.benches] == ["Sunday", "Friday", "Tuesday"]
+    described = ({"name": "falcon", "serial": "8"}, {"name": "mouse", "serial": None}, {"name": "falcon"})
+    assert [getattr(settings.bench_of(device), "measured", None) for device in described] == ["Tuesday", "Friday", None]
+
+
+@pytest.mark.parametrize(
+    ("name", "number", "place"), [("B", 3, 3), ("B", None, 2), ("B", 1, 2), ("D", 1, 4), ("", 1, 4)]
+)
+def test_the_participants_screen_is_found_by_name_and_number(name, number, place):
+    settings = MachineSettings(screen=name, screen_number=number)
+    assert settings.screen_among(["A", "B", "B", "C"]) == place
+
+
 def test_a_chosen_workspace_is_created_and_kept_with_the_other_settings(tmp_path):
     save_settings(ALL)
     keep_workspace(Workspace(tmp_path / "new"))
@@ -113,4 +141,7 @@ def test_the_receipt_gets_the_offset_of_the_screen_it_was_measured_on_alone():
     assert there["display_offset"] == {"mean_ms": 23.5, "spread_ms": 1.2, "how": "photodiode", "measured": "2026-11-20"}
     assert elsewhere["display_offset"] is None
     assert (there["viewing_distance_mm"], there["width_mm"], there["width_measured"]) == (620, 527.5, True)
+    assert (there["photodiode_patch"], there["text_scale"]) == (False, 1.804)  # by hand: 4.329 mm for 2.400 mm
     assert json.loads(json.dumps(there)) == there
+    unmeasured = DEFAULTS.describe("DP-1", 1920, 500.04)
+    assert (unmeasured["width_mm"], unmeasured["width_measured"], unmeasured["text_scale"]) == (500.0, False, 1.0)
