@@ -16,7 +16,7 @@ import pytest
 
 from study_app.errors import StoreError, StudyError
 from study_app.protocol.trials.stimuli import Stimulated
-from study_app.store import exclusions, merged, receipt
+from study_app.store import exclusions, merged, receipt, withdrawals
 from study_app.store.blinded import blinding
 from study_app.store.exclusions import Exclusion
 from study_app.store.files import atomic, csv_files, output_files
@@ -125,6 +125,52 @@ def test_a_site_that_is_a_link_is_named_with_its_place(sites: Path, tmp_path: Pa
     (sites / "sites" / "north").symlink_to(tmp_path / "away")
     with pytest.raises(StoreError, match=f"^{sites / 'sites' / 'north'} is a link to {tmp_path / 'away'}, .*{sites}:"):
         merged.read_merged(sites)
+
+
+def test_a_withdrawal_reaches_what_names_the_participant_and_nothing_of_others(
+    sites: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """P0071 stays; what was made from the merged study goes, too."""
+    monkeypatch.setenv("LIQUID_STUDY_DATA", str(tmp_path / "user"))
+    monkeypatch.setenv("LIQUID_STUDY_WORKSPACE", str(tmp_path))
+    north, results = sites / "sites" / "north", tmp_path / "results"
+    study, participants = StudyFolder(north), ("P007", "P0071")
+    results.mkdir()
+    study.session("P0071", 1).path.mkdir(parents=True)
+    lists = {
+        study.description: ['{"name": "stirring"}'],
+        study.ignore: ["rebuilt.txt"],
+        study.fingerprints: [f"k3vq-7m2p-xw4d  data/sub-{participant}/ses-01" for participant in participants],
+        study.reversed_exclusions: [json.dumps({"exclusion": {"participant": it}}) for it in participants],
+        study.participants("stirring"): ["study,participant", "stirring,P0071"],
+        north / "notes.txt": ["(P007) was late"],
+        north / "other.txt": ["P0071 and XP007 were early"],
+        results / "old.ZIP": [],
+    }
+    for path, lines in lists.items():
+        path.write_text("".join(f"{line}\n" for line in lines), encoding="utf-8", newline="\n")
+    output_files.write_output(sites, tmp_path / "report", {"report.html": b"P007"})
+    assert list(withdrawals.unerased_files(study, "P007")) == [
+        north / "data" / "sub-P007", study.exclusions, study.fingerprints, study.reversed_exclusions,
+    ]  # fmt: skip
+    done = withdrawals.withdraw(north, "P007", by="AB", reason="asked")
+    assert (done.folders, done.outputs) == ((north,), (tmp_path / "report" / "report.html",))
+    assert list(done.left) == [
+        f"{north / 'notes.txt'} still names P007",
+        f"{results / 'old.ZIP'} is an archive, which is not searched: delete it if it contains data from P007",
+    ]
+    assert list(withdrawals.unerased_files(study, "P007")) == []
+    assert (study.exclusions.read_text("utf-8"), study.ids()) == (COLUMNS, ("P0071",))
+    for path in (study.fingerprints, study.reversed_exclusions):
+        assert path.read_text("utf-8").splitlines() == lists[path][1:]
+    assert withdrawals.withdraw(north, "P007", by="CD", reason="again").folders == ()
+    assert study.ignore.read_text("utf-8").splitlines() == ["rebuilt.txt", "withdrawals.jsonl"]
+    assert [(it.participant, it.by, it.reason) for it in withdrawals.tombstones(study).values()] == [
+        ("P007", "AB", "asked"),
+    ]  # fmt: skip
+    study.withdrawals.write_bytes(study.withdrawals.read_bytes().replace(b'"at": "', b'"at": "on '))
+    with pytest.raises(StoreError, match="line 1 is not a withdrawal"):
+        withdrawals.tombstones(study)
 
 
 def test_a_decision_of_a_person_or_a_rule_is_reversed_with_its_own_words(tmp_path: Path) -> None:
