@@ -99,6 +99,34 @@ def test_each_further_attempt_at_a_trial_of_intervals_has_its_reason() -> None:
     assert progress.invalid == 1
 
 
+def test_what_the_operator_is_told_of_a_trial_is_forgotten_when_it_is_repeated() -> None:
+    progress, which = Progress(), {"trial": 4, "attempt": 2}
+    answer = {"item": "which", "value": "second", "onset_s": 20.0, "first_s": 21.5, "last_s": 22.75}
+    measured = {"device_delay_ticks": 4, "loop_delay_ticks": 1}
+    for line in (
+        event_of("session_started", limits={"lateness_ms": 2.0}),
+        event_of("trial_started", t_s=10.0, phase="main", arrangement="SC", block="b", code="V1", **which),
+        event_of("interval_ended", t_s=14.0, interval=1, invalid=["level_error_percent"], **which, **measured),
+        event_of("trial_ended", t_s=17.0, outcome="complete", lateness_p99_ms=2.5, **which),
+        event_of("responses", t_s=23.0, items=[answer], **which),
+        event_of("recorded", t_s=24.0, samples_unrecorded=7, **which),
+        event_of("recording_lost", t_s=25.0, trial=5, attempt=1, reason="no space"),
+        event_of("session_resumed", t_s=125.0),
+        event_of("note", t_s=130.0, kind="note", text="coughed"),
+    ):
+        progress.process_line(line)
+    told = progress.trial_answers[4]
+    assert (told.value, told.seconds, progress.answered) == ("second", 1.5, {4: 1})
+    assert (progress.broken[4], progress.undelivered) == (
+        (("lateness_p99_ms", 2.5, 2.0),), {4: ("level_error_percent",)},
+    )  # fmt: skip
+    assert progress.late == {4: "the device answered after 4 ticks, but the servo assumes 1 tick"}
+    assert (progress.lacking, progress.lost) == ({4: 7}, {5: "no space"})
+    assert [(note.text, note.t_s) for note in progress.notes] == [("coughed", 130.0 - 100.0)]
+    progress.process_line(event_of("repeat", t_s=131.0, trial=4, reason="noise"))
+    assert (progress.trial_answers, progress.broken, progress.late, progress.answered) == ({}, {}, {}, {})
+
+
 @pytest.mark.parametrize(
     ("limits", "invalid", "missing"), [({"attempts": 3.0}, 2, 0), ({"attempts": 3.0}, 3, 1), ({}, 1, 1)]
 )

@@ -192,6 +192,7 @@ def test_catch_trials_are_judged_block_by_block(finished: Start, monkeypatch: py
     titles = {name: {"phase": "main", "title": {"en": f"{name} pairs"}, "catch": 1} for name in blocks}
     published = {"study": {"languages": ["en"]}, "blocks": titles}
     missed = {1: ("easy", 0), 2: ("easy", 0), 3: ("easy", 0), 4: ("hard", 1), 5: ("hard", 0), 6: ("hard", 1)}
+    missed[7] = ("easy", 1)  # one of four is just permitted
     lines = [event_of("trial_started", trial=number, block=block) for number, (block, _) in missed.items()]
     results = [SimpleNamespace(trial=number, catch=True, correct=not wrong) for number, (_, wrong) in missed.items()]
     monkeypatch.setattr(module.receipt, "read", lambda _: {"protocol": published})

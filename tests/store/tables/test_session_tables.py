@@ -169,12 +169,15 @@ def test_notes_of_a_reconnected_device_stand_beside_the_trials_before_and_after(
     script.started(1, 2)
     script.ended(1, 2)
     script.line("repeat", trial=1, reason="noise")
+    script.line("device_reconnected")
     script.started(2)
-    script.note("note", "coughed")
     script.note("mark", "laughed")
+    script.note("note", "coughed")
     rows = SessionRows(script._lines).trials
     failed = "the device failed and was reconnected (the cable)"
-    assert [row["notes"] for row in rows] == [failed, f"presented again: {failed}\nrepeated: noise", "coughed\nlaughed"]
+    assert [row["notes"] for row in rows] == [
+        failed, f"presented again: {failed}\nrepeated: noise\n{failed}", "laughed\ncoughed",
+    ]  # fmt: skip
     assert [row["marked"] for row in rows] == [False, False, True]
 
 
