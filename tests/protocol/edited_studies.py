@@ -1,11 +1,13 @@
-"""Studies with edits, and what `check` says of each, in files that people review: ``--regenerate`` writes them anew.
+"""Studies with edits, and what `check` says of each, in files that people review.
 
 A file of ``cases`` names its study in the first line. A case is a name (``=== name``), lines that are replaced (``-``)
-by others (``+``), ``...`` between two replacements, and what is said (``>``): every problem, or "accepted" and the
-lines of the description that the description of the study without edits does not have.
+by others (``+``), ``...`` between two replacements, and what is said. Lines with ``!`` are assertions, which people
+change by hand: every problem, or "accepted" and the warnings. ``--regenerate`` rewrites the lines with ``>``: those of
+the description that the description of the study without edits does not have, and warnings with simulated numbers.
 """
 
-from collections.abc import Iterator
+import re
+from collections.abc import Iterable, Iterator
 from functools import cache
 from pathlib import Path
 from typing import NamedTuple
@@ -25,13 +27,29 @@ FILES = every(
 )
 
 
+_ASSERTED = re.compile(
+    r"accepted$|line \d+: |format: |(?:analysis|blocks|designs|methods|pages|questionnaires|study|tasks)\.[\w.]+: "
+    r"(?!.* yield ±)"
+)
+"""A problem, a warning without simulated numbers, or "accepted"."""
+
+
+def split(said: Iterable[str]) -> tuple[list[str], list[str]]:
+    """Return the lines that are asserted, and those that are recorded."""
+    asserted, recorded = list[str](), list[str]()
+    for line in said:
+        (asserted if _ASSERTED.match(line) else recorded).append(line)
+    return asserted, recorded
+
+
 class Case(NamedTuple):
-    """A study with edits and what is said of it."""
+    """A study with edits, and the asserted and the recorded lines that are said of it."""
 
     study: str
     name: str
     edits: tuple[tuple[str, str], ...]
-    said: tuple[str, ...]
+    asserted: tuple[str, ...]
+    recorded: tuple[str, ...]
 
     @property
     def text(self) -> str:
@@ -74,9 +92,9 @@ def cases_of(file: Path) -> Iterator[Case]:
     assert parts, f"{file} has no cases"
     for part in parts:
         name, *lines = part.removesuffix("\n").split("\n")
-        edits = "\n".join(line for line in lines if not line.startswith(">")).split("\n...\n")
-        said = tuple(line.removeprefix("> ") for line in lines if line.startswith(">"))
-        yield Case(head.removeprefix("study: ").strip(), name, tuple(map(_edit, edits)), said)
+        edits = "\n".join(line for line in lines if not line.startswith(("!", ">"))).split("\n...\n")
+        said = (tuple(line[2:] for line in lines if line.startswith(sign)) for sign in "!>")
+        yield Case(head.removeprefix("study: ").strip(), name, tuple(map(_edit, edits)), *said)
 
 
 def _edit(hunk: str) -> tuple[str, str]:
@@ -85,12 +103,13 @@ def _edit(hunk: str) -> tuple[str, str]:
 
 
 def regenerate(file: Path) -> None:
-    """Write what is said of each case anew."""
+    """Write the recorded lines of each case anew."""
     cases = list(cases_of(file))
     parts = [f"study: {cases[0].study}\n"]
     for case in cases:
         edits = "...\n".join(_signed("-", old) + _signed("+", new) for old, new in case.edits)
-        said = "".join(f"> {line}\n" for line in said_of(case.text, case.study))
+        _, recorded = split(said_of(case.text, case.study))
+        said = "".join([*(f"! {line}\n" for line in case.asserted), *(f"> {line}\n" for line in recorded)])
         parts.append(f"=== {case.name}\n{edits}{said}")
     file.write_text("\n".join(parts), encoding="utf-8", newline="\n")
 

@@ -25,7 +25,7 @@ ACCEPTED = {
         f"{file.stem}: {case.name}": case.text
         for file in FILES
         for case in cases_of(file)
-        if case.said[0] == "accepted"
+        if case.asserted[0] == "accepted"
     },
 }
 
