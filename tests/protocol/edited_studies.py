@@ -1,9 +1,9 @@
 """Studies with edits, and what `check` says of each, in files that people review.
 
 A file of ``cases`` names its study in the first line. A case is a name (``=== name``), lines that are replaced (``-``)
-by others (``+``), ``...`` between two replacements, and what is said. Lines with ``!`` are assertions, which people
-change by hand: every problem, or "accepted" and the warnings. ``--regenerate`` rewrites the lines with ``>``: those of
-the description that the description of the study without edits does not have, and warnings with simulated numbers.
+by others (``+``), ``...`` between two replacements, and what is said: every problem, or "accepted" and the lines of the
+description that the description of the study without edits does not have. Lines with ``!`` are assertions, which people
+change by hand; ``--regenerate`` rewrites the lines with ``>``, whose numbers are simulated.
 """
 
 import re
@@ -27,18 +27,15 @@ FILES = every(
 )
 
 
-_ASSERTED = re.compile(
-    r"accepted$|line \d+: |format: |(?:analysis|blocks|designs|methods|pages|questionnaires|study|tasks)\.[\w.]+: "
-    r"(?!.* yield ±)"
-)
-"""A problem, a warning without simulated numbers, or "accepted"."""
+_SIMULATED = re.compile(r"Expected precision |.* yield ±|.* holds back about ")
+"""A line with numbers of simulated participants or motions."""
 
 
 def split(said: Iterable[str]) -> tuple[list[str], list[str]]:
     """Return the lines that are asserted, and those that are recorded."""
     asserted, recorded = list[str](), list[str]()
     for line in said:
-        (asserted if _ASSERTED.match(line) else recorded).append(line)
+        (recorded if _SIMULATED.match(line) else asserted).append(line)
     return asserted, recorded
 
 

@@ -21,12 +21,14 @@ from study_app.designer.measures.simulation import Simulated
 from study_app.designer.measures.study_facts import facts
 from study_app.designer.outline import addable_elements, outline_rows
 from study_app.designer.problems import fault_rows
+from study_app.protocol.source.document import value_at
 from tests.designer.document.grown import PROTOCOLS
 from tests.designer.document.test_commands import edited, elements, studies
 from tests.designer.support.designer import DEMO
 from tests.golden import check_kept, compare, each_once
 from tests.golden_values import one_line, value_lines
 from tests.protocol.edited_studies import CASES, cases_of
+from tests.protocol.sound import SOUND
 
 GOLDEN = File(__file__).parent / "golden"
 SINGLE = ("study", "sequence", "device", "scene", "limits", "analysis")
@@ -138,6 +140,27 @@ def test_each_repair_removes_its_problem_and_undo_gives_the_text_back(name: str,
                 words.append(repair.words)
     assert words
     compare(GOLDEN / f"repairs_in_{name}.txt", each_once(words), pytestconfig)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "place", "value"),
+    [
+        ("[-30, 0, 0]", "[-46, 0, 0]", ("tasks", "reach", "targets_mm", 0, 0), -44),  # 50 mm of tank, 6 mm of radius
+        ("[30, 0, 0]", "[30, 24.5, 0]", ("tasks", "reach", "targets_mm", 1, 1), 24),
+        ("part = 2", "part = 3", ("blocks", "look", "part"), 1),
+        ("force_limit_n = 8", "force_limit_n = 9", ("device", "force_limit_n"), 8),
+        ("rate_hz = 1000", "rate_hz = 10", ("device", "rate_hz"), 250),
+        ('task = "reach"', 'task = "rech"', ("blocks", "look", "task"), "reach"),
+        ("format = 2", "format = 2.0", ("format",), 2),
+    ],
+)
+def test_the_first_repair_writes_the_nearest_permitted_value(old: str, new: str, place: Any, value: Any) -> None:
+    assert old in SOUND
+    study = read_study(SOUND.replace(old, new, 1).encode())
+    (fault,) = study.faults
+    after = edited(study, *repairs(study, fault)[0].edits)
+    assert value_at(after.document, place) == value
+    assert not after.faults
 
 
 def shown_lines() -> Iterator[str]:

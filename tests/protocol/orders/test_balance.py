@@ -6,6 +6,7 @@ from study_app.errors import StudyError
 from study_app.protocol.load import load, parse
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.balance import balance, describe_balance, evenness, numbered_participants
+from tests.golden import check_kept
 from tests.protocol.sound import ORDER, SOUND
 
 REK = load("rek2024")
@@ -103,7 +104,7 @@ DESIGNS = (  # order, conditions, repetitions, participants
 )
 
 
-def test_designs_in_words(pytestconfig: pytest.Config) -> None:
+def test_designs_in_words() -> None:
     """The second block, of two conditions in random order, is told the same in all: its text is left out."""
     alone = SOUND.replace('["is_thin", "is_thick"]', '["is_thin"]').replace('["on_time", "both"]', '["both"]')
     told = [describe_balance(balance(parse(alone.encode(), "small"), ("P001",), 1))]
@@ -112,7 +113,4 @@ def test_designs_in_words(pytestconfig: pytest.Config) -> None:
         told.append(f"{order!r}, {conditions} conditions {repetitions} times\n{judged.split('Looking (block')[0]}")
     physical = load("physical_liquids")
     told += [describe_balance(balance(physical, numbered_participants(participants), 1)) for participants in (1, 6, 12)]
-    file = Path(__file__).parents[1] / "orders" / "designs.txt"
-    if pytestconfig.getoption("regenerate"):
-        file.write_text("\n=====\n".join(told), encoding="utf-8", newline="\n")
-    assert file.read_text(encoding="utf-8").split("\n=====\n") == told
+    check_kept(Path(__file__).with_name("designs.txt"), "\n=====\n".join(told).split("\n"))
