@@ -95,6 +95,39 @@ def test_a_free_id_is_suggested(opened, results):
     assert made.verdict.text() == "The ID P005 can be used for session 1"
 
 
+@pytest.mark.parametrize("windowed", [False, True])
+def test_a_pilot_is_shown_in_a_window_and_the_choice_before_comes_back(dialog, results, windowed):
+    box, pilot = dialog.editors["windowed"], dialog.editors["pilot"].control
+    box.control.setChecked(windowed)
+    for chosen, state, folder in ((True, (True, False), "rek2024-pilot"), (False, (windowed, True), "rek2024")):
+        pilot.setChecked(chosen)
+        assert (box.value, box.isEnabled()) == state
+        assert dialog.chosen().results == results / folder
+        assert dialog.chosen().pilot is chosen
+
+
+def test_a_used_id_offers_its_next_session_and_a_new_participant(opened, results):
+    for session in (1, 3):
+        use(results, "P001", session)
+    made = opened()
+    session, participant = made.editors["session"], made.editors["participant"]
+    for way, expected in ((0, ("P001", 4)), (1, ("P002", 1))):
+        participant.control.setText("P001")
+        session.show_value(1)
+        assert not made.begin.isEnabled()
+        assert [button.text() for button in made.ways] == ["Session 4 of P001", "New participant P002"]
+        made.ways[way].click()
+        assert (participant.value, session.value) == expected
+        assert made.begin.isEnabled()
+        assert not made.ways[0].isVisible()
+
+
+def test_a_results_folder_is_said_to_be_inside_or_outside_the_workspace(opened, tmp_path, monkeypatch):
+    for workspace, words in (("", "in the workspace"), ("other", "outside the workspace: Home will not list its")):
+        monkeypatch.setenv("LIQUID_STUDY_WORKSPACE", str(tmp_path / workspace))
+        assert opened().editors["results"].aside.text().startswith(words)
+
+
 def test_a_falcon_by_its_serial_number_can_be_preferred_and_an_unknown_device_is_the_mouse(opened):
     assert opened(device="falcon:FT123").chosen().device == "falcon:FT123"
     assert opened(device="hammer").chosen().device == "mouse"
@@ -190,6 +223,7 @@ def test_replaced_participant_is_asked_for_where_rows_are_dealt(qtbot, tmp_path,
     qtbot.keyClicks(dialog.editors["row_of"].control, "P002")
     assert dialog.begin.isEnabled()
     assert dialog.chosen().row_of == "P002"
+    assert "order; leave empty" in dialog.editors["row_of"].aside.text()
     dialog.editors["row_of"].control.setText("anna")
     assert "rows are assigned by the number" in dialog.verdict.text()
     assert not dialog.begin.isEnabled()
@@ -222,6 +256,7 @@ def test_a_preexisting_group_is_chosen_before_a_session_begins_and_kept_in_the_n
     assert group.value is None
     assert not made.begin.isEnabled()
     assert made.verdict.text() == "Choose the participant's group"
+    assert "order and position in the group; leave empty" in made.editors["row_of"].aside.text()
     assert made.verdict.property("role") == "text2", "nothing is wrong yet"
     made.editors["participant"].control.setText("P 3")
     assert made.verdict.property("role") == "bad"

@@ -6,7 +6,7 @@ import pytest
 from PySide6.QtCore import Qt
 
 from study_app.gui.settings import view
-from study_app.store.workstation import MachineSettings
+from study_app.store.workstation import DisplayOffset, MachineSettings
 from tests.gui.windows import SCREENS, machine, show_settings
 
 
@@ -63,3 +63,27 @@ def test_where_proofs_go_is_set_and_taken_back_here(real_place, qtbot, tmp_path,
         qtbot.keyClicks(editor.control, bad)
         qtbot.keyClick(editor.control, Qt.Key.Key_Return)
     assert "eave" in editor.below.text()
+
+
+@pytest.mark.parametrize(
+    ("screen", "ending"),
+    [("Mine", ")."), ("Other", "). It was measured on another screen (Other) and is not used here.")],
+)
+def test_the_display_offset_is_shown_with_its_screen_and_handed_on_as_it_was_typed(real_place, qtbot, screen, ending):
+    form, kept = real_place.offset, []
+    form.kept.connect(lambda *values: kept.append(values))
+    form.show_offset(None, "Mine")
+    assert (form.forget.isEnabled(), form.said.text().startswith("Not measured.")) == (False, True)
+    offset = DisplayOffset(mean_ms=23.5, spread_ms=1.25, how="data sheet", measured="2026-11-20", screen=screen)
+    form.show_offset(offset, "Mine")
+    assert form.forget.isEnabled()
+    assert form.said.text() == f"23.5 ± 1.25 ms (data sheet, 2026-11-20{ending}"
+    form.editors["mean"].control.setText("17.25")
+    form.keep.click()
+    form.editors["spread"].control.setText("")
+    form.keep.click()
+    form.editors["mean"].control.setText("no number")
+    form.keep.click()
+    assert kept == [(17.25, 1.25, "data sheet"), (17.25, 0.0, "data sheet")]
+    with qtbot.waitSignal(form.forgotten):
+        form.forget.click()
