@@ -1,10 +1,16 @@
 """Choose which tests the quick and the full circle run, by what they cover in how much time; the others run less often.
 
-``python tests/benchmarks/project/circles.py FOLDER [--quick 54] [--full 640]`` reads the contexts and times that
-`faults` names from FOLDER, recorded with ``--by-marks``, and writes `tests/circles.txt`. A budget is processor time of
-the tests of a circle [s], without the start of the workers. A circle gets the tests that cover most lines of the
-program per second which no test before covers, and then the shortest ones. The full circle runs all tests of safety, of
-blinding and of the project.
+Record the contexts and times of the quick and of the slow tests (``NUMBA_DISABLE_JIT=1`` covers compiled code)::
+
+    COVERAGE_FILE=FOLDER/quick.coverage python -m pytest -n 2 --dist loadfile --by-marks \
+        -m "not slow and not nightly" --cov --cov-context=test --cov-report= --junitxml=FOLDER/quick.xml
+    COVERAGE_FILE=FOLDER/slow.coverage python -m pytest -n 2 --dist loadfile --by-marks \
+        -m "slow and not nightly" --cov --cov-context=test --cov-report= --junitxml=FOLDER/slow.xml
+
+Then ``python tests/benchmarks/project/circles.py FOLDER [--quick 54] [--full 640]`` writes `tests/circles.txt`. A
+budget is processor time of the tests of a circle [s], without the start of the workers. A circle gets the tests that
+cover most lines of the program per second which no test before covers, and then the shortest ones. The full circle runs
+all tests of safety, of blinding and of the project.
 """
 
 import argparse

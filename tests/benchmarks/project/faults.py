@@ -1,46 +1,86 @@
-"""How many faults the tests notice: one fault in each of some functions drawn at random, and the tests that cover it.
+"""How many faults the tests notice: one fault in each of some functions drawn at random, and the tests that run it.
 
-Once, hours before: the contexts of the quick and of the slow tests (``NUMBA_DISABLE_JIT=1`` covers compiled code)::
+``python tests/benchmarks/project/faults.py probe FOLDER --seeds 1 2 3 [--functions 100] [--package haptics]`` draws the
+faults and runs the quick and the slow tests once (about 25 minutes on two cores) in a copy of the work tree. In the
+copy, each function with a fault, and the statement with the fault, record which test runs them, also in programs that
+the test starts. Compiled functions cannot record anything; the quick tests of their package therefore run again as
+plain Python, and only these tests judge them.
 
-    COVERAGE_FILE=FOLDER/quick.coverage python -m pytest -n 2 --dist loadfile --by-marks \
-        -m "not slow and not nightly" --cov --cov-context=test --cov-report= --junitxml=FOLDER/quick.xml
-    COVERAGE_FILE=FOLDER/slow.coverage python -m pytest -n 2 --dist loadfile --by-marks \
-        -m "slow and not nightly" --cov --cov-context=test --cov-report= --junitxml=FOLDER/slow.xml
+``python tests/benchmarks/project/faults.py judge FOLDER [--workers 2] [--seed 1]`` then runs the recorded tests with
+each fault, the quick ones first; the first failure ends it. ``FOLDER/verdicts.jsonl`` holds the verdicts; the command
+continues after an interruption. If module and session fixtures run the function, all tests of the test module count; if
+an import runs it, the tests of the package. Each run is a fork of a process that has loaded the libraries, but nothing
+of the program. The tests rewrite recorded outputs (``--regenerate``), so that only an assertion notices a fault; other
+exceptions, crashes and hanging tests are counted separately. Compiled code is not compiled again for a fault elsewhere.
 
-Then ``python tests/benchmarks/project/faults.py FOLDER [--functions 100] [--seed 1] [--package haptics]``. Each fault
-runs in a copy of the work tree, with the quick tests first; the first failure ends it. The tests write recorded outputs
-anew (``--regenerate``), so that only an assertion notices a fault. Neither mutmut nor cosmic-ray exchanges arguments or
-columns, or chooses tests by contexts, so the faults are made here. A test counts for the circle in which
-`tests/circles.txt` has it run; those of the nightly circle are left out.
+Neither mutmut nor cosmic-ray exchanges arguments or columns, or chooses tests by function, so the faults are made here.
+Tests of the nightly circle are left out.
 """
 
 import argparse
 import ast
+import contextlib
+import importlib.util
+import json
 import os
 import random
+import re
 import shutil
+import signal
 import subprocess
 import sys
+import tempfile
 import time
 from collections import Counter
-from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Iterable, Iterator
+from concurrent.futures import ProcessPoolExecutor, as_completed
 from functools import cache
 from itertools import pairwise
+from multiprocessing import get_context
 from pathlib import Path
-from queue import Queue
-from tempfile import TemporaryDirectory
-from typing import NamedTuple
+from typing import Any, NamedTuple, NoReturn
 from xml.etree import ElementTree
 
-from coverage import CoverageData
+import pytest
 
 ROOT = Path(__file__).resolve().parents[3]
 CIRCLES = ("quick", "slow")
-LIMIT_S = 90.0
-"""Longest run of the tests of a fault in one circle; a run that exceeds it although its tests usually fit hangs."""
-FILL = 0.5
-"""Share of `LIMIT_S` that the chosen tests usually take."""
+UNCOMPILED = "uncompiled"
+"""The run of the tests of compiled functions, as plain Python."""
+LIMIT_S = 240.0
+"""A test that takes longer hangs, also on a machine that computes something else; the first one includes the start."""
+USUAL_S = 45.0
+"""How long the tests chosen for a fault usually take in a circle."""
+LIBRARIES = (
+    "numba", "numpy", "pandas", "scipy.optimize", "scipy.stats", "matplotlib.figure", "matplotlib.backends.backend_agg",
+    "matplotlib.backends.backend_pdf", "matplotlib.backends.backend_svg", "pydantic", "click", "jinja2", "tomlkit",
+    "PySide6.QtWidgets", "PySide6.QtSvg", "PySide6.QtTest",
+)  # fmt: skip
+"""What the process loads whose forks run the tests."""
+DECORATORS = ("@kernel", "@part", "@evidence_kernel")
+"""What compiles a function; it is the last decorator."""
+PASSED = re.compile(rb" (?:kernel|part|evidence_kernel)\((?:\w+\.)*(\w+)\)")
+"""A function that is compiled without a decorator."""
+PROBE = """
+import builtins, os
+
+
+def _record(name, tests=os.environ._data, known=set(), open=os.open, write=os.write, close=os.close):
+    test = tests.get(b"PYTEST_CURRENT_TEST", b"")
+    if (name, test) in known:
+        return
+    known.add((name, test))
+    try:
+        file = open(f"{HITS}/{name}.txt", os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
+        write(file, test + b"\\n")
+        close(file)
+    except Exception:
+        pass
+
+
+builtins.record_fault = _record
+"""
+"""What ``study_app/__init__.py`` gets: a function that records the running test once in a process."""
 SWAPPED: dict[type[ast.AST], str] = {
     ast.Add: "-", ast.Sub: "+", ast.Mult: "/", ast.Div: "*", ast.FloorDiv: "*", ast.Mod: "*", ast.And: "or",
     ast.Or: "and", ast.Lt: ">=", ast.LtE: ">", ast.Gt: "<=", ast.GtE: "<", ast.Eq: "!=", ast.NotEq: "==",
@@ -58,18 +98,17 @@ class Fault(NamedTuple):
     kind: str
     edits: tuple[tuple[int, int, bytes], ...]
 
-    def apply(self, source: bytes) -> bytes:
-        """Return the source with this fault."""
-        for begin, end, text in sorted(self.edits, reverse=True):
-            source = source[:begin] + text + source[end:]
-        return source
+    @property
+    def package(self) -> str:
+        """The package or single module of the program, as the tests name it."""
+        return Path(self.path).parts[1].removesuffix(".py")
 
 
 class Source:
     """A module's text and places in it."""
 
-    def __init__(self, path: Path) -> None:
-        self.path = path.relative_to(ROOT).as_posix()
+    def __init__(self, path: Path, root: Path) -> None:
+        self.path = path.relative_to(root).as_posix()
         self.bytes = path.read_bytes()
         self.tree = ast.parse(self.bytes)
         self._starts = [0]
@@ -111,6 +150,28 @@ class Source:
             for node in _walk(function.body)
             for kind, edits in self._edits(node)
         ]
+
+    def probes(self, fault: Fault, name: str) -> Iterator[tuple[int, int, bytes]]:
+        """Yield the edits that record the tests of a fault: at the beginning of its function, before its statement."""
+        function = next(node for _, node in self.functions() if node.lineno == fault.lines[0])
+        yield self._before(function.body[1 if ast.get_docstring(function) is not None else 0], name)
+        begin, end = min(edit[0] for edit in fault.edits), max(edit[1] for edit in fault.edits)
+        statement = min(
+            (
+                node
+                for node in ast.walk(function)
+                if isinstance(node, ast.stmt) and _is_within(self.span(node), begin, end)
+            ),
+            key=lambda node: self.span(node)[1] - self.span(node)[0],
+        )
+        if not self.text(statement).startswith(b"elif"):
+            yield self._before(statement, f"{name}-statement")
+
+    def _before(self, node: ast.stmt, name: str) -> tuple[int, int, bytes]:
+        line = min([node.lineno, *(decorator.lineno for decorator in getattr(node, "decorator_list", []))])
+        begin = self._starts[line - 1] + node.col_offset
+        indent = self.bytes[self._starts[line - 1] : begin]
+        return begin, begin, f'record_fault("{name}")'.encode() + (b"; " if indent.strip() else b"\n" + indent)
 
     def _edits(self, node: ast.expr | ast.stmt) -> Iterator[tuple[str, tuple[tuple[int, int, bytes], ...]]]:
         match node:
@@ -156,6 +217,10 @@ class Source:
         return (*self.span(one), self.text(two)), (*self.span(two), self.text(one))
 
 
+def _is_within(span: tuple[int, int], begin: int, end: int) -> bool:
+    return span[0] <= begin and end <= span[1]
+
+
 def _walk(nodes: list[ast.stmt]) -> Iterator[ast.expr | ast.stmt]:
     """Yield statements and expressions, without functions within, annotations, messages of errors and f-strings."""
     queue: list[ast.AST] = list(nodes)
@@ -174,10 +239,22 @@ def _walk(nodes: list[ast.stmt]) -> Iterator[ast.expr | ast.stmt]:
         ]
 
 
-def draw(count: int, seed: int, package: str) -> list[Fault]:
+def apply_edits(source: bytes, edits: Iterable[tuple[int, int, bytes]]) -> bytes:
+    """Return the source with each span replaced."""
+    for begin, end, text in sorted(edits, reverse=True):
+        source = source[:begin] + text + source[end:]
+    return source
+
+
+@cache
+def _faults_of_functions(root: Path, package: str) -> list[list[Fault]]:
+    sources = [Source(path, root) for path in sorted((root / "study_app" / package).rglob("*.py"))]
+    return [faults for source in sources for each in source.functions() if (faults := source.faults(*each))]
+
+
+def draw(root: Path, count: int, seed: int, package: str) -> list[Fault]:
     """Return one fault in each of ``count`` functions, drawn by ``seed``: first a kind, then a place."""
-    sources = [Source(path) for path in sorted((ROOT / "study_app" / package).rglob("*.py"))]
-    functions = [faults for source in sources for each in source.functions() if (faults := source.faults(*each))]
+    functions = _faults_of_functions(root, package)
     generator = random.Random(seed)  # noqa: S311
     drawn = []
     for faults in generator.sample(functions, min(count, len(functions))):
@@ -187,172 +264,338 @@ def draw(count: int, seed: int, package: str) -> list[Fault]:
 
 
 @cache
-def durations(folder: Path, circle: str) -> dict[str, float]:
-    """Return how long each test took [s], by its name in the contexts."""
-    found = {}
-    for case in ElementTree.parse(folder / f"{circle}.xml").iter("testcase"):  # noqa: S314
-        module, _, group = case.attrib["classname"].partition(".Test")
-        within = f"Test{group}::" if group else ""
-        found[f"{module.replace('.', '/')}.py::{within}{case.attrib['name']}"] = float(case.attrib["time"])
-    return found
+def drawn_faults(folder: Path) -> dict[str, Fault]:
+    """Return the faults of a folder by their names, SEED-NUMBER."""
+    options = json.loads((folder / "draw.json").read_text(encoding="utf-8"))
+    return {
+        f"{seed}-{number:03}": fault
+        for seed in options["seeds"]
+        for number, fault in enumerate(draw(folder / "sound", options["functions"], seed, options["package"]))
+    }
 
 
 @cache
-def _listed() -> dict[str, str]:
-    lines = (ROOT / "tests" / "circles.txt").read_text(encoding="utf-8").splitlines()
-    return {name: circle for circle, _, name in (line.partition(" ") for line in lines)}
+def _passed_names(folder: Path) -> frozenset[str]:
+    sources = [path.read_bytes() for path in (folder / "sound" / "study_app" / "haptics").rglob("*.py")]
+    return frozenset(name.decode() for source in sources for name in PASSED.findall(source))
 
 
-def circle_of(test: str, recorded: str) -> str:
-    """Return the circle in which a test runs; ``recorded`` is the one of its marks."""
-    names = test.partition("::")[0], test.partition("[")[0], test
-    return next((_listed()[name] for name in names if name in _listed()), recorded)
+def is_compiled(folder: Path, fault: Fault) -> bool:
+    """Return whether the function of a fault is compiled."""
+    lines = (folder / "sound" / fault.path).read_text(encoding="utf-8").splitlines()
+    return lines[fault.lines[0] - 2].strip() in DECORATORS or fault.function in _passed_names(folder)
 
 
-@cache
-def _is_left(test: str) -> bool:
-    """Return whether a test of the contexts still exists: pytest runs none where one of those named does not."""
-    module, _, name = test.partition("::")
-    function = name.split("[")[0].rsplit("::", 1)[-1]
-    return (ROOT / module).is_file() and f"def {function}(" in (ROOT / module).read_text(encoding="utf-8")
-
-
-def covering(folder: Path, circle: str, fault: Fault) -> list[str]:
-    """Return tests of a circle that run the function: first those of the faulty line, of its package, quick ones."""
-    times_s = durations(folder, "quick") | durations(folder, "slow")
-    tests_of: dict[int, set[str]] = {}
-    for recorded in CIRCLES:
-        data = CoverageData(str(folder / f"{recorded}.coverage"))
-        data.read()
-        for line, contexts in data.contexts_by_lineno(fault.path).items():
-            names = {name.split("|")[0] for name in contexts if name}
-            tests_of.setdefault(line, set()).update(name for name in names if circle_of(name, recorded) == circle)
-
-    def at(*lines: int) -> set[str]:
-        return {test for line in lines for test in tests_of.get(line, ()) if _is_left(test)}
-
-    at_fault, package = at(fault.line), f"tests/{Path(fault.path).parts[1]}/"
-    total_s, chosen = 0.0, []
-    for test in sorted(
-        at(*range(fault.lines[0], fault.lines[1] + 1)),
-        key=lambda test: (test not in at_fault, not test.startswith(package), times_s.get(test, 1.0), test),
-    ):
-        total_s += times_s.get(test, 1.0)
-        if chosen and total_s > FILL * LIMIT_S:
-            break
-        chosen.append(test)
-    return chosen
-
-
-def cache_of(copy: Path, environment: dict[str, str]) -> Path:
-    """Return the folder of compiled code of a work tree as it stands: its name follows from all its modules."""
-    command = [sys.executable, "-c", "import study_app.haptics.kernels.compiled, numba; print(numba.config.CACHE_DIR)"]
-    return Path(subprocess.check_output(command, cwd=copy, env=environment, text=True).strip())
-
-
-def noticed_by(fault: Fault, folder: Path, copy: Path) -> str:
-    """Return the circle whose tests fail with the fault, or "none"; a test that fails without it does not count.
-
-    A module with kernels runs uncompiled; with a fault in any other one, what is compiled stays.
-    """
-    faulty = copy / fault.path
-    sound = faulty.read_bytes()
-    compiled = b"kernels.compiled import" not in sound
-    environment = os.environ | {
+def environment_of(folder: Path, copy: Path, run: str) -> dict[str, str]:
+    """Return the variables of a run of tests in a copy of the program."""
+    return {
         "PYTHONPATH": str(copy),
         "LIQUID_STUDY_WORKSPACE": str(copy),
         "LIQUID_STUDY_CONFIG": str(copy / "config"),
-        "NUMBA_DISABLE_JIT": "0" if compiled else "1",
+        "NUMBA_CACHE_DIR": str(folder / "compiled"),
+        "NUMBA_DISABLE_JIT": str(int(run == UNCOMPILED)),
     }
-    cache = cache_of(copy, environment)
-    faulty.write_bytes(fault.apply(sound))
-    cache_with_fault = cache_of(copy, environment)
-    faulty.write_bytes(sound)
-    if compiled and cache_with_fault != cache:
-        shutil.copytree(cache, cache_with_fault, dirs_exist_ok=True)
 
-    def failed(tests: list[str]) -> list[str]:
-        options = ["-x", "-q", "--no-header", "-p", "no:cacheprovider", "--regenerate"]
-        command, begun_s = [sys.executable, "-m", "pytest", *options, *tests], time.time()
-        try:
-            done = subprocess.run(
-                command, check=False, cwd=copy, env=environment, capture_output=True, text=True, timeout=LIMIT_S
-            )
-        except subprocess.TimeoutExpired:
-            return tests[:1]
-        finally:
-            restore_recordings(copy, begun_s)
-        if done.returncode in (0, 5):
-            return []
-        named = [line.split()[1] for line in done.stdout.splitlines() if line.startswith(("FAILED ", "ERROR "))]
-        return [test for test in tests if any(test.startswith(name) for name in named)][:1] or tests[:1]
 
-    found = "none"
+def record_tests(folder: Path, tests: list[str]) -> None:
+    """Run the tests once in copies whose functions record them."""
+    faults = drawn_faults(folder)
+    (folder / "hits").mkdir()
+    marks = {"quick": "not slow and not nightly", "slow": "slow and not nightly"}
+    compiled = {name: fault for name, fault in faults.items() if is_compiled(folder, fault)}
+    copy = _probed_copy(folder, "probed", {name: fault for name, fault in faults.items() if name not in compiled})
     for circle in CIRCLES:
-        if not (tests := covering(folder, circle, fault)):
-            continue
-        faulty.write_bytes(fault.apply(sound))
-        first = failed(tests)
-        faulty.write_bytes(sound)
-        if first and not failed(first):
-            found = circle
+        _run_recorded(folder, copy, circle, ["-m", marks[circle], *tests])
+    if compiled:
+        copy = _probed_copy(folder, "probed-uncompiled", compiled)
+        packages = sorted({f"tests/{fault.package}" for fault in compiled.values()})
+        _run_recorded(folder, copy, UNCOMPILED, ["-m", f"{marks['quick']} and not compiled", *(tests or packages)])
+
+
+def _probed_copy(folder: Path, name: str, faults: dict[str, Fault]) -> Path:
+    """Return a copy of the sound program in which the functions of these faults record the tests."""
+    copy = copy_program(folder, folder / name)
+    with (copy / "study_app" / "__init__.py").open("a", encoding="utf-8") as module:
+        module.write(PROBE.replace("{HITS}", str(folder / "hits")))
+    for path in {fault.path for fault in faults.values()}:
+        source = Source(copy / path, copy)
+        edits = [edit for name, fault in faults.items() if fault.path == path for edit in source.probes(fault, name)]
+        write_source(copy / path, apply_edits(source.bytes, edits))
+    return copy
+
+
+def _run_recorded(folder: Path, copy: Path, run: str, options: list[str]) -> None:
+    command = [
+        sys.executable,
+        "-m",
+        "pytest",
+        "-q",
+        "-n",
+        "2",
+        "--dist",
+        "loadfile",
+        "-p",
+        "no:cacheprovider",
+        "--timeout=1800",
+    ]
+    with (folder / f"{run}.log").open("w", encoding="utf-8") as log:
+        subprocess.run(
+            [*command, "--regenerate", f"--junitxml={folder / run}.xml", *options],
+            check=False, cwd=copy, env=os.environ | environment_of(folder, copy, run), stdout=log, stderr=log,
+        )  # fmt: skip
+    print(f"{run}: {(folder / f'{run}.log').read_text(encoding='utf-8').splitlines()[-1]}", flush=True)
+
+
+@cache
+def durations(folder: Path, run: str) -> dict[str, float]:
+    """Return how long each test took [s], by its name."""
+    times_s = {}
+    for case in ElementTree.parse(folder / f"{run}.xml").iter("testcase"):  # noqa: S314
+        module, _, group = case.attrib["classname"].partition(".Test")
+        within = f"Test{group}::" if group else ""
+        times_s[f"{module.replace('.', '/')}.py::{within}{case.attrib['name']}"] = float(case.attrib["time"])
+    return times_s
+
+
+def read_hits(folder: Path, name: str) -> dict[str, set[str]]:
+    """Return the phases ("setup", "call", "teardown") in which each test ran a probe; "" is an import."""
+    path = folder / "hits" / f"{name}.txt"
+    phases: dict[str, set[str]] = {}
+    for line in path.read_text(encoding="utf-8").splitlines() if path.exists() else []:
+        test, _, phase = line.rpartition(" ")
+        phases.setdefault(test, set()).add(phase.strip("()"))
+    return phases
+
+
+def choose_tests(folder: Path, name: str, fault: Fault, run: str) -> list[str]:
+    """Return tests that run the function: first those of the faulty statement, of its package, quick ones."""
+    times_s, hits = durations(folder, run), read_hits(folder, name)
+    at_statement = read_hits(folder, f"{name}-statement")
+    modules = {test.partition("::")[0] for test, phases in hits.items() if "setup" in phases}
+    package = (f"tests/{fault.package}/", f"tests/test_{fault.package}.py")
+    tests = {test for test in times_s if test in hits or test.partition("::")[0] in modules}
+    if "" in hits:
+        tests |= {test for test in times_s if test.startswith(package)}
+
+    def rank(test: str) -> tuple[bool, bool, bool, float, str]:
+        return test not in at_statement, test not in hits, not test.startswith(package), times_s[test], test
+
+    total_s, chosen = 0.0, list[str]()
+    for test in sorted(tests, key=rank):
+        total_s += times_s[test]
+        if chosen and total_s > USUAL_S:
             break
-    if cache_with_fault != cache:
-        shutil.rmtree(cache_with_fault, ignore_errors=True)
-    return found
+        chosen.append(test)
+    order = list(dict.fromkeys(test.partition("::")[0] for test in chosen))
+    return sorted(chosen, key=lambda test: order.index(test.partition("::")[0]))
 
 
-def restore_recordings(copy: Path, since_s: float) -> None:
+class FirstFailure:
+    """A plug-in of pytest that writes the running test to a file, and how it failed: "crash" until it has ended."""
+
+    def __init__(self, file: Path) -> None:
+        self._file = file
+        self.test = self.how = ""
+
+    def write(self) -> None:
+        """Write the test and how it failed."""
+        self._file.write_text(f"{self.how}\n{self.test}", encoding="utf-8")
+
+    def pytest_runtest_logstart(self, nodeid: str) -> None:
+        """Note which test begins."""
+        self.test, self.how = nodeid, "crash"
+        self.write()
+
+    def pytest_exception_interact(self, node: pytest.Item | pytest.Collector, call: pytest.CallInfo[Any]) -> None:
+        """Note the first exception of a test, or of an import."""
+        if (self.test, self.how) == (node.nodeid, "crash") or self.test != node.nodeid:
+            assert call.excinfo is not None
+            is_assertion = isinstance(call.excinfo.value, AssertionError | pytest.fail.Exception)
+            self.test, self.how = node.nodeid, "assertion" if is_assertion else "exception"
+            self.write()
+
+
+def first_failure(folder: Path, copy: Path, tests: list[str], run: str) -> tuple[str, str]:
+    """Return which of the tests failed first in a fork of this process, and how: ("", "") if all passed."""
+    temporary = copy.parent / "t"
+    shutil.rmtree(temporary, ignore_errors=True)
+    temporary.mkdir()
+    file, begun_s = temporary / "failure", time.time()
+    file.write_text(f"crash\n{tests[0]}", encoding="utf-8")
+    if (child := os.fork()) == 0:
+        _run_tests(folder, copy, tests, run, file)
+    status = None
+    while status is None and time.time() - file.stat().st_mtime < LIMIT_S:
+        time.sleep(0.05)
+        ended, code = os.waitpid(child, os.WNOHANG)
+        status = code if ended else None
+    with contextlib.suppress(ProcessLookupError):
+        os.killpg(child, signal.SIGKILL)
+    how, _, test = file.read_text(encoding="utf-8").partition("\n")
+    if status is None:
+        os.waitpid(child, 0)
+        how = "timeout"
+    restore_recordings(folder, copy, begun_s)
+    return test, how
+
+
+def _run_tests(folder: Path, copy: Path, tests: list[str], run: str, file: Path) -> NoReturn:
+    """Run tests in this process, a fork, and end it."""
+    try:
+        os.setsid()
+        log = os.open(file.with_name("log"), os.O_WRONLY | os.O_CREAT)
+        os.dup2(log, 1)
+        os.dup2(log, 2)
+        os.chdir(copy)
+        os.environ.update(environment_of(folder, copy, run), TMPDIR=str(file.parent))
+        tempfile.tempdir = None
+        sys.path[0] = str(copy)
+        sys.modules["__main__"] = importlib.import_module("pytest.__main__")  # for processes that the tests start
+        importlib.import_module("numba").config.reload_config()
+        sys.argv = ["pytest", "-x", "-q", "-p", "no:cacheprovider", "-W", "ignore::pytest.PytestAssertRewriteWarning"]
+        sys.argv += ["--timeout=0", "--regenerate", f"--basetemp={file.parent / 'base'}", *tests]
+        failure = FirstFailure(file)
+        code = pytest.main(sys.argv[1:], plugins=[failure])
+        if code in (pytest.ExitCode.OK, pytest.ExitCode.NO_TESTS_COLLECTED):
+            failure.test = failure.how = ""
+        elif failure.how in ("", "crash"):
+            failure.test, failure.how = failure.test or tests[0], "exception"
+        failure.write()
+        sys.stdout.flush()
+    finally:
+        os._exit(0)
+
+
+def judge_fault(folder: Path, temporary: Path, name: str) -> dict[str, Any]:
+    """Return the circle whose tests notice a fault and how, or "none"; a test that fails without it does not count."""
+    copy, fault, begun_s = _own_copy(folder, temporary), drawn_faults(folder)[name], time.perf_counter()
+    sound = (copy / fault.path).read_bytes()
+    verdict = {"fault": name, "circle": "none", "how": "not run", "test": ""}
+    for run in (UNCOMPILED,) if is_compiled(folder, fault) else CIRCLES:
+        tests = choose_tests(folder, name, fault, run)
+        while tests and verdict["circle"] == "none":
+            verdict["how"] = "passed"
+            write_source(copy / fault.path, apply_edits(sound, fault.edits))
+            failed, how = first_failure(folder, copy, tests, run)
+            write_source(copy / fault.path, sound)
+            if not how:
+                break
+            named = [test for test in tests if test.startswith(failed)][:1] or tests[:1]
+            if first_failure(folder, copy, named, run)[1]:
+                tests = [test for test in tests if test not in named]
+            else:
+                verdict |= {"circle": run, "how": how, "test": failed}
+    return verdict | {"took_s": round(time.perf_counter() - begun_s, 1)}
+
+
+@cache
+def _own_copy(folder: Path, temporary: Path) -> Path:
+    """Return the copy of this process."""
+    return copy_program(folder, temporary / str(os.getpid()) / "program")
+
+
+def copy_program(folder: Path, target: Path) -> Path:
+    """Copy the sound program; in the copy, one folder holds what is compiled, whatever the sources."""
+    shutil.copytree(folder / "sound", target)
+    module = target / "study_app" / "haptics" / "kernels" / "compiled.py"
+    digest = b"digest_of(SOURCES, _processor(), versions())"
+    source = module.read_bytes()
+    assert digest in source
+    write_source(module, source.replace(digest, b'"fa175fa175fa175f"'.ljust(len(digest))))  # no place moves
+    return target
+
+
+def write_source(path: Path, source: bytes) -> None:
+    """Write a module, and remove its bytecode, which Python would use if length and second were the same."""
+    path.write_bytes(source)
+    Path(importlib.util.cache_from_source(str(path))).unlink(missing_ok=True)
+
+
+def restore_recordings(folder: Path, copy: Path, since_s: float) -> None:
     """Restore the files of the tests that were written since a time [s since the epoch]."""
     for path in (copy / "tests").rglob("*"):
         if path.suffix != ".pyc" and path.is_file() and path.stat().st_mtime >= since_s:
-            recorded = ROOT / path.relative_to(copy)
+            recorded = folder / "sound" / path.relative_to(copy)
             shutil.copy2(recorded, path) if recorded.is_file() else path.unlink()
 
 
+def judge(folder: Path, workers: int, seed: int | None) -> None:
+    """Judge the faults that have no verdict; print a row for each, then the shares."""
+    faults = {
+        name: fault for name, fault in drawn_faults(folder).items() if seed in (None, int(name.partition("-")[0]))
+    }
+    file = folder / "verdicts.jsonl"
+    verdicts = [json.loads(line) for line in file.read_text(encoding="utf-8").splitlines()] if file.exists() else []
+    left = sorted(faults.keys() - {verdict["fault"] for verdict in verdicts})
+    os.environ["OPENBLAS_NUM_THREADS"] = "1"
+    for library in LIBRARIES:
+        importlib.import_module(library)
+    with tempfile.TemporaryDirectory() as temporary, ProcessPoolExecutor(workers, get_context("fork")) as pool:
+        for future in as_completed([pool.submit(judge_fault, folder, Path(temporary), name) for name in left]):
+            verdicts.append(future.result())
+            with file.open("a", encoding="utf-8") as lines:
+                lines.write(json.dumps(verdicts[-1]) + "\n")
+            print(_row(verdicts[-1], faults[verdicts[-1]["fault"]]), flush=True)
+    verdicts = [verdict for verdict in verdicts if verdict["fault"] in faults]
+    for group in sorted({fault.package for fault in faults.values()}):
+        chosen = [verdict for verdict in verdicts if faults[verdict["fault"]].package == group]
+        print(f"{group}: {_shares(chosen)}")
+        for verdict in chosen:
+            if verdict["circle"] == "none":
+                print(f"    {_row(verdict, faults[verdict['fault']])}")
+    for group in sorted({name.partition("-")[0] for name in faults}):
+        print(f"seed {group}: {_shares([verdict for verdict in verdicts if verdict['fault'].startswith(f'{group}-')])}")
+    print(f"all: {_shares(verdicts)}")
+
+
+def _row(verdict: dict[str, Any], fault: Fault) -> str:
+    change = " ".join(text.decode() for *_, text in fault.edits)[:60]
+    judged = f"{verdict['circle']:10} {verdict['how']:9} {verdict['took_s']:5.0f} s  {verdict['fault']}"
+    return f"{judged} {fault.kind:8} {fault.path}:{fault.line} {fault.function}: {change}"
+
+
+def _shares(verdicts: list[dict[str, Any]]) -> str:
+    circles, ways = (Counter(verdict[key] for verdict in verdicts) for key in ("circle", "how"))
+    total = len(verdicts)
+    counts = ", ".join(f"{name} {count}" for counter in (circles, ways) for name, count in sorted(counter.items()))
+    return (
+        f"{total} faults, noticed {1 - circles['none'] / total:.0%}, by an assertion {ways['assertion'] / total:.0%}"
+        f" ({counts})"
+    )
+
+
 def main() -> None:
-    """Print a row for each fault, then the shares."""
+    """Record the tests of drawn faults, or judge these faults."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("folder", type=Path)
-    parser.add_argument("--functions", type=int, default=100)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--package", default="")
-    parser.add_argument("--workers", type=int, default=1)
+    commands = parser.add_subparsers(dest="command", required=True)
+    probing, judging = commands.add_parser("probe"), commands.add_parser("judge")
+    for command in (probing, judging):
+        command.add_argument("folder", type=Path)
+    probing.add_argument("--seeds", type=int, nargs="+", default=[1])
+    probing.add_argument("--functions", type=int, default=100)
+    probing.add_argument("--package", default="")
+    probing.add_argument("--tests", nargs="+", default=[], help="only these folders or files")
+    judging.add_argument("--workers", type=int, default=1)
+    judging.add_argument("--seed", type=int)
     given = parser.parse_args()
-    faults = draw(given.functions, given.seed, given.package)
-    counts: Counter[str] = Counter()
-    with TemporaryDirectory() as temporary, ThreadPoolExecutor(given.workers) as workers:
-        copies: Queue[Path] = Queue()
-        for number in range(given.workers):
-            copies.put(_copy(Path(temporary) / str(number)))
-
-        def judge(fault: Fault) -> tuple[Fault, str, float]:
-            copy, begun = copies.get(), time.perf_counter()
-            try:
-                return fault, noticed_by(fault, given.folder.resolve(), copy), time.perf_counter() - begun
-            finally:
-                copies.put(copy)
-
-        for fault, circle, took_s in workers.map(judge, faults):
-            counts[circle] += 1
-            change = " ".join(text.decode() for *_, text in fault.edits)
-            print(
-                f"{circle:6} {took_s:4.0f} s  {fault.kind:9} {fault.path}:{fault.line} {fault.function}: {change[:60]}",
-                flush=True,
-            )
-    total = counts.total()
-    shares = ", ".join(f"{name} {counts[name]} ({counts[name] / total:.0%})" for name in (*CIRCLES, "none"))
-    print(f"seed {given.seed}, {total} faults: {shares}; noticed {1 - counts['none'] / total:.0%}")
+    folder = given.folder.resolve()
+    if given.command == "judge":
+        judge(folder, given.workers, given.seed)
+        return
+    folder.mkdir(parents=True)
+    copy_work_tree(folder / "sound")
+    options = {"seeds": given.seeds, "functions": given.functions, "package": given.package}
+    (folder / "draw.json").write_text(json.dumps(options), encoding="utf-8")
+    record_tests(folder, given.tests)
 
 
-def _copy(folder: Path) -> Path:
+def copy_work_tree(folder: Path) -> None:
     """Copy what Git tracks, as it stands in the work tree."""
     listed = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
     for name in listed.splitlines():
         if (ROOT / name).is_file():
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
             shutil.copy2(ROOT / name, folder / name)
-    return folder
 
 
 if __name__ == "__main__":
