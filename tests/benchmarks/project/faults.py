@@ -315,7 +315,7 @@ def record_tests(folder: Path, tests: list[str]) -> None:
 def _probed_copy(folder: Path, name: str, faults: dict[str, Fault]) -> Path:
     """Return a copy of the sound program in which the functions of these faults record the tests."""
     copy = copy_program(folder, folder / name)
-    with (copy / "study_app" / "__init__.py").open("a", encoding="utf-8") as module:
+    with (copy / "study_app" / "__init__.py").open("a", encoding="utf-8", newline="\n") as module:
         module.write(PROBE.replace("{HITS}", str(folder / "hits")))
     for path in {fault.path for fault in faults.values()}:
         source = Source(copy / path, copy)
@@ -338,7 +338,7 @@ def _run_recorded(folder: Path, copy: Path, run: str, options: list[str]) -> Non
         "no:cacheprovider",
         "--timeout=1800",
     ]
-    with (folder / f"{run}.log").open("w", encoding="utf-8") as log:
+    with (folder / f"{run}.log").open("w", encoding="utf-8", newline="\n") as log:
         subprocess.run(
             [*command, "--regenerate", f"--junitxml={folder / run}.xml", *options],
             check=False, cwd=copy, env=os.environ | environment_of(folder, copy, run), stdout=log, stderr=log,
@@ -399,7 +399,7 @@ class FirstFailure:
 
     def write(self) -> None:
         """Write the test and how it failed."""
-        self._file.write_text(f"{self.how}\n{self.test}", encoding="utf-8")
+        self._file.write_text(f"{self.how}\n{self.test}", encoding="utf-8", newline="\n")
 
     def pytest_runtest_logstart(self, nodeid: str) -> None:
         """Note which test begins."""
@@ -421,7 +421,7 @@ def first_failure(folder: Path, copy: Path, tests: list[str], run: str) -> tuple
     shutil.rmtree(temporary, ignore_errors=True)
     temporary.mkdir()
     file, begun_s = temporary / "failure", time.time()
-    file.write_text(f"crash\n{tests[0]}", encoding="utf-8")
+    file.write_text(f"crash\n{tests[0]}", encoding="utf-8", newline="\n")
     if (child := os.fork()) == 0:
         _run_tests(folder, copy, tests, run, file)
     status = None
@@ -533,7 +533,7 @@ def judge(folder: Path, workers: int, seed: int | None) -> None:
     with tempfile.TemporaryDirectory() as temporary, ProcessPoolExecutor(workers, get_context("fork")) as pool:
         for future in as_completed([pool.submit(judge_fault, folder, Path(temporary), name) for name in left]):
             verdicts.append(future.result())
-            with file.open("a", encoding="utf-8") as lines:
+            with file.open("a", encoding="utf-8", newline="\n") as lines:
                 lines.write(json.dumps(verdicts[-1]) + "\n")
             print(_row(verdicts[-1], faults[verdicts[-1]["fault"]]), flush=True)
     verdicts = [verdict for verdict in verdicts if verdict["fault"] in faults]
@@ -585,7 +585,7 @@ def main() -> None:
     folder.mkdir(parents=True)
     copy_work_tree(folder / "sound")
     options = {"seeds": given.seeds, "functions": given.functions, "package": given.package}
-    (folder / "draw.json").write_text(json.dumps(options), encoding="utf-8")
+    (folder / "draw.json").write_text(json.dumps(options), encoding="utf-8", newline="\n")
     record_tests(folder, given.tests)
 
 
