@@ -9,8 +9,10 @@ from PySide6.QtGui import QColor, QGuiApplication
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
+from study_app.gui.operator.operator_view import TrialTime
 from study_app.gui.operator.window import OperatorWindow
 from study_app.gui.widgets.main_view import HOLD_MS
+from study_app.number_text import clock_text
 
 pytestmark = pytest.mark.slow
 
@@ -167,3 +169,76 @@ def test_each_chip_of_the_header_shows_its_own_state(window, told, health):
     texts = [part.text() for part in (header.clock, header.expected, header.trials)]
     assert texts == ["1:01", "of about 13 min", "3 of 8 trials"]
     assert (header.study.accessibleName(), header.who.accessibleName()) == ("Study", "P7")
+
+
+@pytest.mark.parametrize(
+    ("facts", "hint"),
+    [
+        ({"over": True}, "The journal is closed and the tables have been written."),
+        ({"over": True, "trouble": "it broke"}, ""),
+        ({"waits": True, "state": "trouble"}, "The force is off. The answers are kept in memory until they can be "
+         "written to disk."),
+        ({"state": "trouble"}, "The force is off. All answers so far are on disk."),
+        ({"state": "force off"}, "The force stays off until you turn it on again."),
+        ({"state": "paused"}, "An interrupted trial starts again."),
+        ({"may_repeat": True}, "You will be asked for a reason; both recordings are kept."),
+        ({"may_repeat": False}, ""),
+    ],
+)  # fmt: skip
+def test_the_hint_below_the_buttons_fits_the_state(window, told, health, facts, hint):
+    window.show_view(replace(told.view(health), **{"state": "running", **facts}))
+    assert window.buttons.hint.text() == hint
+
+
+@pytest.mark.parametrize(
+    ("facts", "advice", "offered"),
+    [
+        ({}, "End the session, fix the cause, then start a new one.", False),
+        ({"may_reconnect": True}, "Plug in the device, then reconnect it.", True),
+        ({"may_reconnect": True, "reconnection": "Looking …"}, "Looking …", True),
+        ({"waits": True}, "Free up some disk space or reconnect the drive. The session will then", False),
+        ({"over": True, "may_reconnect": True}, "The session is closed and the force is off.", False),
+        ({"over": True, "waits": True}, "leave this window open until", False),
+    ],
+)
+def test_the_banner_of_a_fault_says_what_to_do(window, told, health, facts, advice, offered):
+    banner = window.banner
+    for reconnects in (False, True):
+        shown = replace(told.view(health), trouble="the device is gone", reconnects=reconnects, **facts)
+        window.show_view(shown)
+        assert banner.what.text() == "The device is gone"
+        assert advice in banner.then.text()
+        assert (banner.reconnect.isHidden(), banner.reconnect.isEnabled()) == (not offered, not reconnects)
+    window.show_view(replace(shown, trouble=""))
+    assert banner.isHidden()
+
+
+def test_buttons_notes_and_counts_are_those_of_the_view(window, told, health):
+    buttons, notes, rail = window.buttons, window.notes, window.rail
+    told.tell("note", 5.0, kind="note", text="slow  hand")
+    told.tell("note", 70.0, kind="mark", text="")
+    shown = replace(
+        told.view(health),
+        trial_time=TrialTime(elapsed_s=30.0, least_s=15.0, most_s=60.0),
+        beyond=("Newest", "Older"),
+        counts=(("Answers on disk", "3 of 8"), ("Marks, repeats", "1, 2")),
+    )
+    for pauses, resumes, repeats, word in ((True, False, True, "Pause"), (False, True, False, "Resume")):
+        window.show_view(replace(shown, may_pause=pauses, may_resume=resumes, may_repeat=repeats))
+        assert (buttons.pause.text(), buttons.pause.isEnabled(), buttons.repeat.isEnabled()) == (word, True, repeats)
+    window.show_view(replace(shown, may_pause=False, may_resume=False))
+    assert not buttons.pause.isEnabled()
+    assert [(row.sign.name, row.sign.ink, row.time.text(), row.text.accessibleName()) for row in notes.lines[:2]] == [
+        ("flag", "warn", clock_text(shown.notes[0].t_s), "Mark"),
+        ("pen", "text2", clock_text(shown.notes[0].t_s - 70), "slow hand"),
+    ]
+    assert notes.lines[2].isHidden()
+    assert [(name.text(), value.text()) for name, value in rail.tally.counts] == list(shown.counts)
+    assert (rail.tally.beyond.text(), rail.tally.beyond.toolTip()) == ("Newest.", "Newest\nOlder")
+    assert (rail.now.elapsed.text(), rail.now.least.text()) == ("0:30 of 1:00", "at least 0:15")
+    assert (rail.now.bar.share, rail.now.bar.tick) == (0.5, 0.25)
+    for over in (False, True):
+        window.show_view(replace(shown, over=over, state="ended" if over else "running"))
+        assert [part.isEnabled() for part in (notes.add, notes.mark, notes.field)] == [not over] * 3
+        assert [part.isHidden() for part in (buttons.pause, buttons.repeat, buttons.end)] == [over] * 3
+        assert buttons.close_session.isHidden() == (not over)
