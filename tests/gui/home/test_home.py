@@ -1,6 +1,7 @@
 """Home: cards, sessions, and the ways into a session, while studies, drafts and files come, change and go."""
 
 import threading
+from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
@@ -8,7 +9,10 @@ from PySide6.QtCore import QEvent, QPoint, QSize, Qt
 from PySide6.QtWidgets import QApplication, QDialog, QFileDialog
 
 from study_app.gui.home import view
+from study_app.gui.home.cards import DeviceCard, SessionsCard
 from study_app.gui.home.dialogs import NewSessionDialog, RehearsalDialog
+from study_app.gui.kit.devices import DeviceShown
+from study_app.gui.sessions.session_facts import SessionFacts
 from study_app.gui.widgets.background import wait_for_jobs
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import label
@@ -266,3 +270,51 @@ def test_a_session_is_opened_by_the_keyboard_a_double_click_and_a_button(home, q
     qtbot.mouseDClick(table.viewport(), Qt.MouseButton.LeftButton, pos=middle)
     qtbot.mouseClick(home.sessions.details, Qt.MouseButton.LeftButton)
     assert asked == ["P001"] * 3
+
+
+def test_the_card_of_sessions_counts_each_kind_and_says_which_ones_it_does_not_show(qtbot):
+    now = datetime(2026, 3, 9, 18, 30, tzinfo=UTC)
+    facts = [
+        SessionFacts(
+            participant=f"P{number}", session=1, study="demo", started=now, status="completed", validity="valid",
+            answers=8, answers_of=8, simulated=simulated, pilot=pilot, folder=Path(f"results/{name}/data/sub/ses"),
+        )
+        for number, (name, simulated, pilot) in enumerate(
+            (("demo", False, True), ("demo", True, True), ("demo-rehearsal", True, False), ("sample-demo", True, False))
+        )
+    ]  # fmt: skip
+    card = SessionsCard()
+    qtbot.addWidget(card)
+    assert card.nothing.text() == "No sessions yet. The first session will appear here when it starts."
+    assert (card.kind.isHidden(), card.all.isHidden(), card.rows.isHidden()) == (True, True, True)
+    card.show_sessions(facts[:3], "results", now)
+    counts = [card.kind.itemText(at) for at in range(card.kind.count())]
+    assert counts == ["Participants (0)", "Pilot (2)", "Simulated (1)", "Sample (0)", "All (3)"]
+    others = "Not shown: 2 pilot sessions, 1 simulated session."
+    none = {"": "No participant sessions yet. The first session will appear here when it starts.",
+            "sample": "No sample sessions."}  # fmt: skip
+    for kind, shown in (("", []), ("pilot", ["P0", "P1"]), ("simulated", ["P2"]), ("sample", [])):
+        card.show_kind(kind)
+        assert sorted(session.participant for session in card.shown) == shown
+        assert card.rows.isHidden() == card.is_empty == (not shown)
+        assert card.nothing.isHidden() == bool(shown)
+        assert shown or card.nothing.text() == f"{none[kind]} {others}"
+        assert not card.details.isEnabled()
+    card.show_sessions(facts[3:], "results", now)
+    for kind, words in (("pilot", "No pilot sessions."), ("simulated", "No simulated sessions.")):
+        card.show_kind(kind)
+        assert card.nothing.text() == f"{words} Not shown: 1 sample session."
+
+
+@pytest.mark.parametrize(("tone", "ink"), [("warn", "warn"), ("bad", "bad"), ("neutral", "text2")])
+def test_the_card_of_the_device_shows_why_it_cannot_be_used(qtbot, tone, ink):
+    card = DeviceCard()
+    qtbot.addWidget(card)
+    card.show_device(
+        DeviceShown(
+            name="a", title="Falcon", icon="device", tone=tone, sign="clock", word="Word", can="Can.", why="Why."
+        )
+    )
+    assert [part.text() for part in (card.name, card.about, card.why)] == ["Falcon", "Can.", "Why."]
+    assert (card.state.tone, card.state.icon, card.state.word) == (tone, "clock", "Word")
+    assert card.why.property("role") == ink
