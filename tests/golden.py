@@ -71,8 +71,9 @@ def compare(
     rel: float = 1e-5,
     abs_: float = 1e-9,
     exact: bool = False,
+    fixed: bool = False,
 ) -> None:
-    """Compare lines with a golden file, or write it.
+    """Compare lines with a golden file, or write it; a ``fixed`` file is written once, and then never anew.
 
     What ``mask`` matches is left out; numbers may differ a little, or as they are written, unless ``exact``.
     """
@@ -80,7 +81,7 @@ def compare(
     assert any(found), f"{kept} is compared with nothing"
     if mask is not None:
         found = [mask.sub("*", line) for line in found]
-    if config.getoption("regenerate"):
+    if config.getoption("regenerate") and not (fixed and kept.exists()):
         note_changed_texts(kept.read_text(encoding="utf-8").splitlines() if kept.exists() else [], found)
         kept.parent.mkdir(parents=True, exist_ok=True)
         kept.write_text("\n".join(found) + "\n", encoding="utf-8", newline="\n")

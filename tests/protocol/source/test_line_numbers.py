@@ -13,7 +13,7 @@ TRICKY = (Path(__file__).parent / "tricky.toml").read_text(encoding="utf-8")
 def test_lines_of_every_kind_of_notation(pytestconfig: pytest.Config):
     places = Places(TRICKY)
     lines = [f"{places.line(path)}: {path}" for path in keys_of(tomllib.loads(TRICKY))]
-    compare(Path(__file__).parent / "tricky_lines.txt", lines, pytestconfig)
+    compare(Path(__file__).parent / "tricky_lines.txt", lines, pytestconfig, fixed=True)
 
 
 def test_what_is_missing_is_at_the_table_around_it():
