@@ -66,26 +66,6 @@ def problems_of(text: str | bytes) -> tuple[str, ...]:
     return tuple(map(str, refused.value.problems))
 
 
-@pytest.mark.parametrize(
-    ("keys", "problem"),
-    [
-        ("max_repeats = 3", None),
-        ("min_distance = 3", "min_distance: is 3, but it must be at most 2 with 2 conditions"),
-        ("max_repeats = 2\nmin_distance = 1", None),
-    ],
-)
-def test_each_key_of_a_constrained_order_is_checked_by_its_own_rule(keys: str, problem: str | None) -> None:
-    shuffled = 'order = "shuffled"\nquestionnaire = "feel"'
-    text = text_of("session")
-    assert shuffled in text
-    text = text.replace(shuffled, f'order = "constrained"\nrepetitions = 4\n{keys}\nquestionnaire = "feel"')
-    if problem is None:
-        block = parse(text.encode(), "file.toml").blocks["feeling"]
-        assert {f"{name} = {getattr(block, name)}" for name in ("max_repeats", "min_distance")} >= {*keys.split("\n")}
-    else:
-        assert problem in problems_of(text)[0]
-
-
 def test_a_viscosity_that_a_constant_coefficient_ignores_is_named_with_both_forces() -> None:
     """Of a ball of 50 mm with C_d = 0.4 at 10 times the speed of the hand; at Re = 0.5 Stokes' law is 9 % too low."""
     scene = '[scene]\nscale = 10\nknee = { law = "none" }\nbody = { diameter_m = 0.05, drag_coefficient = 0.4 }\n'
