@@ -5,7 +5,7 @@ import os
 import shutil
 import time
 from collections.abc import Callable
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from pathlib import Path
 from re import escape
 from types import SimpleNamespace
@@ -544,6 +544,7 @@ def test_an_id_that_cannot_be_used_is_named_with_what_is_permitted(participant: 
         (("a", "B"), "site 'B' has already been merged"),
         (("c", "C"), "site 'C' is specified twice"),
         (("c", "d-e"), "'d-e' cannot be used as the name of a site"),
+        (("c", "d" * 17), f"'{'d' * 17}' cannot be used as the name of a site"),
     ],
 )
 def test_names_of_sites_differ_from_those_merged_and_from_each_other(
@@ -553,8 +554,53 @@ def test_names_of_sites_differ_from_those_merged_and_from_each_other(
     study = merged.Merged(tmp_path, "stirring", "c" * 64, (there,))
     with pytest.raises(StoreError, match=f"^{sentence}"):
         merge._check_names(dict.fromkeys(names, tmp_path), study)
-    merge._check_names({"a": tmp_path, "c": tmp_path}, study)
+    merge._check_names({"a": tmp_path, "c" * 16: tmp_path}, study)
     merge._check_names({"a": tmp_path, "b": tmp_path}, None)
+
+
+@pytest.mark.parametrize(
+    ("changed", "sentence"),
+    [
+        ({"study": "other"}, f"site south ran the protocol other with SHA-256 {'c' * 64}, but site north ran stirring"),
+        ({"protocol_hash": "d" * 64}, f"site south ran the protocol stirring with SHA-256 {'d' * 64}, but site north"),
+        ({"pilot": True}, "site south contains pilot sessions, but site north contains real sessions: only"),
+        ({"key": SimpleNamespace(drawn="seed")}, "site south contains rehearsals, but site north contains real sess"),
+        ({"pilot": None, "protocol_hash": ""}, ""),
+        ({"begun": {"2": Path("south/2"), "1": Path("south/1")}}, f"{Path('south/1')} is a copy of {Path('north/1')}"),
+    ],
+)
+def test_sites_of_another_kind_and_sessions_of_two_sites_are_not_merged(changed: dict[str, Any], sentence: str) -> None:
+    alike = {"study": "stirring", "protocol_hash": "c" * 64, "pilot": False, "key": SimpleNamespace(drawn="system")}
+    south = alike | {"begun": {"2": Path("south/2")}} | changed
+    sources: Any = (
+        SimpleNamespace(name="north", begun={"1": Path("north/1")}, **alike),
+        SimpleNamespace(name="south", **south),
+    )
+    with pytest.raises(StoreError, match=f"^{escape(sentence)}") if sentence else nullcontext():
+        merge._check_alike(sources, "c" * 64)
+        merge._check_sessions(sources)
+
+
+def test_a_receipts_hash_is_that_of_what_does_not_change_later() -> None:
+    held = {"participant": "P7", "status": "unfinished", "resumed": [], "device": {"name": "falcon", "serial": "7"}}
+    later = {
+        "status": "completed",
+        "reason": "r",
+        "ended_at": AT,
+        "resumed": [{"at": AT}],
+        "outlets_lost": {"LSL": "1"},
+    }
+    assert receipt.digest(held | later) == receipt.digest(dict(reversed(held.items())))
+    for changed in ({"participant": "P8"}, {"device": {"name": "falcon", "serial": "8"}}):
+        assert receipt.digest(held | changed) != receipt.digest(held)
+
+
+def test_temporary_files_of_a_name_are_not_those_of_a_longer_one(tmp_path: Path) -> None:
+    halves = [atomic.temporary_path(tmp_path / name) for name in ("a", "ab", "a.csv")]
+    for half in (*halves, tmp_path / ".a.tmp", tmp_path / ".a.0123456.tmp"):
+        half.write_bytes(b"")
+    assert atomic.temporary_files(tmp_path, "a") == (halves[0],)
+    assert set(atomic.temporary_files(tmp_path)) == set(halves)
 
 
 @pytest.mark.parametrize(
@@ -595,6 +641,9 @@ def test_a_key_of_another_session_is_named_with_that_session(tmp_path: Path, mon
     assert blinding.revealed_key(tmp_path) is key
     (record,) = blinding.reveals(tmp_path)
     assert [record[name] for name in ("by", "reason", "key_hash")] == ["AB", "analysis", "a" * 64]
+    for by in ("AB", "CD", "AB"):
+        blinding.reveal(tmp_path, by, "analysis")
+    assert [record["by"] for record in blinding.reveals(tmp_path)] == ["AB", "CD", "AB"], "the first one only repeats"
     assert blinding.sealed_hash(tmp_path) is None
 
 
