@@ -1,7 +1,6 @@
 """What events of a session write, with which measures, and what waits for the disk."""
 
 import hashlib
-from collections import defaultdict
 from contextlib import suppress
 from itertools import product
 from typing import Any
@@ -40,7 +39,7 @@ from study_app.session.transitions.page_builder import build_page
 from study_app.session.transitions.state import Phase, SessionState
 from study_app.session.transitions.table import advance
 from tests.session import pairs, small
-from tests.session.transitions.states import EVENTS, event_of, shown, state_in
+from tests.session.transitions.states import EVENTS, LEFT, event_of, shown, state_in
 from tests.session.transitions.transcribed import VALUE, opened, replying, to_page, to_setting, to_trial, with_break
 
 
@@ -65,16 +64,19 @@ def test_only_what_a_person_gave_waits_for_the_disk() -> None:
         (state_in(Phase.TASK), Note(9.0, "mark", "")),
         *((state_in(phase), event_of(kind)) for phase, kind in product(Phase, EVENTS)),
     ]
-    waits = defaultdict[str, set[bool]](set)
+    written: dict[bool, set[tuple[str, str | None]]] = {True: set(), False: set()}
     for state, event in cases:
         with suppress(SessionError):
             for command in advance(state, event)[1]:
-                if isinstance(command, Write):
-                    waits[command.line.event].add(command.waits)
-    assert {event for event, values in waits.items() if values == {True}} == {
-        "choice", "answer_removed", "responses", "repeat", "device_reconnected",
+                if isinstance(command, Write) and command is not LEFT:
+                    fields = command.line.fields()
+                    written[command.waits].add((command.line.event, fields.get("page", fields.get("kind"))))
+    assert written[True] == {
+        ("page_left", "welcome"), ("choice", "statement"), ("answer_removed", None), ("responses", None),
+        ("note", "note"), ("repeat", None), ("device_reconnected", None),
     }  # fmt: skip
-    assert {event for event, values in waits.items() if values == {True, False}} == {"page_left", "note"}
+    assert written[True].isdisjoint(written[False])
+    assert written[False] >= {("page_left", "thanks"), ("note", "mark")}
 
 
 def test_consent_is_recorded_with_its_text_and_the_version_of_the_study() -> None:
