@@ -1,6 +1,5 @@
-"""What events of a session write, with which measures, and what waits for the disk."""
+"""What the transcripts leave open: which measures a line has, which lines wait for the disk, and how long a rest is."""
 
-import hashlib
 from contextlib import suppress
 from itertools import product
 from typing import Any
@@ -18,29 +17,23 @@ from study_app.session.transitions.events import (
     Continue,
     EndRequested,
     Event,
-    FadeIn,
-    Finish,
     ForceStopped,
     LeaveTask,
     Note,
     PauseRequested,
-    Reconnected,
     RepeatRequested,
-    ResumeRequested,
     Stepped,
     Submitted,
     TaskDone,
     TimeUp,
     Write,
-    WriteCompleted,
-    WriteFailed,
 )
 from study_app.session.transitions.page_builder import build_page
 from study_app.session.transitions.state import Phase, SessionState
 from study_app.session.transitions.table import advance
 from tests.session import pairs, small
 from tests.session.transitions.states import EVENTS, LEFT, event_of, shown, state_in
-from tests.session.transitions.transcribed import VALUE, opened, replying, to_page, to_setting, to_trial, with_break
+from tests.session.transitions.transcribed import VALUE, replying, to_setting, to_trial
 
 
 def lines_of(commands: tuple[Command, ...]) -> list[tuple[str, dict[str, Any]]]:
@@ -58,6 +51,7 @@ def second_interval() -> SessionState:
     return advance(state, TimeUp(state.until_s or 0.0))[0]
 
 
+@pytest.mark.slow
 def test_only_what_a_person_gave_waits_for_the_disk() -> None:
     cases: list[tuple[SessionState, Event]] = [
         (last_page(), Continue(90.0)),
@@ -77,21 +71,6 @@ def test_only_what_a_person_gave_waits_for_the_disk() -> None:
     }  # fmt: skip
     assert written[True].isdisjoint(written[False])
     assert written[False] >= {("page_left", "thanks"), ("note", "mark")}
-
-
-def test_consent_is_recorded_with_its_text_and_the_version_of_the_study() -> None:
-    _, commands = advance(state_in(Phase.READING), Continue(50.0))
-    read = hashlib.sha256(b"Welcome\n\nOne.\n\nTwo.").hexdigest()
-    assert lines_of(commands)[0] == ("page_left", {"page": "welcome", "text_sha256": read, "study_version": "1"})
-    _, commands = advance(last_page(), Continue(50.0))
-    assert lines_of(commands) == [("page_left", {"page": "thanks"})]
-
-
-def test_a_break_is_not_left_before_its_least_time() -> None:
-    state = to_page(opened(with_break(min_s=60)), "rest")
-    assert build_page(state).stays_until_s == 100.0 + 60.0  # type: ignore[union-attr]
-    assert advance(state, Continue(159.9)) == (state, ())
-    assert advance(state, Continue(160.0))[0].phase is Phase.TASK
 
 
 INTERRUPTIONS: tuple[Event, ...] = (
@@ -178,65 +157,6 @@ def test_a_setting_is_answered_by_the_sum_of_its_steps_and_has_the_level_that_wa
     task = state_in(Phase.TASK)
     assert advance(task, Continue(20.0)) == (task, (LeaveTask(),))
     assert advance(task, Submitted(20.0)) == (task, ())
-
-
-@pytest.mark.parametrize(
-    ("phase", "status", "finished"),
-    [
-        (Phase.TROUBLE, "aborted", "broken"),
-        (Phase.TROUBLE, "withdrawn", "withdrawn"),
-        (Phase.TASK, "aborted", "aborted"),
-        (Phase.READING, "withdrawn", "withdrawn"),
-    ],
-)
-def test_a_session_that_is_given_up_after_a_failure_is_broken(phase: Phase, status: Any, finished: Any) -> None:
-    after, commands = advance(state_in(phase), EndRequested(9.0, status, "a fire"))
-    assert [command for command in commands if isinstance(command, Finish)] == [Finish(finished, "a fire")]
-    assert after.phase is Phase.ENDED
-
-
-def test_only_a_device_can_be_reconnected_and_only_the_operator_resumes() -> None:
-    broken, _ = advance(state_in(Phase.ANSWERING), Broke(9.0, "a bug"))
-    described = {"name": "memory", "force_limit_n": 8.0}
-    for state in (broken, advance(broken, Broke(10.0, "the cable", "device"))[0]):
-        with pytest.raises(SessionError, match="was not stopped by a device failure"):
-            advance(state, Reconnected(11.0, described))
-    in_pause, _ = advance(state_in(Phase.PAUSED), Broke(10.0, "the cable", "device"))
-    for state in (state_in(Phase.TROUBLE), in_pause):
-        paused, commands = advance(state, Reconnected(11.0, described))
-        assert lines_of(commands) == [
-            ("device_reconnected", {"device": "memory", "described": described}), ("paused", {"by": "program"}),
-        ]  # fmt: skip
-        assert (paused.phase, paused.held, paused.force_off) == (Phase.PAUSED, "force", True)
-        back, commands = advance(paused, ResumeRequested(12.0, "operator"))
-        by = {"by": "operator"}
-        assert (lines_of(commands), FadeIn() in commands) == ([("resumed", by), ("force_restored", by)], True)
-        assert (back.phase, back.answers) == (Phase.ANSWERING, state.answers)
-
-
-def test_a_stop_by_the_operator_holds_after_the_disk_has_failed_twice() -> None:
-    stalled, _ = advance(state_in(Phase.STALLED), ForceStopped(10.0, "operator"))
-    stalled, _ = advance(stalled, WriteFailed(11.0, "still full", ()))
-    assert stalled.stall is not None
-    assert (stalled.stall.before, stalled.stall.reason, stalled.stall.left) == (Phase.ANSWERING, "still full", ())
-    after, _ = advance(stalled, WriteCompleted(12.0))
-    assert (after.phase, after.interrupted, after.held) == (Phase.PAUSED, Phase.ANSWERING, "force")
-
-
-def test_a_pause_during_feedback_ends_with_the_next_step() -> None:
-    state = state_in(Phase.FEEDBACK)
-    paused, _ = advance(state, PauseRequested(90.0, "participant"))
-    after, _ = advance(paused, ResumeRequested(95.0, "participant"))
-    assert after.index == state.index + 1
-
-
-def test_a_trial_is_repeated_with_a_reason_and_without_its_answers() -> None:
-    state = state_in(Phase.ANSWERING)
-    with pytest.raises(SessionError, match="repeating a trial requires a reason"):
-        advance(state, RepeatRequested(9.0, "  "))
-    again, commands = advance(state, RepeatRequested(9.0, "a call"))
-    assert lines_of(commands)[0] == ("repeat", {"trial": 2, "reason": "a call"})
-    assert (again.phase, again.trial.number, again.attempt, again.answers) == (Phase.TASK, 2, 2, {})
 
 
 def test_only_the_first_estimation_states_the_number_of_its_modulus() -> None:
