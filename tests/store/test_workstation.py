@@ -96,14 +96,6 @@ def test_a_measurement_replaces_that_of_the_same_device_alone():
     assert [getattr(settings.bench_of(device), "measured", None) for device in described] == ["Tuesday", "Friday", None]
 
 
-@pytest.mark.parametrize(
-    ("name", "number", "place"), [("B", 3, 3), ("B", None, 2), ("B", 1, 2), ("D", 1, 4), ("", 1, 4)]
-)
-def test_the_participants_screen_is_found_by_name_and_number(name, number, place):
-    settings = MachineSettings(screen=name, screen_number=number)
-    assert settings.screen_among(["A", "B", "B", "C"]) == place
-
-
 def test_a_chosen_workspace_is_created_and_kept_with_the_other_settings(tmp_path):
     save_settings(ALL)
     keep_workspace(Workspace(tmp_path / "new"))

@@ -18,7 +18,6 @@ from study_app.session.transitions.events import (
     EndRequested,
     Event,
     ForceStopped,
-    LeaveTask,
     Note,
     PauseRequested,
     RepeatRequested,
@@ -32,7 +31,7 @@ from study_app.session.transitions.page_builder import build_page
 from study_app.session.transitions.state import Phase, SessionState
 from study_app.session.transitions.table import advance
 from tests.session import pairs, small
-from tests.session.transitions.states import EVENTS, LEFT, event_of, shown, state_in
+from tests.session.transitions.states import EVENTS, LEFT, event_of, state_in
 from tests.session.transitions.transcribed import VALUE, replying, to_setting, to_trial
 
 
@@ -119,24 +118,11 @@ def test_measures_are_those_of_the_interval_and_of_a_trial_without_intervals() -
     assert (after.phase, after.answers) == (Phase.ANSWERING, {})
 
 
-def test_an_undelivered_trial_comes_again_after_a_rest_until_its_attempts_are_used_up() -> None:
+def test_an_undelivered_trial_comes_again_after_the_force_has_faded_and_a_rest() -> None:
     state = to_trial(pairs.opened(), "viscosity", 2)
-    number, attempts = state.trial.number, 3
-    assert state.plan.protocol.limits.attempts == attempts
-    for attempt in range(1, attempts + 1):
-        at_s = 100.0 * attempt
-        state, commands = advance(state, TaskDone(at_s, "complete", {}, ("pace_error_percent",)))
-        interval, trial, begun = lines_of(commands)[:3]
-        which = {"trial": number, "attempt": attempt}
-        assert interval == ("interval_ended", {**which, "interval": 1, "outcome": "complete",
-                                               "invalid": ("pace_error_percent",)})  # fmt: skip
-        assert trial == ("trial_ended", {**which, "outcome": "invalid"})
-        if attempt < attempts:
-            assert (begun[0], begun[1]["trial"], begun[1]["attempt"]) == ("trial_started", number, attempt + 1)
-            assert (state.phase, state.interval, state.until_s) == (Phase.RESTING, 1, pytest.approx(at_s + 0.05 + 1.5))
-            assert shown(commands).interval.announced == words("en").once_more
-            state, _ = advance(state, TimeUp(state.until_s or 0.0))
-    assert (state.trial.number, state.attempt, state.invalid) == (number + 1, 1, 0)
+    again, commands = advance(state, TaskDone(100.0, "complete", {}, ("pace_error_percent",)))
+    assert dict(lines_of(commands))["interval_ended"]["invalid"] == ("pace_error_percent",)
+    assert (again.trial, again.phase, again.until_s) == (state.trial, Phase.RESTING, pytest.approx(100 + 0.05 + 1.5))
 
 
 def test_a_setting_is_answered_by_the_sum_of_its_steps_and_has_the_level_that_was_reached() -> None:
@@ -148,15 +134,10 @@ def test_a_setting_is_answered_by_the_sum_of_its_steps_and_has_the_level_that_wa
         assert adjust.line.steps == steps
     assert values[1:3] == [18.0, 2.0]  # the ends of the range
     assert 2.0 < (values[3] or 0.0) < 18.0
-    assert advance(state, Continue(20.0)) == (state, ())
-    assert advance(state, Submitted(20.0)) == (state, (LeaveTask(),))
     _, commands = advance(state, TaskDone(30.0, "complete", {"duration_s": 20.0}))
     told = dict(lines_of(commands))
     assert (told["interval_ended"]["setting"], told["interval_ended"]["duration_s"]) == (values[3], 20.0)
     assert told["choice"]["value"] == told["responses"]["items"][0]["value"] == -1 + 1000 - 5000 + 2
-    task = state_in(Phase.TASK)
-    assert advance(task, Continue(20.0)) == (task, (LeaveTask(),))
-    assert advance(task, Submitted(20.0)) == (task, ())
 
 
 def test_only_the_first_estimation_states_the_number_of_its_modulus() -> None:
