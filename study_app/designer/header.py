@@ -87,7 +87,7 @@ class NoticeCard(Card):
             return
         self.notice = notice
         if notice is None and self.isAncestorOf(self.window().focusWidget()):
-            self.left.emit()  # else Qt moves the focus to the next part
+            self.left.emit()  # otherwise Qt moves the focus to the next widget
         self.setVisible(notice is not None)
         for part in (*self.buttons.values(), *self._lines):
             remove_widget(part)
@@ -106,10 +106,10 @@ class NoticeCard(Card):
             made = ActionButton(icon, text, cap=cap, role=_ROLES.get(action, ""), height=36)
             made.clicked.connect(lambda _checked=False, action=action: self.asked.emit(action))
             self._buttons.addWidget(made)
-            made.show()  # at once: a hidden part cannot take the focus
+            made.show()  # a hidden widget cannot take the focus
             self.buttons[action] = made
         if self._of_playing and self.buttons:
-            next(iter(self.buttons.values())).setFocus()  # of the window, once it is active again
+            next(iter(self.buttons.values())).setFocus()  # takes effect when the window is active again
 
     def close_by_key(self) -> bool:
         """Close the notice if it can be closed; return whether it was."""

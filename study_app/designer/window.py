@@ -142,9 +142,9 @@ class _RightPane(QWidget):
         most = QWIDGETSIZE_MAX if page is None or not facts else page.most_px()
         left = self.height() - self._stack.y() - most - self._column.spacing()
         if most < QWIDGETSIZE_MAX and self.isVisible() and left < FACTS_LEAST:
-            facts = False  # the page is shown as wide as the pane
+            facts = False  # the page fills the pane
         self._stack.setMaximumHeight(most if facts else QWIDGETSIZE_MAX)
-        self.facts.make_room(height, left)
+        self.facts.fit_height(height, left)
         self.facts.setVisible(facts)
 
 

@@ -613,7 +613,7 @@ class ChecksField(Field):
             made.setFont(font("label", weight=400))
             made.setAccessibleName(f"{row.label}, {made.text()}")
             made.setToolTip(plain_tip(choice.sentence))
-            made.clicked.connect(self._take_checked)
+            made.clicked.connect(self._apply_checked)
             self.checks[str(choice.value)] = made
             self.box.addWidget(made)
         if self.checks:
@@ -626,7 +626,7 @@ class ChecksField(Field):
         for value, check in self.checks.items():
             check.setChecked(value in chosen)
 
-    def _take_checked(self) -> None:
+    def _apply_checked(self) -> None:
         row = self.row
         chosen = [value for value in row.value or () if value in self.checks and self.checks[value].isChecked()]
         chosen += [value for value, check in self.checks.items() if check.isChecked() and value not in chosen]

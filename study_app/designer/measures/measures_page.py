@@ -109,23 +109,23 @@ class FactsRow(_MeasureCards):
         super().__init__("Facts")
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self._window_px = self._left_px = 0
-        self.make_room(0, 0)
+        self.fit_height(0, 0)
 
-    def make_room(self, window_px: int, left_px: int) -> None:
-        """Take the height of the cards as far as the window has room or the page above leaves it."""
+    def fit_height(self, window_px: int, left_px: int) -> None:
+        """Set the height that the cards need, at most ``left_px`` if positive, otherwise a share of the window."""
         self._window_px, self._left_px = window_px, left_px
-        most = FACTS_MOST if window_px >= HIGH_FROM else max(FACTS_LEAST, round(FACTS_SHARE * window_px))
-        most = left_px if left_px > 0 else most
+        largest = FACTS_MOST if window_px >= HIGH_FROM else max(FACTS_LEAST, round(FACTS_SHARE * window_px))
+        largest = left_px if left_px > 0 else largest
         column = self.column
         needed = max(column.totalHeightForWidth(self.viewport().width()), column.totalMinimumSize().height())
-        self.setFixedHeight(min(most, needed + 2 * self.frameWidth()) if self.grid.cards else most)
+        self.setFixedHeight(min(largest, needed + 2 * self.frameWidth()) if self.grid.cards else largest)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         handled = super().eventFilter(watched, event)
         if watched is self.widget() and event.type() == QEvent.Type.LayoutRequest:
-            self.make_room(self._window_px, self._left_px)
+            self.fit_height(self._window_px, self._left_px)
         return handled
 
     def show_parts(self, shown: MeasuresView) -> None:
         super().show_parts(shown)
-        self.make_room(self._window_px, self._left_px)
+        self.fit_height(self._window_px, self._left_px)

@@ -167,7 +167,7 @@ class Candidate:
     def memory_bytes(self) -> int:
         return sum(rows.nbytes for rows in pack(self._run_scene, limits=_UNLIMITED).arrays)
 
-    def take(self, start: int, stop: int) -> None:
+    def run_ticks(self, start: int, stop: int) -> None:
         """Run the ticks from ``start`` to ``stop`` and write their rows of ``force_n``."""
         self._run.run(start, stop)
         self.force_n[start:stop] = self._run.results.force_n[start:stop]
@@ -175,7 +175,7 @@ class Candidate:
     def forces(self, motion: Motion) -> Floats:
         """Return the force at every row of the motion, (n, 3) [N]."""
         self.begin(motion)
-        self.take(0, self.ticks)
+        self.run_ticks(0, self.ticks)
         return np.repeat(self.force_n, self.every, axis=0)[: len(motion.t_s)]
 
     def forces_against(self, truth: Truth) -> list[Floats]:
@@ -206,7 +206,7 @@ class _LinearViscosity(Candidate):
 
     HAS_LIQUIDS: ClassVar[bool] = False
 
-    def take(self, start: int, stop: int) -> None:
+    def run_ticks(self, start: int, stop: int) -> None:
         damping_nspm = 3 * math.pi * (self.scene.liquids[0].viscosity_pa_s or math.nan) * self.scene.body.diameter_m
         self._run.run(start, stop)
         self.force_n[start:stop] = -damping_nspm * self._run.results.velocity_mps[start:stop]
@@ -231,7 +231,7 @@ class _WakeList(Candidate):
     def memory_bytes(self) -> int:
         return sum(rows.nbytes for rows in self._new_list())
 
-    def take(self, start: int, stop: int) -> None:
+    def run_ticks(self, start: int, stop: int) -> None:
         self._run.run(start, stop)
         period_s = 1 / self.scene.rate_hz
         _by_the_list(self._liquid, self._list, self._t_ns, period_s, self._run.results, self.force_n, start, stop)

@@ -275,7 +275,7 @@ class _Bench:
         liquid = self._candidate.scene.liquids[0]
         length = liquid.wake.length if liquid.wake is not None and "wake" in liquid.effects else 0
         filled = min(round(length * self._candidate.rate_hz / 1000), self._candidate.ticks - self._size)
-        self._candidate.take(0, filled)
+        self._candidate.run_ticks(0, filled)
         self._at = filled
 
     @property
@@ -286,7 +286,7 @@ class _Bench:
         if self._at + self._size > self._candidate.ticks:
             self._begin()
         began_s, began = time.perf_counter(), self._clock_ns()
-        self._candidate.take(self._at, self._at + self._size)
+        self._candidate.run_ticks(self._at, self._at + self._size)
         self.costs_ns.append((self._clock_ns() - began) / self._size)
         self.passed_s += time.perf_counter() - began_s
         self._at += self._size

@@ -29,10 +29,10 @@ _LEDGER = np.dtype(
         ("tracking", np.int64),  # 1 once a position was accepted
         ("gap_ns", np.float64),  # longer without a sample is a gap
         ("accepted_m", np.float64, (3,)),  # the last accepted position
-        ("rejected", np.int64),  # readings refused in a row
+        ("rejected", np.int64),  # consecutive rejected readings
         ("accepted_ns", np.int64),
         ("h_mps", np.float64, (3,)),
-        ("position_m", np.float64, (3,)),  # scene, without the origin
+        ("position_m", np.float64, (3,)),  # in the scene, relative to the origin
     ],
     align=True,
 )
@@ -64,7 +64,7 @@ class _Ledger:
         ledger.period_ns = round(1e9 / scene.rate_hz)
         ledger.gap_ns = CURRENT.gap_ticks * ledger.period_ns
 
-    def take(self, samples: Any) -> float | None:
+    def record(self, samples: Any) -> float | None:
         """Record ``samples`` (`Samples`, all of this scene, none missing), and compare at the last one.
 
         Returns
@@ -153,25 +153,25 @@ class Drift:
     _ledger: _Ledger | None = None
     _next_tick: int = -1
 
-    def expect(self, serial: int, scene: Scene) -> None:
-        """Register the scene that telemetry calls ``serial``."""
+    def expect_scene(self, serial: int, scene: Scene) -> None:
+        """Register the scene that has this serial number in the telemetry."""
         if wake_of(scene) is not None:
             self._scenes[serial] = scene
 
-    def take(self, samples: Any) -> None:
+    def record(self, samples: Any) -> None:
         """Follow the next ``samples`` (`Samples`).
 
         A scene with missing samples is not followed further.
         """
         for part in np.split(samples, np.flatnonzero(np.diff(samples.scene)) + 1):
             if len(part) > 0:
-                self._take_part(part)
+                self._record_part(part)
 
-    def _take_part(self, samples: Any) -> None:
+    def _record_part(self, samples: Any) -> None:
         serial = int(samples.scene[0])
         if serial != self._serial:
             scene = self._scenes.get(serial)
-            self._scenes = {later: it for later, it in self._scenes.items() if later > serial}
+            self._scenes = {later: waiting for later, waiting in self._scenes.items() if later > serial}
             self._ledger = _Ledger(scene) if scene is not None else None
             self._serial = serial
         elif samples.tick[0] != self._next_tick:
@@ -182,7 +182,7 @@ class Drift:
         if (np.diff(samples.tick) != 1).any():
             self._ledger = None
             return
-        error = self._ledger.take(samples)
+        error = self._ledger.record(samples)
         self.longest_s = max(self.longest_s, self._ledger.age_s)
         if error is not None:
             self.comparisons += 1

@@ -68,7 +68,7 @@ class Audit:
         self._next_tick = self._next_deadline_ns = 0
         self._last_n = np.zeros(3)
 
-    def take(self, samples: Any) -> None:
+    def check(self, samples: Any) -> None:
         """Check the next ``samples`` (`Samples`), each against the one before it."""
         if len(samples) == 0:
             return

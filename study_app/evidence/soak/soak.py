@@ -335,7 +335,7 @@ class Soak:
         """Present a liquid; a servo that has stopped itself receives it after its recovery."""
         self._presented = name
         with suppress(DeviceLost, ServoFault):
-            self.drift.expect(self.servo.load(self._scenes[name]), self._scenes[name])
+            self.drift.expect_scene(self.servo.load(self._scenes[name]), self._scenes[name])
             self._loads += 1
 
     def _recover(self) -> None:
@@ -350,8 +350,8 @@ class Soak:
     def _look(self) -> None:
         """Check all new samples and, at every tenth of the test, the memory."""
         samples = self.reader.read()
-        self.audit.take(samples)
-        self.drift.take(samples)
+        self.audit.check(samples)
+        self.drift.record(samples)
         pushed = samples.tick[np.linalg.norm(samples.device_force_n, axis=1) > PERCEPTIBLE_N]
         if self._is_left_alone and pushed.size:
             self._rests.pushed_s = max(self._rests.pushed_s, (int(pushed[-1]) - self._still_from) / self._rate_hz)

@@ -28,8 +28,8 @@ from study_app.evidence.stability.verdict import (
     SWING_MPS,
     Verdict,
     acted,
-    calm_motion,
     compare_fast,
+    low_pass_trace,
     not_finite,
     reasons_of,
     swing,
@@ -133,7 +133,7 @@ def _driven_trace(case: Case, falcon: _Falcon) -> Any:
     """Return the trace of a case through the driver."""
     falcon.renew()
     trace = _trace(case, falcon, falcon.hand, falcon.dynamics)
-    trace.acting_n[:-1] = trace.acting_n[1:]  # forces of the handle, which records them up to now
+    trace.acting_n[:-1] = trace.acting_n[1:]  # the handle records each force one row late
     return trace
 
 
@@ -156,7 +156,7 @@ def _scripted_traces(case: Case, dynamics: Dynamics) -> list[Any]:
 
 def _traces_with_count_error(case: Case, trace: Any, dynamics: Dynamics) -> list[Any]:
     """Return the traces of the same motion without feedback, one per encoder count, with that count undecided."""
-    calm, traces = calm_motion(trace), []
+    calm, traces = low_pass_trace(trace), []
     calm.fresh[:] = calm.measured[:] = 1
     for count_m in _COUNTS_M:
         count_um = count_m * 1e6

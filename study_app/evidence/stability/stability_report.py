@@ -67,15 +67,15 @@ def draw_map(off: Sequence[Verdict]) -> Figure:
         figure.add_axes((left_pt / width_pt, _FOOT_PT / _HEIGHT_PT, wide_pt / width_pt, _PLOT_PT / _HEIGHT_PT))
         for left_pt, wide_pt in ((34, 150), (232, 118), (400, 105))
     ]
-    _boundary(axes[0])
-    _limits(axes[1])
-    _found(axes[2], off)
+    _draw_boundary(axes[0])
+    _draw_limits(axes[1])
+    _draw_unstable_shares(axes[2], off)
     caption = textwrap.fill(_CAPTION, _CAPTION_LETTERS)
     figure.text(34 / width_pt, 6 / _HEIGHT_PT, caption, color=style.TEXT_SOFT, linespacing=1.25)
     return figure
 
 
-def _boundary(axes: Axes) -> None:
+def _draw_boundary(axes: Axes) -> None:
     """Draw the maximum stable damping of a handle with some friction, and the passive limit given by friction alone."""
     for delay in _MAP_DELAYS:
         measured = [boundary_nspm(Ewma(), NOMINAL_S, delay, friction_nspm=b) for b in _FRICTIONS_NSPM]
@@ -89,7 +89,7 @@ def _boundary(axes: Axes) -> None:
     _name_curves(axes, 4)
 
 
-def _limits(axes: Axes) -> None:
+def _draw_limits(axes: Axes) -> None:
     periods_ms = [period_s * 1e3 for period_s in PERIODS_S]
     for delay in _LIMIT_DELAYS:
         measured = [boundary_nspm(Ewma(), period_s, delay) for period_s in PERIODS_S]
@@ -104,15 +104,15 @@ def _limits(axes: Axes) -> None:
     _name_curves(axes, 3)
 
 
-def _found(axes: Axes, off: Sequence[Verdict]) -> None:
-    """Draw the share of sweep cases that are unstable without safety, against rate and delay."""
-    total: collections.Counter[tuple[float, int]] = collections.Counter()
-    bad: collections.Counter[tuple[float, int]] = collections.Counter()
+def _draw_unstable_shares(axes: Axes, off: Sequence[Verdict]) -> None:
+    """Draw the percentage of sweep cases that are unstable without safety, against rate and delay."""
+    totals: collections.Counter[tuple[float, int]] = collections.Counter()
+    unstable: collections.Counter[tuple[float, int]] = collections.Counter()
     for verdict in off:
-        total[verdict.case.rate_hz, verdict.case.delay] += 1
-        bad[verdict.case.rate_hz, verdict.case.delay] += verdict.grade == UNSTABLE
-    rates_hz = sorted({rate_hz for rate_hz, _ in total}, reverse=True)
-    shares = np.array([[bad[r, d] / max(total[r, d], 1) for r in rates_hz] for d in DELAYS])
+        totals[verdict.case.rate_hz, verdict.case.delay] += 1
+        unstable[verdict.case.rate_hz, verdict.case.delay] += verdict.grade == UNSTABLE
+    rates_hz = sorted({rate_hz for rate_hz, _ in totals}, reverse=True)
+    shares = np.array([[unstable[r, d] / max(totals[r, d], 1) for r in rates_hz] for d in DELAYS])
     axes.grid(visible=False)
     axes.imshow(shares, cmap="Blues", vmin=0, vmax=1, aspect="auto", origin="lower")
     for (row, column), share in np.ndenumerate(shares):

@@ -220,7 +220,7 @@ def _fast_force_excess(
     case: Case, trace: Any, before: list[tuple[int, Bench]], limits: DampingLimits | None, *, late_share: float
 ) -> FastForce:
     """Compare the force's fast part with that of the same motion without feedback, where they differ most."""
-    calm = calm_motion(trace)
+    calm = low_pass_trace(trace)
     passive = _passive(case, bool(before[0][1].loop.safe), limits)
     compared = []
     for window_s, (first, bench) in zip(windows(case), before, strict=True):
@@ -248,8 +248,8 @@ def _outlasts_noise(case: Case, trace: Any, window_s: tuple[float, float], begun
     return not parts_n or (min(parts_n) > _PERMITTED_EXCESS_N and parts_n[-1] >= _DECAY * parts_n[0])
 
 
-def calm_motion(trace: Any) -> Any:
-    """Return a copy of a trace whose motion and sent forces have no part above 40 Hz."""
+def low_pass_trace(trace: Any) -> Any:
+    """Return a copy of a trace whose motion and sent forces contain no frequencies above 40 Hz."""
     calm = trace.copy()
     smooth(trace, _SPREAD_S, calm.position_m, calm.sent_n)
     calm.velocity_mps[:] = np.gradient(calm.position_m, trace.t_s, axis=0)

@@ -1,4 +1,4 @@
-"""Lateness of ticks: loops that take a tick every millisecond, in turn, and what comes of them.
+"""Lateness of ticks: loops that run a tick every millisecond, one loop after another, and their results.
 
 All loops count alike: a deadline every millisecond; one that a tick ran past is passed over and counted, never made up
 for. What a tick has to do is a scene with every effect, on a hand that costs nothing itself.
@@ -122,12 +122,12 @@ class _BareLoop:
     def run(self, ticks: int) -> Ticks:
         lateness_ns = np.zeros(0, np.int64)
 
-        def take() -> None:
+        def time_ticks() -> None:
             nonlocal lateness_ns
             raise_priority(real_time=self._real_time)
             lateness_ns = sleep_repeatedly(self._clock, PERIOD_NS, ticks + LEAD_IN)[LEAD_IN:]
 
-        _in_a_thread(take)
+        _run_in_thread(time_ticks)
         skipped = np.maximum(lateness_ns // PERIOD_NS, 1) - 1
         return Ticks(lateness_ns, np.zeros(0, np.int64), int(skipped.sum()))
 
@@ -154,7 +154,7 @@ class _ThreadLoop:
         times: list[tuple[int, int]] = []
         start_ns = 0
 
-        def take() -> None:
+        def time_ticks() -> None:
             nonlocal start_ns
             raise_priority(real_time=self._real_time)
             start_ns = time.perf_counter_ns()
@@ -169,7 +169,7 @@ class _ThreadLoop:
                 times.append((began_ns, ended_ns))
                 deadline_ns += PERIOD_NS * max(1, (ended_ns - deadline_ns) // PERIOD_NS)
 
-        _in_a_thread(take)
+        _run_in_thread(time_ticks)
         return ticks_at(start_ns, times)
 
 
@@ -210,8 +210,8 @@ def ticks_at(start_ns: int, times: Sequence[tuple[int, int]]) -> Ticks:
     return Ticks(lateness_ns[LEAD_IN:], (ended - began)[LEAD_IN:], overruns)
 
 
-def _in_a_thread(take: Callable[[], None]) -> None:
-    thread = threading.Thread(target=take, name="timed")
+def _run_in_thread(function: Callable[[], None]) -> None:
+    thread = threading.Thread(target=function, name="timed")
     thread.start()
     thread.join()
 
@@ -232,7 +232,7 @@ def granted() -> Classes:
         grants.append(raise_priority(real_time=False))
         grants.append(raise_priority())
 
-    _in_a_thread(ask)
+    _run_in_thread(ask)
     normal, best = grants
     return Classes(normal, None if best.level == "normal" else best)
 

@@ -342,21 +342,21 @@ class NewSessionDialog(QDialog):
         QTimer.singleShot(0, self, self._fit_height)  # once the parts have their style
 
     def _fit_height(self) -> None:
-        """Make the dialog as high as its questions, at most the screen's height, beyond which they scroll.
+        """Make the dialog as high as its questions, or as the screen if that is lower; the questions then scroll.
 
-        It is wide enough for the questions beside their scroll bar.
+        The dialog is wide enough for the questions and their scroll bar.
         """
-        inside, whole = self._inside.layout(), self.layout()
-        assert inside is not None and whole is not None  # noqa: S101, PT018 - laid out above
-        inside.activate()
-        beside = whole.contentsMargins().left() + whole.contentsMargins().right()
-        least = inside.totalMinimumSize().width() + self._area.verticalScrollBar().sizeHint().width() + beside
-        self.setMinimumWidth(max(self.minimumWidth(), least))
-        wide = self.minimumWidth() - beside
-        needed = inside.totalHeightForWidth(wide)
+        questions, outer = self._inside.layout(), self.layout()
+        assert questions is not None and outer is not None  # noqa: S101, PT018 - laid out above
+        questions.activate()
+        margins_px = outer.contentsMargins().left() + outer.contentsMargins().right()
+        least_px = questions.totalMinimumSize().width() + self._area.verticalScrollBar().sizeHint().width() + margins_px
+        self.setMinimumWidth(max(self.minimumWidth(), least_px))
+        width_px = self.minimumWidth() - margins_px
+        needed_px = questions.totalHeightForWidth(width_px)
         self._area.setMinimumHeight(0)
-        around = whole.totalMinimumSize().height() - self._area.minimumSizeHint().height()
-        self._area.setMinimumHeight(min(needed, self.screen().availableSize().height() - _FRAME - around))
+        around_px = outer.totalMinimumSize().height() - self._area.minimumSizeHint().height()
+        self._area.setMinimumHeight(min(needed_px, self.screen().availableSize().height() - _FRAME - around_px))
         self.adjustSize()
 
     def _choose_device(self) -> None:

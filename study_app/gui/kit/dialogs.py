@@ -106,11 +106,11 @@ class Question(QDialog):
 
     def accept(self) -> None:
         """Accept unless an answer is missing."""
-        if self.is_complete():
+        if self.check_answers():
             super().accept()
 
-    def is_complete(self) -> bool:
-        """Return whether all answers are present and valid; else show and focus the first one that is not."""
+    def check_answers(self) -> bool:
+        """Return True if all answers are present and valid; otherwise focus the first that is not, and show why."""
         for editor in self.editors.values():
             try:
                 _ = editor.value
@@ -177,7 +177,7 @@ class Work(Question):
         """Begin the work, or open its result."""
         if self.over:
             self.opened.emit()
-        elif not self.working and self.is_complete():
+        elif not self.working and self.check_answers():
             self.working = True
             for part in (*self.editors.values(), self.go_on):
                 part.hide()

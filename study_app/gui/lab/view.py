@@ -220,6 +220,6 @@ class LabPlace(Place):
 
 
 def _preset_name(title: str) -> str:
-    """Return a file name for a setting's title: "Water, edited" becomes "water-edited"."""
-    parts = "".join(sign if sign.isalnum() else " " for sign in title.lower()).split()
+    """Return a file name for a preset from its title: "Water, edited" becomes "water-edited"."""
+    parts = "".join(letter if letter.isalnum() else " " for letter in title.lower()).split()
     return "-".join(parts) or "preset"

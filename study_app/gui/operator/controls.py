@@ -138,13 +138,13 @@ class NotesCard(Card):
         self.field.entered.connect(self._keep_note)
         self.add.clicked.connect(self._add_note)
 
-    def show_lines(self, most: int) -> None:
-        """Show at most ``most`` notes; heading and hint are hidden with the first omitted note."""
-        self._shown = most
-        self._head.setVisible(most == NOTES_SHOWN)
-        self._list.setVisible(most > 0)
-        self.hint.setVisible(most == NOTES_SHOWN)
-        self.field.setToolTip(plain_tip("" if most == NOTES_SHOWN else self.hint.text()))
+    def set_note_count(self, count: int) -> None:
+        """Set the maximum number of notes; if it is less than `NOTES_SHOWN`, the heading and the hint are hidden."""
+        self._shown = count
+        self._head.setVisible(count == NOTES_SHOWN)
+        self._list.setVisible(count > 0)
+        self.hint.setVisible(count == NOTES_SHOWN)
+        self.field.setToolTip(plain_tip("" if count == NOTES_SHOWN else self.hint.text()))
         if self._view is not None:
             self.show_view(self._view)
 

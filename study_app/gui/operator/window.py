@@ -88,7 +88,7 @@ class _Arrangement(QWidget):
         self._arranged = (width, height, across, signs)
         self._set_width(width)
         self._parts.stop.setFixedSize(_SIDE, _STOPS[height])
-        self._parts.notes.show_lines(_NOTES[height])
+        self._parts.notes.set_note_count(_NOTES[height])
         self._parts.device.show_rows(_DEVICE_ROWS[height])
         self._parts.buttons.set_narrow(not signs)
         self._parts.buttons.hint.setVisible(width == "wide")

@@ -227,7 +227,7 @@ def describe_gate(scene: Scene, cost_ns: Mapping[tuple[str, Effect], float] | No
 
 
 def _budget_n(scene: Scene, total_n: float) -> float:
-    """Return the force that may be omitted."""
+    """Return the total force [N] of the effects that may be omitted."""
     return max(scene.accuracy.relative * min(total_n, scene.force_limit_n), scene.accuracy.absolute_n)
 
 

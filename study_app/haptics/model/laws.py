@@ -196,7 +196,7 @@ def shape_factor(flow_index: float) -> float:
 
 
 def herschel_bulkley(speed_mps: float, viscous: float, plastic: float, half_index: float) -> float:
-    """Return the viscous part of the force [N]: a w^n + b w^(n/2), of the flow and of its plastic boundary layer."""
+    """Return the viscous part of the force [N]: a w^n + b w^(n/2), from flow and plastic boundary layer."""
     root = math.pow(speed_mps, half_index)
     return (viscous * root + plastic) * root
 

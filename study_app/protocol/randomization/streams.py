@@ -79,10 +79,10 @@ def secret_stream(secret: bytes, name: str) -> random.Random:
 
 
 def own_code(codes: Sequence[str], secret: bytes, participant: str, block: str, code: str) -> str:
-    """Return a participant's own code for ``code``; ``codes`` are those of the block, in any order."""
-    known = sorted(codes)
-    mixed = shuffle(known, secret_stream(secret, f"codes/{participant}/{block}").random)
-    return mixed[known.index(code)]
+    """Return the code that replaces ``code`` for this participant; ``codes`` are all codes of the block."""
+    ordered = sorted(codes)
+    shuffled = shuffle(ordered, secret_stream(secret, f"codes/{participant}/{block}").random)
+    return shuffled[ordered.index(code)]
 
 
 def group_of(shares: Mapping[str, int], secret: bytes, entry: int) -> str:

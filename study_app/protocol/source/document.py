@@ -120,11 +120,11 @@ class _Scan:
 
     def _read_header(self) -> Path:
         start = self._at
-        many = self._take_mark("[[")
+        many = self._skip_mark("[[")
         if not many:
-            self._take_mark("[")
+            self._skip_mark("[")
         keys, parts = self._read_key()
-        self._take_mark("]]" if many else "]")
+        self._skip_mark("]]" if many else "]")
         path = self._within_arrays(keys)
         if many:
             index = self._array_tables.get(path, 0)
@@ -161,7 +161,7 @@ class _Scan:
         else:
             keys, parts = self._read_key()
             self._skip_blank()
-            self._take_mark("=")
+            self._skip_mark("=")
             self._skip_blank()
         value, path = self._at, table + keys
         self._read_value(path)
@@ -169,20 +169,20 @@ class _Scan:
         return table
 
     def _read_value(self, path: Path) -> None:
-        if self._take_mark("["):
+        if self._skip_mark("["):
             index = 0
-            while self._skip_blank() and not self._take_mark("]"):
+            while self._skip_blank() and not self._skip_mark("]"):
                 start, entry = self._at, (*path, index)
                 self._read_value(entry)
                 self.nodes.append(Node(kind="entry", path=entry, parts=(), start=start, value=start, end=self._at))
                 index += 1
                 self._skip_blank()
-                self._take_mark(",")
-        elif self._take_mark("{"):
-            while self._skip_blank() and not self._take_mark("}"):
+                self._skip_mark(",")
+        elif self._skip_mark("{"):
+            while self._skip_blank() and not self._skip_mark("}"):
                 self._read_assignment(path, "pair")
                 self._skip_blank()
-                self._take_mark(",")
+                self._skip_mark(",")
         elif string := _STRING.match(self._text, self._at):
             self._at = string.end()
         elif scalar := _SCALAR.match(self._text, self._at):
@@ -202,7 +202,7 @@ class _Scan:
                 parts.append(quoted.span())
                 self._at = quoted.end()
             self._skip_blank()
-            if not self._take_mark("."):
+            if not self._skip_mark("."):
                 return tuple(keys), tuple(parts)
 
     def _skip_blank(self) -> bool:
@@ -211,7 +211,8 @@ class _Scan:
             self._at = blank.end()
         return self._at < len(self._text)
 
-    def _take_mark(self, mark: str) -> bool:
+    def _skip_mark(self, mark: str) -> bool:
+        """Skip ``mark`` and return True if it comes next."""
         if self._text.startswith(mark, self._at):
             self._at += len(mark)
             return True

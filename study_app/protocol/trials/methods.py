@@ -329,8 +329,8 @@ class Adjusting:
     def comparison(self, place: int) -> float:
         return self.stimulus.comparison(self.standard, self.level(place))
 
-    def reached(self, steps: Iterable[int]) -> int:
-        """Return the place after these steps in order."""
+    def place_after(self, steps: Iterable[int]) -> int:
+        """Return the place after these steps, from the start."""
         place = 0
         for step in steps:
             place = self.moved(place, step)

@@ -103,13 +103,13 @@ def delay_warnings(protocol: Protocol) -> Iterator[str]:
 
 
 def _table_warning(protocol: Protocol, name: str, liquid: str, delay_ms: float) -> str | None:
-    """Return the stored table's warning about a shipped liquid and a light hand; None if little is withheld."""
+    """Return the warning about a shipped liquid and a light grip from the stored table; None if little is withheld."""
     estimator = protocol.scene.velocity.kind if protocol.scene.velocity.kind == "kalman" else "ewma"
     most_ms = longest_delay_ms(liquid, estimator)
     if delay_ms <= most_ms:
         return None
     rows = _table_rows(liquid, estimator, "light")
-    percent = float(np.interp(delay_ms, [it.delay_ms for it in rows], [it.withheld_percent for it in rows]))
+    percent = float(np.interp(delay_ms, [row.delay_ms for row in rows], [row.withheld_percent for row in rows]))
     if percent <= WITHHELD_PERCENT:
         return None
     force_n = steady_force(protocol.scene_for(name), STIRRED.speed_mps).drag_n

@@ -215,7 +215,7 @@ class Answering(SimulatedParticipant):
             self._post(Stepped(self._time.seconds, steps))
         self._post(TaskDone(self._time.seconds, "timeout" if over else "complete", {}))
 
-    def _features_felt(self, _trial: int | None) -> TrialFeatures:
+    def _perceived_features(self, _trial: int | None) -> TrialFeatures:
         return self._feels
 
     def _sensed_magnitudes(self, block: Block) -> Mapping[int, Sequence[float]]:

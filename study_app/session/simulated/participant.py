@@ -100,7 +100,7 @@ class SimulatedParticipant(ABC):
         """Post an event to the session."""
 
     @abstractmethod
-    def _features_felt(self, trial: int | None) -> TrialFeatures:
+    def _perceived_features(self, trial: int | None) -> TrialFeatures:
         """Return the features of a trial's last presentation; those of no trial for a form."""
 
     @abstractmethod
@@ -154,7 +154,7 @@ class SimulatedParticipant(ABC):
                 page.items, {page.items[0].id: given}, draw, changes_mind=not isinstance(page, ChoicePage)
             )
         assert isinstance(page, QuestionnairePage)  # noqa: S101 - only designs have other pages
-        return fill_in_page(page, self._features_felt(trial), self._person, draw)
+        return fill_in_page(page, self._perceived_features(trial), self._person, draw)
 
     def _design_answer(self, block: Block, trial: int, draw: Draw) -> str | int | float:
         """Return the answer to a trial with a design; a resumed session repeats its earlier answers."""

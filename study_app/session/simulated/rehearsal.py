@@ -409,7 +409,7 @@ class RehearsedSession(SimulatedParticipant):
         ]
         return answer_choices(visible, answers, self._stream(page.stream), changes_mind=False)
 
-    def _features_felt(self, trial: int | None) -> TrialFeatures:
+    def _perceived_features(self, trial: int | None) -> TrialFeatures:
         return NO_FEATURES if trial is None else {**self._features_of, **self._known}[trial][-1]
 
     def _sensed_magnitudes(self, block: Block) -> Mapping[int, Sequence[float]]:

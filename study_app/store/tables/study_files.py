@@ -190,9 +190,9 @@ def is_same_description(content: bytes, expected: bytes) -> bool:
         columns, wanted_columns = (
             [
                 (variable["name"], {key: variable[key] for key in variable.keys() - {"description"}})
-                for variable in it.pop("variableMeasured")
+                for variable in content.pop("variableMeasured")
             ]
-            for it in (description, wanted)
+            for content in (description, wanted)
         )
     except (AttributeError, KeyError, TypeError, ValueError):
         return False

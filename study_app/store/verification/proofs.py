@@ -147,6 +147,7 @@ def _signing_key(*, draws: bool) -> Any:
 
 
 def _check_signature(path: Path, lines: str, public: str, signature: str) -> str:
+    """Return who signed the proof in ``path``; raise StoreError if the signature is wrong or by another key."""
     ed25519 = optional_library("cryptography.hazmat.primitives.asymmetric.ed25519")
     wrong = optional_library("cryptography.exceptions").InvalidSignature
     try:

@@ -160,7 +160,7 @@ class _Compared:
         if isinstance(line, events.Responses):
             follows, wrong = bool(line.items) and line.items[0].value == sum(steps), "the answer is not the sum of the"
         else:
-            follows = set_to == setting.level(setting.reached(steps))
+            follows = set_to == setting.level(setting.place_after(steps))
             wrong = "the setting at the end of the interval does not match the"
         if not follows:
             self.differences.append(f"trial {which[0]}, attempt {which[1]}: {wrong} steps")

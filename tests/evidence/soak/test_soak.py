@@ -146,7 +146,7 @@ def test_a_sample_that_breaks_a_guarantee_is_counted(changes, violated):
         samples[field][3] = value
     audit = Audit(limit_n=8.0, slew_n=1.5, period_ns=1_000_000, reach_m=0.05)
     for part in np.split(samples, [2, 3]):
-        audit.take(part)
+        audit.check(part)
     names = ("accepted", "excess", "no_number", "steps", "unstopped", "drift_ns", "missing")
     assert {name for name in names if audit.counts[name]} == violated
     assert audit.counts.first_tick == (3 if violated else -1)

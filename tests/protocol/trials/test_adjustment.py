@@ -29,10 +29,10 @@ def test_steps_lead_to_more_of_the_number_and_stop_at_the_ends(level: str, direc
 def test_steps_beyond_an_end_are_none_and_those_back_are_counted_from_it() -> None:
     stimulus = Stimulus.model_validate({"vary": "b", "level": "value", "levels": (2.0, 18.0)})
     setting = Adjustment().adjusting(stimulus, 6.0, 2.1)
-    assert setting.level(setting.reached([-1000])) == 2.0
-    assert setting.reached([-5, -5, 4, 2]) == setting.reached([-100, 6]) != setting.reached([-4])
-    assert setting.level(setting.reached([1000])) == 18.0
-    back = setting.level(setting.reached([1000, -1]))
+    assert setting.level(setting.place_after([-1000])) == 2.0
+    assert setting.place_after([-5, -5, 4, 2]) == setting.place_after([-100, 6]) != setting.place_after([-4])
+    assert setting.level(setting.place_after([1000])) == 18.0
+    back = setting.level(setting.place_after([1000, -1]))
     assert back < 18.0 < back * 9 ** (1 / 40) * (1 + 1e-9)
     assert setting.level(0) == 2.1
     assert setting.level(20) == pytest.approx(2.1 * 9 ** (20 / 40))

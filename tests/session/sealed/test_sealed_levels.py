@@ -102,7 +102,7 @@ def run(protocol: Path, folder: Path, secret: int) -> Path:
 def blindly() -> Any:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Comparison, "answer", answer_blindly)
-        patch.setattr(RehearsedSession, "_features_felt", lambda _self, _trial: NO_FEATURES)
+        patch.setattr(RehearsedSession, "_perceived_features", lambda _self, _trial: NO_FEATURES)
         patch.setattr("study_app.session.simulated.participant.AdjustingObserver", BlindSetting)
         yield patch
 

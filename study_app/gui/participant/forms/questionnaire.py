@@ -14,7 +14,7 @@ from PySide6.QtWidgets import QHBoxLayout, QWidget
 
 from study_app.gui.participant.forms.question_field import NO_WORDS, QuestionField, ScaleField
 from study_app.gui.participant.forms.questions_page import QuestionsPage
-from study_app.gui.participant.pages.page_widget import PageContext, page_painter, page_scale, words_scale
+from study_app.gui.participant.pages.page_widget import PageContext, font_scale, page_painter, page_scale
 from study_app.gui.theme.theme import PARTICIPANT, font
 from study_app.gui.widgets.boxes import add_layout
 from study_app.protocol.questions import ItemView
@@ -92,7 +92,7 @@ def grid(width: float, height: float, asked: Asked, margin: float, *, text_scale
     Texts are enlarged by at least ``text_scale``. Rows may be too low for their texts or cells: see `Grid.can_be_hit`.
     """
     scale = page_scale(width, height)
-    text = words_scale(width, height, text_scale)
+    text = font_scale(width, height, text_scale)
     content = width - 2 * margin
     roomy = content >= 1100
     judge = max((112 if roomy else 92) * scale, asked.judge * text + 8 * scale) if asked.judge else 0.0

@@ -255,7 +255,7 @@ class QuestionsPage(PageWidget):
     @property
     def tight(self) -> bool:
         """Whether margins are reduced because the window is low for its text size."""
-        return self.height() < 740 * self.words_scale
+        return self.height() < 740 * self.font_scale
 
     @property
     def margin(self) -> float:
@@ -268,7 +268,7 @@ class QuestionsPage(PageWidget):
         title = self._title.sizeHint().height()
         head = self._head.heightForWidth(self.width())  # -1 without an introduction, which wraps
         head = (head if head >= 0 else self._head.sizeHint().height()) - self._head_row.sizeHint().height() + title
-        higher = max(0, round(target_px(self.words_scale)) - title) if tabs else 0
+        higher = max(0, round(target_px(self.font_scale)) - title) if tabs else 0
         return self.height() - head - higher - self.foot.height()
 
     def focus_first(self) -> None:
@@ -314,7 +314,7 @@ class QuestionsPage(PageWidget):
     def lay_out(self, scale: float) -> None:
         """Set the size of all parts and divide the questions into parts."""
         self.space_scale = scale
-        text, margin = self.words_scale, round(self.margin)
+        text, margin = self.font_scale, round(self.margin)
         side = round(self.margin - MARGIN * scale)
         self._head.setContentsMargins(margin, round((12 if self.tight else 20) * scale), margin, round(4 * scale))
         self._head.setSpacing(round((0 if self.tight else 6) * scale))
@@ -350,7 +350,7 @@ class QuestionsPage(PageWidget):
         self._update_foot()
 
     def _make_tabs(self) -> None:
-        text, face = self.words_scale, font("label", scale=self.words_scale)
+        text, face = self.font_scale, font("label", scale=self.font_scale)
         names = [_range_text(part) for part in self.parts]
         widest = max(map(QFontMetricsF(face).horizontalAdvance, names))
         size = QSize(round(max(_TAB_WIDTH * text, widest + 12 * text)), round(target_px(text)))
@@ -471,16 +471,16 @@ class FormWidget(QuestionsPage):
 
     def arrange_parts(self, asked: Sequence[QuestionField]) -> _Parts:
         """Return the questions in parts that fit; a smaller text is used if it avoids a second part."""
-        must = self.words_scale > 1.0 and self._text_scale > 1.0
-        parts = self._packed_parts(asked, self.words_scale)
+        must = self.font_scale > 1.0 and self._text_scale > 1.0
+        parts = self._packed_parts(asked, self.font_scale)
         if len(parts) == 2 and not must:
-            return self._single_part(asked) or self._packed_parts(asked, self.words_scale)
+            return self._single_part(asked) or self._packed_parts(asked, self.font_scale)
         return parts
 
     def _single_part(self, asked: Sequence[QuestionField]) -> _Parts | None:
         """Return all questions in one part with slightly smaller text, None if they do not fit."""
         for shrink in _SHRINKING:
-            parts = self._packed_parts(asked, self.words_scale * shrink)
+            parts = self._packed_parts(asked, self.font_scale * shrink)
             if len(parts) == 1:
                 return parts
             if sum(field.minimumHeight() for field in parts[1]) > _MOST_OVER * self.height():

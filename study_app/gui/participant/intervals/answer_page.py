@@ -47,8 +47,8 @@ class _AnswerPage(PageWidget):
     def lay_out(self, scale: float) -> None:
         margin = round((40 if self.width() >= 1100 else 24) * scale)
         self._column.setContentsMargins(margin, round(20 * scale), margin, margin)
-        self._progress.set_scale(self.words_scale)
-        self.question.setFont(_font_of_height(_QUESTION_PX * self.words_scale))
+        self._progress.set_scale(self.font_scale)
+        self.question.setFont(_font_of_height(_QUESTION_PX * self.font_scale))
 
     def showEvent(self, event: QShowEvent) -> None:
         super().showEvent(event)
@@ -103,9 +103,9 @@ class ChoiceWidget(_AnswerPage):
         super().lay_out(scale)
         for button in self.buttons:
             button.setMinimumSize(*(round(side * scale) for side in _CHOICE_BUTTON_PX))
-            button.setFont(_font_of_height(_CHOICE_TEXT_PX * self.words_scale))
-        self._cap.show_key(self.page.item.keys, self.words_scale)
-        self._hint.setFont(font("body", scale=self.words_scale))
+            button.setFont(_font_of_height(_CHOICE_TEXT_PX * self.font_scale))
+        self._cap.show_key(self.page.item.keys, self.font_scale)
+        self._hint.setFont(font("body", scale=self.font_scale))
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         if isinstance(event, QKeyEvent) and event.type() == QEvent.Type.KeyPress and self._handle_key(event):
@@ -161,9 +161,9 @@ class FeedbackWidget(PageWidget):
         self._column = vbox((STRETCH, 2), badge, word, (STRETCH, 3), parent=self)
 
     def lay_out(self, _scale: float) -> None:
-        self._badge.set_scale(_BADGE_SCALE * self.words_scale)
-        self._word.setFont(font("display", scale=self.words_scale))
-        self._column.setSpacing(round(14 * self.words_scale))
+        self._badge.set_scale(_BADGE_SCALE * self.font_scale)
+        self._word.setFont(font("display", scale=self.font_scale))
+        self._column.setSpacing(round(14 * self.font_scale))
 
     def showEvent(self, event: QShowEvent) -> None:
         super().showEvent(event)
@@ -243,11 +243,11 @@ class NumberWidget(_AnswerPage):
 
     def lay_out(self, scale: float) -> None:
         super().lay_out(scale)
-        words_scale = self.words_scale
+        font_scale = self.font_scale
         self.field.setFixedSize(*(round(side * scale) for side in _FIELD_PX))
         self.field.setFont(_font_of_height(_NUMBER_TEXT_PX * scale))
-        self.wrong.setFont(_font_of_height(18 * words_scale))
-        self.button.set_scale(words_scale)
+        self.wrong.setFont(_font_of_height(18 * font_scale))
+        self.button.set_scale(font_scale)
         width, height = (round(side * scale) for side in _KEY_PX)
         self._pad.set_size(width, height, round(_KEY_GAP_PX * scale), _font_of_height(20 * scale))
 

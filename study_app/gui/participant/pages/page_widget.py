@@ -47,13 +47,13 @@ def page_scale(width: float, height: float) -> float:
     return min(max(min(width / _DESIGNED_FOR[0], height / _DESIGNED_FOR[1]), 1.0), _MOST_SCALE)
 
 
-def words_scale(width: float, height: float, text_scale: float) -> float:
-    """Return the scale of text in a window [logical px], at least the legible one.
+def font_scale(width: float, height: float, text_scale: float) -> float:
+    """Return the scale of text in a window of this size [logical px]: ``text_scale`` or the page's scale if larger.
 
     A window smaller than the design size cannot hold text at 200 %; there the text is enlarged as far as possible.
     """
-    most = _MOST_TEXT * min(width / _DESIGNED_FOR[0], height / _DESIGNED_FOR[1])
-    return max(page_scale(width, height), min(text_scale, most))
+    largest = _MOST_TEXT * min(width / _DESIGNED_FOR[0], height / _DESIGNED_FOR[1])
+    return max(page_scale(width, height), min(text_scale, largest))
 
 
 def _layout_direction(wording: Words) -> Qt.LayoutDirection:
@@ -119,8 +119,8 @@ class PageWidget(QWidget):
         return self.layoutDirection() == Qt.LayoutDirection.RightToLeft
 
     @property
-    def words_scale(self) -> float:
-        return words_scale(self.width(), self.height(), self._text_scale)
+    def font_scale(self) -> float:
+        return font_scale(self.width(), self.height(), self._text_scale)
 
     def lay_out(self, scale: float) -> None:
         """Lay out all parts at the current size."""

@@ -147,8 +147,8 @@ class ReadingPage(PageWidget):
 
     def lay_out(self, scale: float) -> None:
         """Centre the column, slightly above the middle; the button is at the start of its lines."""
-        least = self.words_scale > scale
-        scale = self.words_scale
+        least = self.font_scale > scale
+        scale = self.font_scale
         margin = round((40 if self.width() >= 1100 else 24) * scale)
         top = round(20 * scale)
         if self._progress is not None:
@@ -290,7 +290,7 @@ class TextWidget(ReadingPage):
 
     def lay_out(self, scale: float) -> None:
         super().lay_out(scale)
-        self.count_label.setFont(font("card", scale=self.words_scale * 1.125, weight=500, tabular=True))
+        self.count_label.setFont(font("card", scale=self.font_scale * 1.125, weight=500, tabular=True))
         self.count_label.adjustSize()
         self._place_count()
 
@@ -300,13 +300,13 @@ class TextWidget(ReadingPage):
         """Return the room for the decline button if both do not fit in one line."""
         if self.decline is None or self.button is None:
             return 0
-        self.decline.set_scale(self.words_scale)
+        self.decline.set_scale(self.font_scale)
         self._stacked = self.button.width() + self._gap + self.decline.width() > width
         return self.decline.height() + self._gap // 2 if self._stacked else 0
 
     @property
     def _gap(self) -> int:
-        return round(16 * self.words_scale)
+        return round(16 * self.font_scale)
 
     def _place_decline(self) -> None:
         """Place the decline button next to the other one, or below it."""

@@ -12,9 +12,9 @@ from study_app.gui.participant.pages.page_widget import (
     BEGINNING,
     draw_key,
     draw_progress,
+    font_scale,
     key_size,
     mirrored,
-    words_scale,
 )
 from study_app.gui.participant.tank.frame import Placed, TaskShown
 from study_app.gui.theme.theme import PARTICIPANT, font
@@ -99,7 +99,7 @@ class Captions:
     def _size_words(self, width: float, height: float) -> None:
         self._width, self._height = width, height
         base = _caption_scale(width, height)
-        least = words_scale(width, height, self._text_scale) if self._text_scale > 1 else 1.0
+        least = font_scale(width, height, self._text_scale) if self._text_scale > 1 else 1.0
         self._scale = max(base, _LEAST_SCALE * least)
         self._fine = max(self._scale, least if self._text_scale > 1 else _FINE)  # small text shrinks less than the tank
         self._instruction_font = font("instruction", scale=self._scale)

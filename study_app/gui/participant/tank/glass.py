@@ -52,14 +52,14 @@ def brightness() -> NDArray[np.float32]:
 
 
 def _ray_starts(cells: int) -> NDArray[np.float32]:
-    """Return the start positions of rays along one axis [widths of the floor], beyond both ends."""
+    """Return the start positions of rays along one axis [widths of the floor]; some are beyond the ends."""
     beyond = math.ceil(_BEND * COLUMNS) * _RAYS
     starts: NDArray[np.float32] = np.arange(-beyond, cells * _RAYS + beyond, dtype=np.float32)
     return (starts + np.float32(0.5)) / np.float32(COLUMNS * _RAYS)
 
 
 def _count_rays(x: NDArray[np.float32], z: NDArray[np.float32]) -> NDArray[np.float64]:
-    """Count rays per cell of the floor; 1 is the brightness without ripples."""
+    """Return the number of rays per cell of the floor, relative to a surface without ripples."""
     column = np.floor(x * COLUMNS).astype(np.int32).ravel()
     row = np.floor(z * COLUMNS).astype(np.int32).ravel()
     inside = (column >= 0) & (column < COLUMNS) & (row >= 0) & (row < ROWS)
