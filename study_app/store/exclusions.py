@@ -293,8 +293,8 @@ def _parse_exclusion(path: Path, line: int, row: list[str], length: int) -> Excl
     flags = {"true": True, "false": False, MISSING: None}
     if not (_WHOLE.fullmatch(session) and (trial == MISSING or _WHOLE.fullmatch(trial)) and key_open in flags):
         raise StoreError(
-            f"{path}, line {line}: {','.join(row)!r} is not an exclusion (participant, session, trial or {MISSING}, "
-            "name, reason, time, whether the key was open): correct or remove the row"
+            f"{path}, line {line}: {','.join(row)!r} is not a valid exclusion (participant, session, trial or "
+            f"{MISSING}, name, reason, time, and whether the key was open): correct or remove the row"
         )
     return Exclusion(
         participant=participant,

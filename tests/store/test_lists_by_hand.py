@@ -606,8 +606,8 @@ def test_temporary_files_of_a_name_are_not_those_of_a_longer_one(tmp_path: Path)
 @pytest.mark.parametrize(
     ("row", "sentence"),
     [
-        (f"P1,one,2,AB,rang,{AT},true", f"line 3: 'P1,one,2,AB,rang,{AT},true' is not an exclusion"),
-        (f"P1,1,2,AB,rang,{AT},perhaps", f"line 3: 'P1,1,2,AB,rang,{AT},perhaps' is not an exclusion"),
+        (f"P1,one,2,AB,rang,{AT},true", f"line 3: 'P1,one,2,AB,rang,{AT},true' is not a valid exclusion"),
+        (f"P1,1,2,AB,rang,{AT},perhaps", f"line 3: 'P1,1,2,AB,rang,{AT},perhaps' is not a valid exclusion"),
         (f"P1,1,AB,rang,{AT},true", "line 3: has 6 fields"),
     ],
 )

@@ -39,7 +39,7 @@ _WIDE: Final = Grid(ahead=80, behind=160, aside=80, ball=0.07, near=0.25, far=16
 _WIDE_COARSE: Final = Grid(ahead=80, behind=160, aside=80, ball=0.1, near=0.4, far=16)
 _STEP: Final = 0.005
 FAST_REYNOLDS: Final = 50.0
-"""Above, steps are half as long: on the coarse grid, where they are twice as long, the flow would blow up."""
+"""Above this Reynolds number, steps are halved: otherwise the solution on the coarse grid would diverge."""
 _REYNOLDS: Final = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0)
 
 PERMITTED: Final = 0.02

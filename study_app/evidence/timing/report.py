@@ -162,7 +162,7 @@ def timing_evidence(timing: Timed) -> Evidence:
     )
     notes = timing.notes
     if timing.spin_us > 0:
-        notes += (f"spinning for {timing.spin_us:g} µs before each deadline used {timing.spun_share:.1%} of a core",)
+        notes += (f"spinning for {timing.spin_us:g} µs before each deadline used {timing.spun_share:.1%} of one core",)
     table = Table(_HEADINGS, [_row(timing, loop) for loop in timing.loops], left=2)
     what = "lateness in µs; skipped: deadlines that passed during a longer tick"
     text = "\n".join((head, what, "", table.text(), "", *map(str, timing.limits()), "", *notes)) + "\n"

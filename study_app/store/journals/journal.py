@@ -323,7 +323,7 @@ class Journal:
         line = line_of(event, self._lines + 1, self.clock, t_s, previous=self._hash.hexdigest())
         if (wrong := line_problem(line)) is not None:
             raise StoreError(
-                f"{self.path}, line {line['n']} {wrong}: it was not written; report this to the developers"
+                f"{self.path}, line {line['n']} {wrong}: the line was not written; report this to the developers"
             )
         content = line_bytes(line)
         self._refuse_if_replaced()
