@@ -214,18 +214,18 @@ def _compared(
     else:
         sides, samples = [{person: side[person] for person in kept} for side in sides], (tuple(numbers.values()),)
     return Compared(
-        samples=tuple(map(_ascending, samples)), left_out=left_out, shared=shared, sides=tuple(sides), cells=cells
+        samples=tuple(map(_sorted_by_value, samples)), left_out=left_out, shared=shared, sides=tuple(sides), cells=cells
     )
 
 
-def _ascending(sample: Iterable[Measured]) -> tuple[Measured, ...]:
-    return tuple(sorted(sample, key=lambda one: one.value))
+def _sorted_by_value(sample: Iterable[Measured]) -> tuple[Measured, ...]:
+    return tuple(sorted(sample, key=lambda measured: measured.value))
 
 
 def _side(name: str, held: Mapping[str, Measured], *, ratio: bool) -> ContrastSide:
     """Return the numbers of one side in display units, with their mean."""
     scale = math.exp if ratio else float
-    means = Compared(samples=(_ascending(held.values()),), left_out={}).means(0.05)
+    means = Compared(samples=(_sorted_by_value(held.values()),), left_out={}).means(0.05)
     low, high = (None, None) if means is None else (scale(float(end[0])) for end in means.interval(0.95))
     return ContrastSide(
         name=name,
@@ -620,8 +620,9 @@ def contrast_methods(results: Results) -> Iterator[str]:
     yield from _tests_used(contrasts)
     yield (
         "Each participant contributed one value to each comparison. In addition to the t test, we used a bootstrap "
-        "that adds a participant as extreme as the most extreme one (Gaffke 2005) and a t test corrected for skewness "
-        f"(Hall 1992). The reported p value is the largest of the three{_holm_words(contrasts)}."
+        "that includes one hypothetical participant as extreme as the most extreme participant in the sample (Gaffke "
+        "2005), and a t test corrected for skewness (Hall 1992). The reported p value is the largest of the "
+        f"three{_holm_words(contrasts)}."
     )
     if any(contrast.contrast.measure == "threshold" for contrast in contrasts):
         yield _WEIGHTED.rstrip()
@@ -694,9 +695,10 @@ def contrast_section(results: Results) -> Iterator[str]:
     yield paragraph(_direction_words(kinds), "soft")
     yield paragraph(
         "The column “t-test p” is from the t test alone. The column “p” is the largest p value from the t test, a "
-        "bootstrap that adds a participant as extreme as the most extreme one, and a t test corrected for skewness. "
-        f"The verdict depends on it{_holm_words(contrasts)}. The last two tests do not assume normal distributions, so "
-        f"normality is not tested. {_UNADJUSTED * (len(contrasts) > 1)}{_BAYES} {_WEIGHTED * weighted}"
+        "bootstrap that includes one hypothetical participant as extreme as the most extreme participant in the "
+        f"sample, and a t test corrected for skewness. The verdict depends on this value{_holm_words(contrasts)}. The "
+        f"last two tests do not assume normal distributions, so normality is not tested. "
+        f"{_UNADJUSTED * (len(contrasts) > 1)}{_BAYES} {_WEIGHTED * weighted}"
         f"{inclusion_words(contrast.contrast for contrast in contrasts)}",
         "soft",
     )

@@ -75,28 +75,30 @@ def _evaluated(study: Study, failures: Failures, progress: Progress, *, recordin
     ]
     asked = with_gates([one for one in collected if not isinstance(one, Failure)])
 
-    def tested(number: int, block: Block) -> BlockResult:
+    def block_result(number: int, block: Block) -> BlockResult:
         def tell(what: str) -> None:
             progress(f"testing: {what}", 0.5 * number / len(study.blocks))
 
         def test(answers: BlockAnswers) -> BlockResult | Failure:
             return failures.attempt("all tests", partial(evaluate_block, study, answers, tell), block=block.id)
 
-        lost = collected[number]
-        found = (
-            lost if isinstance(lost, Failure) else test(next(answers for answers in asked if answers.block is block))
+        failure = collected[number]
+        result = (
+            failure
+            if isinstance(failure, Failure)
+            else test(next(answers for answers in asked if answers.block is block))
         )
-        return empty_result(block, NotTested(found.what, found.why)) if isinstance(found, Failure) else found
+        return empty_result(block, NotTested(result.what, result.why)) if isinstance(result, Failure) else result
 
-    def moved() -> Performance | None:
-        """Measure motion and force if requested; None while sealed, since the force reveals a thick liquid."""
+    def measure_performance() -> Performance | None:
+        """Measure motion and force if requested; None before unblinding, because the force reveals a thick liquid."""
         if not (study.revealed and recordings):
             return None
         return performance(
             study, lambda done, total: progress(f"reading recordings: {done} of {total}", 0.5 + 0.3 * done / total)
         )
 
-    blocks = tuple(tested(number, block) for number, block in enumerate(study.blocks))
+    blocks = tuple(block_result(number, block) for number, block in enumerate(study.blocks))
     levels = failures.value("the answers at each level", lambda: level_results(study), ())
     return Results(
         decided=study.decided,
@@ -109,7 +111,7 @@ def _evaluated(study: Study, failures: Failures, progress: Progress, *, recordin
         questions=failures.value("the answers to other questions", lambda: question_results(study), ()),
         scores=failures.value("the questionnaire scores", lambda: score_results(study), ()),
         levels=levels,
-        performance=failures.value("motion and force", moved, None),
+        performance=failures.value("motion and force", measure_performance, None),
         failures=tuple(failures.found),
     )
 

@@ -66,7 +66,7 @@ def _environment() -> Environment:
 
 
 def _typeset(value: Any) -> Any:
-    """Return a text with the subscript of d_z; other values are unchanged."""
+    """Return a text in which the z of d_z is a subscript; other values are unchanged."""
     if isinstance(value, Markup) or not isinstance(value, str) or "d_z" not in value:
         return value
     return Markup(with_d_z(Markup.escape(value), "d<sub>z</sub>"))  # noqa: S704 - the text is escaped

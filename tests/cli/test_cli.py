@@ -187,7 +187,7 @@ def test_a_blinded_report_says_once_how_to_open_the_key_and_which_limits_were_br
     liquid_study("rehearse", "own.toml", "--no-recordings", "--results", "results")
     liquid_study("report", "results", "--to", "report")
     page = (tmp_path / "report" / "report.html").read_text(encoding="utf-8")
-    assert re.search(r"4 of 4 trials exceeded a limit: [^.]*frame gap at most 2 ms \(four trials\)", page)
+    assert re.search(r"4 of 4 trials exceeded a limit: [^.]*the trial at most 2 ms \(four trials\)", page)
     assert page.count("liquid-study unblind RESULTS --by NAME --reason TEXT") == 1
 
 

@@ -61,7 +61,7 @@ class _CumulativeModels(StatementTests):
             ("Statement", lambda test: short_text(self.found, test.item)),
             ("n", lambda test: f"{test.outcome.n}"),
             ("incomplete", lambda test: f"{self._model(test).incomplete}"),
-            ("Answers", lambda test: f"{self._model(test).answers}"),
+            ("answers", lambda test: f"{self._model(test).answers}"),
             *[(effect, partial(self._effect, place)) for place, effect in enumerate(effects)],
             (
                 "SDs (intercept, delay)" if delays else "SD",
@@ -77,10 +77,10 @@ class _CumulativeModels(StatementTests):
         unit, sign = ("per 100 ms of delay", "answers rise") if delays else ("", "the first of the two is rated higher")
         yield paragraph(
             f"A cumulative logit mixed model was fitted to {self._answers()} to each primary statement, including the "
-            f"answers of incomplete participants. Effects are log odds ratios {unit}".rstrip()
+            f"answers of participants with missing answers. Effects are log odds ratios {unit}".rstrip()
             + f" and are positive if {sign}; their 95 % intervals are Wald intervals. The SDs describe the "
             f"participants' intercepts{' and delay effects' if delays else ''}. "
-            f"LR is the likelihood-ratio statistic; p values are based on {methods} and were adjusted "
+            f"LR is the likelihood-ratio statistic; p values are based on {methods}. Adjusted p values are corrected "
             f"({fitted[0].correction}) across {number_text.counted(fitted[0].members, 'test')}.",
             "soft",
         )

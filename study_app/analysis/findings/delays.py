@@ -286,9 +286,10 @@ class ContrastsWithControl(Finding[tuple[ContrastWithControl, ...]]):
                 f"Each delay was compared with {ms(self.value[0].control_ms)} using two one-sided t tests on paired "
                 f"differences, with equivalence bounds of {bound_text(first.bound)}{beforehand} and "
                 f"{percent(1 - 2 * first.alpha)} confidence intervals. A delay was classified as equivalent only if a "
-                "bootstrap that adds a participant as extreme as the most extreme one (Gaffke 2005) also showed "
-                f"equivalence, and only with {min_sample(first.alpha, first.bound)}. It was classified as not "
-                "equivalent if the whole confidence interval lay outside the bounds."
+                "bootstrap that includes one hypothetical participant as extreme as the most extreme participant in "
+                "the sample (Gaffke 2005) also showed equivalence, and only with "
+                f"{min_sample(first.alpha, first.bound)}. It was classified as not equivalent if the whole confidence "
+                "interval lay outside the bounds."
             )
 
 
@@ -550,8 +551,8 @@ class _NoticedFrom(Finding[None]):
         corrected = f" With {counted(members, 'statement')} tested, p ≤ {criterion} is significant."
         return (
             f"Over delays of {self.found.delays_ms[0]:g} to {ms(at)}, participants tended to rate longer delays "
-            f"{listed(rated)}.{corrected * (members > 1)} They may also notice shorter delays. The test compares "
-            "ranks, not mean ratings."
+            f"{listed(rated)}.{corrected * (members > 1)} Participants may also notice shorter delays. The test "
+            "compares ranks, not mean ratings."
         )
 
     def _threshold_words(self) -> str:

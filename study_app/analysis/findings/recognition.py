@@ -176,7 +176,7 @@ def _undecided_words(outcome: Recognition) -> str:
         return ""
     one = outcome.undecided == 1
     return (
-        f"{number_text.counted(outcome.undecided, 'undecided answer')} {'counts' if one else 'count'} as incorrect, "
+        f"{number_text.counted(outcome.undecided, 'undecided answer')} {'counts' if one else 'count'} as incorrect "
         f"and {'is' if one else 'are'} not included in kappa. "
     )
 

@@ -1,4 +1,4 @@
-"""Tests of statements: whether settings differ, in which pairs, with the delay and between sessions."""
+"""Tests of statements: whether conditions differ, in which pairs, with the delay and between sessions."""
 
 import math
 import re
@@ -46,7 +46,17 @@ from study_app.analysis.statistics.outcome import Interval, Outcome, false_disco
 from study_app.analysis.statistics.rank_tests import Paired, friedman, global_permutation, paired
 from study_app.analysis.statistics.slope_tests import HOTELLING, T_TEST, SlopeTest, slope_test
 from study_app.analysis.statistics.trend_tests import trend
-from study_app.analysis.wording import all_of, counted, listed, number, p_equals, p_value, percent, significant
+from study_app.analysis.wording import (
+    all_of,
+    bound_text,
+    counted,
+    listed,
+    number,
+    p_equals,
+    p_value,
+    percent,
+    significant,
+)
 
 ONE_DELAY: Final = "the block has only one delay, so there is nothing to compare it with"
 
@@ -84,7 +94,9 @@ def table_of_tests(
         ("df", lambda test: _freedom(test.outcome)) if any(map(_freedom, outcomes)) else None,
         ("p", lambda test: p_value(test.outcome.p)),
         ("adjusted p", lambda test: p_value(test.p_adjusted)),
-        ("smallest p", lambda test: p_value(test.outcome.smallest_p)) if _has(outcomes, "smallest_p") else None,
+        ("smallest attainable p", lambda test: p_value(test.outcome.smallest_p))
+        if _has(outcomes, "smallest_p")
+        else None,
         (effect if len(effect) <= _MOST_NAME else "effect size", lambda test: number(test.outcome.effect))
         if _has(outcomes, "effect")
         else None,
@@ -131,15 +143,15 @@ def families(tests: Sequence[Tested]) -> str:
     ).replace("  ", " ")
 
 
-def compared(answers: BlockAnswers) -> tuple[tuple[Tested, ...], Absent]:
+def test_differences(answers: BlockAnswers) -> tuple[tuple[Tested, ...], Absent]:
     """Test for every statement whether the settings receive the same answers."""
     if answers.k < 2:
         return (), (NotTested(SettingsDiffer.what, "the block has only one condition, so there is nothing to compare"),)
-    outcomes = {item: _alike(answers, values) for item, values in answers.values.items()}
-    return corrected_tests(outcomes, answers, f"{answers.block.id}: settings differ"), ()
+    outcomes = {item: _test_difference(answers, values) for item, values in answers.values.items()}
+    return corrected_tests(outcomes, answers, f"{answers.block.id}: conditions differ"), ()
 
 
-def _alike(answers: BlockAnswers, values: Any) -> Outcome:
+def _test_difference(answers: BlockAnswers, values: Any) -> Outcome:
     if values.shape[1] == 2:
         return paired(values[:, 0], values[:, 1], alpha=answers.decided.alpha)
     return friedman(values, draws=answers.draws, seed=answers.seed)
@@ -162,7 +174,7 @@ class StatementTests(Finding[tuple[Tested, ...]]):
     asks: ClassVar[str]
     title: ClassVar[str]
 
-    def compared(self) -> Sequence[str]:
+    def compared_names(self) -> Sequence[str]:
         """Return the names of the compared settings."""
         return ()
 
@@ -170,7 +182,7 @@ class StatementTests(Finding[tuple[Tested, ...]]):
         return (judged_row(self.found, self.asks, test) for test in self.value)
 
     def section(self) -> Iterator[str]:
-        return table_of_tests(self._said(self.title), self.found, self.value, self.compared())
+        return table_of_tests(self._said(self.title), self.found, self.value, self.compared_names())
 
     def _said(self, words: str) -> str:
         return words.format(noun=settings_noun(self.found))
@@ -186,14 +198,14 @@ class SettingsDiffer(StatementTests):
     kinds = ("liquids", "views")
     sealed = KINDS
     statements = True
-    asks = "settings differ"
+    asks = "conditions differ"
     title = "Do the {noun}s differ, statement by statement?"
 
     @classmethod
     def test(cls, answers: BlockAnswers, result: BlockResult) -> tuple[tuple[Tested, ...], Absent]:
-        return compared(answers)
+        return test_differences(answers)
 
-    def compared(self) -> Sequence[str]:
+    def compared_names(self) -> Sequence[str]:
         return self.found.names
 
     def methods(self) -> Iterator[str]:
@@ -265,7 +277,7 @@ class _SessionsDiffer(StatementTests):
     asks = "sessions differ"
     title = "Do sessions differ?"
 
-    def compared(self) -> Sequence[str]:
+    def compared_names(self) -> Sequence[str]:
         return [f"session {number}" for number in self.found.sessions]
 
     @classmethod
@@ -279,7 +291,9 @@ class _SessionsDiffer(StatementTests):
             single, of = answers.single[item.id], answers.sessions[item.id]
             each = np.stack([medians(np.where(of == one, single, np.nan)) for one in numbers], axis=2)
             common = np.asarray(~np.isnan(each).any(axis=2))
-            outcomes[item.id] = _alike(answers, medians(np.where(common[..., None], each, np.nan).transpose(0, 2, 1)))
+            outcomes[item.id] = _test_difference(
+                answers, medians(np.where(common[..., None], each, np.nan).transpose(0, 2, 1))
+            )
         ungated = replace(answers, gate=0.0)  # sessions may differ even if settings do not
         tested = in_family(outcomes, ungated, f"{answers.block.id}: sessions", false_discovery, FDR, primary=False)
         if all(test.outcome.n == 0 for test in tested):
@@ -324,7 +338,7 @@ class OverAll(Finding[Outcome | None]):
 
     def rows(self) -> Iterator[Row]:
         if (overall := self.value) is not None:
-            row = test_row(self.found, "settings differ, all statements", overall)
+            row = test_row(self.found, "conditions differ, all statements", overall)
             yield row | rows_alone(self.found, "all statements at once")
 
     def section(self) -> Iterator[str]:
@@ -437,7 +451,7 @@ class Effects(Finding[tuple[Effect, ...]]):
         caption = (
             f"{what} ({drawing.simulated}n = {result.n}). Diamonds: means with {percent(level)} confidence intervals "
             "(Student's t), not corrected for the number of intervals. Conclusions are based on the tests."
-            + (f" Band: equivalence bounds of ±{bound:g}." if bound else "")
+            + (f" Band: equivalence bounds of {bound_text(bound)}." if bound else "")
         )
         return people_picture(
             study,
@@ -491,7 +505,7 @@ def pairs_of(answers: BlockAnswers, omnibus: tuple[Tested, ...]) -> tuple[tuple[
         for item, first, second in each
     }
     primary = [answers.decided.is_primary(item) for item, *_ in each]
-    tested = in_family(outcomes, answers, f"{answers.block.id}: all pairs of settings", holm, HOLM, primary=primary)
+    tested = in_family(outcomes, answers, f"{answers.block.id}: all pairs of conditions", holm, HOLM, primary=primary)
     return tuple(
         Pair(codes[first], codes[second], replace(test, item=item))
         for (item, first, second), test in zip(each, tested, strict=True)
@@ -516,7 +530,7 @@ class Pairs(Finding[tuple[Pair, ...]]):
     def rows(self) -> Iterator[Row]:
         for pair in self.value:
             compared = f"{name(self.found, pair.first)} − {name(self.found, pair.second)}"
-            row = judged_row(self.found, "two settings differ", pair.tested)
+            row = judged_row(self.found, "two conditions differ", pair.tested)
             yield row | {"comparison": compared, "codes": f"{pair.first} {pair.second}"}
 
     def section(self) -> Iterator[str]:
@@ -531,7 +545,7 @@ class Pairs(Finding[tuple[Pair, ...]]):
             ("V", lambda pair: number(pair.tested.outcome.statistic, 1)),
             ("p", lambda pair: p_value(pair.tested.outcome.p)),
             ("adjusted p", lambda pair: p_value(pair.tested.p_adjusted)),
-            ("smallest p", lambda pair: p_value(pair.tested.outcome.smallest_p)),
+            ("smallest attainable p", lambda pair: p_value(pair.tested.outcome.smallest_p)),
             ("rank-biserial", lambda pair: number(pair.tested.outcome.effect)),
             *ends_of(lambda pair: pair.tested.outcome.interval),
             ("Verdict", lambda pair: pair.tested.verdict),
@@ -544,8 +558,9 @@ class Pairs(Finding[tuple[Pair, ...]]):
             f"{settings_noun(self.found)}s ({pairs[0].tested.outcome.method}); p values are Holm-adjusted across the "
             f"{pairs[0].tested.members} pairs in this table. A rank-biserial correlation above 0 means that the first "
             f"{settings_noun(self.found)} in the pair was rated higher. Nominal 95 % confidence intervals use "
-            "Fisher's z; with up to 24 pairs, their coverage is about 90 %. There is no interval if all differing "
-            "pairs differ in the same direction (the correlation is then −1 or 1), or if fewer than six pairs differ.",
+            "Fisher's z; with up to 24 participants, their coverage is about 90 %. There is no interval if all "
+            "differences have the same sign (the correlation is then −1 or 1), or if fewer than six participants "
+            "answered differently about the two.",
             "soft",
         )
 

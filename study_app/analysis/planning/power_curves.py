@@ -42,7 +42,7 @@ from study_app.protocol.participants import CONSISTENT, NOISY, STATED
 from study_app.psychophysics.grid import Z_95
 from study_app.store.files import Column, csv_bytes, optional, write_files
 
-Question: TypeAlias = Literal["settings differ", "trend", "lowest delay", "equivalence", "contrast"]
+Question: TypeAlias = Literal["conditions differ", "trend", "lowest delay", "equivalence", "contrast"]
 
 _MANY: Final = 200
 """So many simulated participants tell how far people differ."""
@@ -135,7 +135,7 @@ def interval(share: float, studies: int) -> tuple[float, float]:
 
 
 def _curves(block: Planned, counts: Counts, studies: int) -> Iterator[Curve]:
-    question: Question = "trend" if block.kind == "delays" else "settings differ"
+    question: Question = "trend" if block.kind == "delays" else "conditions differ"
     means = counts[block.id, "means"] / studies
     for what, over in (("any", "at least one statement"), ("all", _OVER_ALL)):
         if (block.id, what) in counts:
@@ -330,7 +330,7 @@ COLUMNS: Final = (
 )
 
 _HEADS: Final[dict[Question, tuple[str, str]]] = {
-    "settings differ": ("Do the conditions differ?", "statement"),
+    "conditions differ": ("Do the conditions differ?", "statement"),
     "trend": ("Do answers change with the delay?", "statement"),
     "lowest delay": ("Is a trend found up to this delay or a shorter one?", "statement, delay"),
     "equivalence": ("Can any delay be shown to be equivalent to the shortest one?", "statement, delay"),
@@ -472,7 +472,7 @@ def _summary(power: Powers) -> Iterator[str]:
             and curve.item not in plan.unknown
             and (not plan.decided.made or plan.decided.is_primary(curve.item))
         )
-        if curve.question == "contrast" or (primary and curve.question in ("settings differ", "trend")):
+        if curve.question == "contrast" or (primary and curve.question in ("conditions differ", "trend")):
             shares = dict(zip(power.kinds, (kind.power[place] for kind in power.among_kinds(curve)), strict=True))
             about = "" if curve.question == "contrast" else f" ({HEADS[curve.question]})"
             lines.append(
@@ -537,7 +537,7 @@ def _truly_equal(curves: Sequence[Curve]) -> list[Curve]:
 
 def _explained(question: Question, found: Powers) -> list[str]:
     match question:
-        case "settings differ":
+        case "conditions differ":
             return [
                 "Differences are tested with Friedman's test (permutation), or with Wilcoxon's signed-rank test if "
                 "there are two conditions."
@@ -621,7 +621,7 @@ def _name(curve: Curve, power: Powers) -> str:
 _PLOTS_A_ROW: Final = 5
 _TITLE_LETTERS: Final = 21
 HEADS: Final[dict[Question, str]] = {
-    "settings differ": "conditions differ",
+    "conditions differ": "conditions differ",
     "trend": "trend over delay",
     "lowest delay": "trend up to this delay",
     "equivalence": "equivalent to the control",

@@ -140,9 +140,10 @@ def hypotheses(protocol: Protocol, language: str) -> Iterator[str]:
         weighted = " Participants are weighted as in the group mean." if contrast.measure == "threshold" else ""
         yield (
             f"Hypothesis: {described}. We test it with a {sides} {test}, using one value per "
-            f"participant.{weighted} We also use a bootstrap that adds a participant as extreme as the most extreme "
-            "one (Gaffke 2005) and a t test corrected for skewness (Hall 1992). The p value is the largest of the "
-            f"three, Holm-adjusted across all hypotheses of this kind.{_equality_of(protocol, contrast)}"
+            f"participant.{weighted} We also use a bootstrap that includes one hypothetical participant as extreme as "
+            "the most extreme participant in the sample (Gaffke 2005), and a t test corrected for skewness (Hall "
+            f"1992). The p value is the largest of the three, Holm-adjusted across all "
+            f"hypotheses of this kind.{_equality_of(protocol, contrast)}"
         )
     if protocol.analysis is not None and protocol.analysis.contrasts:
         yield inclusion_words(protocol.analysis.contrasts)
@@ -468,7 +469,7 @@ def _exclusions(protocol: Protocol) -> Iterator[str]:
         attempts = protocol.limits.attempts
         times = "" if attempts is None else f", for up to {number_text.counted(attempts, 'presentation')} in total"
         yield (
-            "If any interval in a trial exceeds one of these limits, no question is asked and the trial is "
+            "If any interval in a trial exceeds one of the limits below, no question is asked and the trial is "
             f"repeated{times}."
         )
         if (permitted := protocol.limits.missing_percent) is not None:

@@ -68,7 +68,7 @@ class Card:
 
     @property
     def badge(self) -> str:
-        """The verdict as the badge beside the question shows it."""
+        """The text of the badge that shows the verdict."""
         return BADGES.get(self.verdict, self.verdict)
 
     def figure_of(self, drawn: Sequence[Picture]) -> Picture | None:

@@ -383,7 +383,7 @@ def _form_times(study: Study, steps: tuple[str, ...], form: str) -> str:
 def _of_statements(study: Study, results: Results, blocks: list[BlockResult]) -> Iterator[str]:
     quartiles = QUARTILES.replace(" (", ", ").rstrip(")")
     yield (
-        "Statements were rated on seven-point scales. Answers were treated as ordinal and are summarised by medians "
+        "Statements were rated on seven-point scales. Answers were treated as ordinal and summarised by medians "
         f"and quartiles ({quartiles})."
     )
     yield from _means(results, blocks)

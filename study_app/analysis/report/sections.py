@@ -51,6 +51,7 @@ from study_app.analysis.results import (
 from study_app.analysis.statistics.outcome import FEW
 from study_app.analysis.wording import counted, listed, ms, number, significant
 from study_app.discovery import by_name
+from study_app.protocol.descriptions import limit_label
 from study_app.protocol.model import RULES, quoted_title
 from study_app.protocol.orders import Evenness
 from study_app.protocol.participants import RecordedSessions
@@ -739,16 +740,17 @@ def _violated_limits(study: Study, limits: Mapping[str, float]) -> str:
     if not any(broken):
         return ""
     counts = Counter(limit for one in broken for limit in one)
-    listed = ", ".join(f"{_limit(what, limits[what])} ({counted(count, 'trial')})" for what, count in counts.items())
+    listed = "; ".join(f"{_limit(what, limits[what])} ({counted(count, 'trial')})" for what, count in counts.items())
     return f"{sum(map(bool, broken))} of {len(rows)} trials exceeded a limit: {listed}. "
 
 
 def _limit(what: str, limit: float) -> str:
-    """Return a limit as text: "frame gap at most 250 ms"."""
+    """Return a limit as text: "time between two ticks at most 20 ms"."""
     words, _, unit = what.rpartition("_")
-    most = f"at most {limit:g} {'%' if words and unit == 'percent' else unit}"
-    named = words.replace("_", " ").replace("withheld", "force held back")
-    return f"{named} {most}" if words else most
+    bound, _, quantity = limit_label(what).partition(" ")
+    value = f"at {'least' if bound == 'minimum' else 'most'} {limit:g}"
+    value += {"percent": " %", "ms": " ms"}.get(unit, "" if quantity else f" {unit}")
+    return f"{quantity or words.replace('_', ' ')} {value}".lstrip()
 
 
 def _within(delivered: Delivered) -> str:
@@ -862,7 +864,7 @@ def _recordings(measured: Performance) -> str:
     if not measured.judged:
         return f"{text}. No data are available on whether trials met the protocol's limits."
     if not measured.invalid:
-        return f"{text}. All measured trials met the protocol's limits."
+        return f"{text}. All trials with measured timing met the protocol's limits."
     verb = "is" if measured.invalid == 1 else "are"
     invalid = f"{counted(measured.invalid, 'trial').capitalize()} exceeded the protocol's limits but {verb}"
     return f"{text}. {invalid} included."

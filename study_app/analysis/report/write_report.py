@@ -50,7 +50,7 @@ from study_app.analysis.results import (
     name,
     report_no_progress,
 )
-from study_app.analysis.wording import counted, listed, with_d_z
+from study_app.analysis.wording import bound_text, counted, listed, with_d_z
 from study_app.errors import AnalysisError
 from study_app.figure_style import FORMATS
 from study_app.number_text import capitalised
@@ -311,7 +311,7 @@ def report_files(study: Study, progress: Progress = report_no_progress) -> tuple
     planned = failures.value("planned exclusions", lambda: planned_exclusions(study, results), None)
     if planned is not None:
         open_ones = [proposal for proposal in planned.proposals if proposal.decision == "undecided"]
-        texts["limits"] = (*_proposed(open_ones), *texts["limits"])
+        texts["limits"] = (*_proposal_sentences(open_ones), *texts["limits"])
         texts["planned_exclusions"] = [asdict(proposal) for proposal in planned.proposals]
     files: dict[str, bytes] = {}
     for file, make in (
@@ -351,8 +351,8 @@ def _draw(task: FigureTask) -> Picture | Failure | None:
     return failures.found[0] if failures.found else picture
 
 
-def _proposed(proposals: Sequence[Proposal]) -> Iterator[str]:
-    """Yield the sentence on sessions that await a person's decision."""
+def _proposal_sentences(proposals: Sequence[Proposal]) -> Iterator[str]:
+    """Yield the sentence on sessions whose exclusion awaits a decision, if any."""
     if proposals:
         who = listed(
             [
@@ -489,7 +489,7 @@ def _reproduction_sentences(study: Study, results: Results) -> Iterator[str]:
     rows = [
         ("Analysis decided before the first session", "yes" if decided.binding else "no; all results are exploratory"),
         ("Alpha", decided.alpha_words()),
-        ("Equivalence bound of statements", "none" if bound is None else f"±{bound:g}"),
+        ("Equivalence bound for statements", "none" if bound is None else bound_text(bound)),
         ("Primary statements", (", ".join(decided.primary) or "all") if decided.binding else "none"),
         ("Seed of the analysis", str(results.seed)),
         *((f"Version of {library}", version) for library, version in versions().items()),

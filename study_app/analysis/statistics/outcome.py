@@ -169,7 +169,10 @@ def _normal_density(values: Array, means: Array, sd: float) -> Array:
 
 
 def _excess(end: float, places: Array, weights: Array, step: float, due: float) -> float:
-    """Return the probability beyond ``due`` that a walk from ``places`` leaves ± ``end`` in a ``step``."""
+    """Return the probability that a walk leaves ± ``end`` in its next step, minus ``due``.
+
+    ``places`` and ``weights`` are the distribution before the step, ``step`` is the SD of the step.
+    """
     return float(weights @ (ndtr((places - end) / step) + ndtr((-end - places) / step))) - due
 
 

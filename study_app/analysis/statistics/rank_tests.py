@@ -58,7 +58,7 @@ class Paired(Outcome):
 
 
 def paired(x: ArrayLike, y: ArrayLike, *, alpha: float = 0.05) -> Paired:
-    """Compare answers (participants,) of the same participants in two settings; equal pairs are dropped, as in R.
+    """Compare answers (participants,) of the same participants in two settings; equal answers are dropped, as in R.
 
     Pairs with NaN, a missing answer, are also dropped. The note says if too few pairs remain to reach p of ``alpha``.
     """
@@ -84,7 +84,7 @@ def paired(x: ArrayLike, y: ArrayLike, *, alpha: float = 0.05) -> Paired:
         statistic=v / 2 if len(ranks) else None,
         p=p,
         smallest_p=smallest,
-        method=f"{method}, two-sided; equal pairs dropped",
+        method=f"{method}, two-sided; pairs of equal answers dropped",
         effect_name="matched-pairs rank-biserial correlation",
         effect=effect,
         interval=interval,
@@ -146,7 +146,10 @@ def _fisher(effect: float | None, n: int) -> tuple[Interval | None, str]:
     reach = float(ndtri(0.975)) * deviation
     low, high = math.tanh(math.atanh(effect) - reach), math.tanh(math.atanh(effect) + reach)
     return Interval(
-        low=low, high=high, level=0.95, method="Fisher z (approximate: coverage of about 90 % for up to 24 pairs)"
+        low=low,
+        high=high,
+        level=0.95,
+        method="Fisher z (approximate: coverage of about 90 % for up to 24 participants)",
     ), ""
 
 

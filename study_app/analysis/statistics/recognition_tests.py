@@ -110,12 +110,12 @@ def recognition(names: ArrayLike, truth: Sequence[int | None], labels: int, *, s
     ``names`` (participants, settings) are from `named_labels`, ``truth`` is the index of the correct label for each
     setting, None if there is none; ``seed`` is for the bootstrap interval of kappa, which needs two participants.
     """
-    given = _names(names, truth, labels)
-    used = (given != UNANSWERED).any(axis=1)
-    right = np.array([UNANSWERED - 1 if label is None else label for label in truth])
-    hits = int((given == right).sum())
-    chance = sum_distribution(_chance(tuple(row), tuple(right.tolist())) for row in given.tolist())
-    effect, interval, reason = _kappa(given, right, labels, seed)
+    named = _names(names, truth, labels)
+    used = (named != UNANSWERED).any(axis=1)
+    correct = np.array([UNANSWERED - 1 if label is None else label for label in truth])
+    hits = int((named == correct).sum())
+    chance = sum_distribution(_chance(tuple(row), tuple(correct.tolist())) for row in named.tolist())
+    effect, interval, reason = _kappa(named, correct, labels, seed)
     n = int(used.sum())
     return Recognition(
         test="recognition by name",
@@ -130,13 +130,13 @@ def recognition(names: ArrayLike, truth: Sequence[int | None], labels: int, *, s
         effect=effect,
         interval=interval,
         no_interval=reason,
-        note=_note(n, int((given == UNDECIDED).sum()), chance.highest),
+        note=_note(n, int((named == UNDECIDED).sum()), chance.highest),
         expected=chance.mean if n else None,
-        table=tuple(tuple(int((column == label).sum()) for label in _columns(labels)) for column in given.T),
-        rates=_rates(given, truth),
-        decided=int((given >= 0).sum()),
-        undecided=int((given == UNDECIDED).sum()),
-        unanswered=int((given == UNANSWERED).sum()),
+        table=tuple(tuple(int((column == label).sum()) for label in _columns(labels)) for column in named.T),
+        rates=_rates(named, truth),
+        decided=int((named >= 0).sum()),
+        undecided=int((named == UNDECIDED).sum()),
+        unanswered=int((named == UNANSWERED).sum()),
     )
 
 

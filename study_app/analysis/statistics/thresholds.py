@@ -125,7 +125,7 @@ def noticed(values: ArrayLike, levels: Sequence[float]) -> Threshold:
         n=int(used.sum()),
         dropped=int((~used).sum()),
         statistic_name="deviance",
-        method="posterior median of a logistic function of the level",
+        method="posterior median of a logistic function of the delay",
         effect_name="detection threshold",
         note=note,
         levels=tuple(order.tolist()),

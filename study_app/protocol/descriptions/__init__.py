@@ -1,7 +1,13 @@
 """A protocol in words, and how one protocol differs from another."""
 
 from study_app.protocol.descriptions.protocol_differences import CONDITIONS_DIFFER, differences, document_differences
-from study_app.protocol.descriptions.protocol_text import describe, describe_scenes, limit_rows, number_range
+from study_app.protocol.descriptions.protocol_text import (
+    describe,
+    describe_scenes,
+    limit_label,
+    limit_rows,
+    number_range,
+)
 
 __all__ = [
     "CONDITIONS_DIFFER",
@@ -9,6 +15,7 @@ __all__ = [
     "describe_scenes",
     "differences",
     "document_differences",
+    "limit_label",
     "limit_rows",
     "number_range",
 ]

@@ -350,6 +350,13 @@ def _question_kind(item: Question, context: Context) -> str:
     return f"{item.kind_id}{answers}{condition}"
 
 
+def limit_label(key: str) -> str:
+    """Return the meaning of a limit, such as "maximum time between two ticks"; "" for an unknown key."""
+    field = Limits.model_fields.get(key)
+    label = "" if field is None else re.sub(r" \[.*|; .*|\.$", "", field.description or "")
+    return label[:1].lower() + label[1:]
+
+
 def limit_rows(protocol: Protocol) -> list[tuple[str, str]]:
     """Return the limits of a valid trial that the study's blocks can exceed: each value with its meaning."""
     units, rows = {"ms": " ms", "percent": " %"}, []
@@ -362,10 +369,9 @@ def limit_rows(protocol: Protocol) -> list[tuple[str, str]]:
         "attempts": bool(with_intervals),
         "missing_percent": bool(with_intervals),
     }
-    for key, field in Limits.model_fields.items():
+    for key in Limits.model_fields:
         if not applies.get(key, True):
             continue
-        label = re.sub(r" \[.*|; .*|\.$", "", field.description or "")
         if (value := getattr(protocol.limits, key)) is not None:
-            rows.append((f"{value:g}{units.get(key.rpartition('_')[2], '')}", label[:1].lower() + label[1:]))
+            rows.append((f"{value:g}{units.get(key.rpartition('_')[2], '')}", limit_label(key)))
     return rows

@@ -115,7 +115,7 @@ def test_r_computes_the_same_settings(reported: Path) -> None:
     done = run_in_r(reported)
     assert (done.returncode, done.stderr) == (0, "")
     *_, counts, verdict = done.stdout.splitlines()
-    assert verdict == "every number that R computes is the report's"
+    assert verdict == "all numbers that R computed agree with the report"
     found, of = re.findall(r"\d+", counts)
     assert found == of == "18"  # three people: PSE, two ends, JND, error, hysteresis
     assert "matching, P002 at 6.0: hysteresis" in done.stdout

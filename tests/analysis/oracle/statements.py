@@ -135,13 +135,13 @@ def _settings_differ(block: Block) -> None:
     own |= {"statistic": sum(one for one, _ in tested), "effect": np.mean([one / n / (k - 1) for one, n in tested])}
     own |= {"incomplete": len(people) * len(whole) - sum(map(len, whole.values()))}
     own |= {"smallest_p": max(1 / (1 + draws), math.factorial(k) ** (1.0 - len(people)))}
-    block.record("overall", own, "settings differ, all statements")
+    block.record("overall", own, "conditions differ, all statements")
     delays = block.found["kind"] == "delays"
     design = np.array(block.delays)[:, None] / 100 if delays else np.eye(k)[:, 1:]
     slopes = {item: _slopes(answers, design, block.sides.get(item)) for item, answers in block.wide.items()}
     block.record_family("mixed", "means differ", slopes, explored=True)
     if not delays:
-        block.record_family("omnibus", "settings differ", {item: _alike(one) for item, one in block.wide.items()})
+        block.record_family("omnibus", "conditions differ", {item: _alike(one) for item, one in block.wide.items()})
 
 
 def _cumulative_models(block: Block) -> None:
@@ -231,7 +231,7 @@ def _pairs(block: Block) -> None:
         item, first, second = pairs[number]
         own = named("tested.outcome", outcomes[number]) | {"tested.p_adjusted": max(p, block.gate)}
         comparison = f"{names[first]} − {names[second]}"
-        block.record(f"pairs.{number}", own | {"tested.members": len(pairs)}, "two settings differ", item, comparison)
+        block.record(f"pairs.{number}", own | {"tested.members": len(pairs)}, "two conditions differ", item, comparison)
 
 
 def _recognition(block: Block) -> None:

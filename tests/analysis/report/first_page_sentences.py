@@ -159,9 +159,9 @@ def pairs_differ(match: re.Match[str], told: Told) -> bool:
     """Check that each named pair is significant in a statement, in the verdict of the first page."""
     names = {setting["code"]: name.lower() for setting, name in
              zip(told.block["settings"], told.block["names"], strict=True)}  # fmt: skip
-    question = "settings differ" if len(names) == 2 else "two settings differ"
+    question = "conditions differ" if len(names) == 2 else "two conditions differ"
     found: dict[str, set[tuple[str, str]]] = {"shown": set(), "suggested": set()}
-    verdicts = {row["verdict"] for row in (*told.asked("settings differ"), *told.asked(question))}
+    verdicts = {row["verdict"] for row in (*told.asked("conditions differ"), *told.asked(question))}
     for row in told.asked(question):
         if row["verdict"] in found and float(row["p_adjusted"]) <= told.alpha:
             pair = " and ".join(names[code] for code in row["codes"].split())
@@ -176,8 +176,8 @@ def largest_of_settings(match: re.Match[str], told: Told) -> bool:
     first, mean, item, other, low, high, n = match.groups()
     block = told.block
     names = {it["code"]: text.lower() for it, text in zip(block["settings"], block["names"], strict=True)}
-    rows = told.asked("settings differ")
-    verdicts = {row["verdict"] for row in (*rows, *told.asked("two settings differ"))}
+    rows = told.asked("conditions differ")
+    verdicts = {row["verdict"] for row in (*rows, *told.asked("two conditions differ"))}
     stated = "shown" if "shown" in verdicts or _recognition_shown(told) else "suggested"
     differing = {row["item"] for row in rows if row["verdict"] == stated}
     known = [effect for effect in block["effects"] if effect["item"] in differing]
@@ -197,13 +197,13 @@ def _recognition_shown(told: Told) -> bool:
 
 def statements_differ(match: re.Match[str], told: Told) -> bool:
     """Check that the named statements show a difference."""
-    rows = {row["item"]: row for row in told.asked("settings differ")}
+    rows = {row["item"]: row for row in told.asked("conditions differ")}
     return all(float(rows[item]["p_adjusted"]) <= told.alpha for item in names_in(match[1]))
 
 
 def no_statement_differs(_match: re.Match[str], told: Told) -> bool:
     """Check that nothing is significant in the verdict of the first page."""
-    rows = [*told.asked("settings differ"), *told.asked("two settings differ")]
+    rows = [*told.asked("conditions differ"), *told.asked("two conditions differ")]
     shown = [row for row in rows if row["verdict"] in DECIDED]
     return not shown or (_recognition_shown(told) and all(row["verdict"] == "suggested" for row in shown))
 
@@ -227,7 +227,7 @@ FIRST_PAGE: Final[Sequence[tuple[str, Check]]] = (
     # Delays
     (rf"Over delays of {R} to {R} ms, participants tended to rate longer delays (.*)\.", trend_is_shown),
     (rf"With {N} statements tested, p ≤ {R} \({R} / (\d+)\) is significant\.", trend_is_corrected),
-    (r"They may also notice shorter delays\.", always),
+    (r"Participants may also notice shorter delays\.", always),
     (r"The test compares ranks, not mean ratings\.", always),
     (r"Agreement increases with the delay, but we could not show that participants noticed any particular delay\.",
      when(lambda told: told.block["threshold"]["effect"] is not None)),

@@ -171,7 +171,7 @@ def family(match: re.Match[str], told: Told) -> bool:
 
 def corrected(text: str, told: Told) -> bool:
     """Return whether a text names each correction and its number of statements."""
-    question = "answers follow the delay" if told.block["kind"] == "delays" else "settings differ"
+    question = "answers follow the delay" if told.block["kind"] == "delays" else "conditions differ"
     rows = told.asked(question)
     found = {(row["correction"], int(row["members"])) for row in rows}
     return {
@@ -251,8 +251,9 @@ METHODS: Final[Sequence[tuple[str, Check]]] = (
     (r"Comparisons between groups used the degrees of freedom of the smaller group \(Hsu 1938\)\.",
      when(lambda told: any(one["contrast"]["groups"] for one in told.contrasts))),
     (r"Each participant contributed one value to each comparison\.", when(lambda told: bool(told.contrasts))),
-    (r"In addition to the t test, we used a bootstrap that adds a participant as extreme as the most extreme one "
-     r"\(Gaffke 2005\) and a t test corrected for skewness \(Hall 1992\)\.", when(lambda told: bool(told.contrasts))),
+    (r"In addition to the t test, we used a bootstrap that includes one hypothetical participant as extreme as the "
+     r"most extreme participant in the sample \(Gaffke 2005\), and a t test corrected for skewness "
+     r"\(Hall 1992\)\.", when(lambda told: bool(told.contrasts))),
     (r"The reported p value is the largest of the three(?:, Holm-adjusted across (\d+) hypotheses)?\.",
      lambda match, told: int(match[1] or 1) == len(told.contrasts)),
     (r"Equivalence was tested with two one-sided t tests and the same bootstrap(?:, Holm-adjusted across (\d+) "
@@ -271,7 +272,7 @@ METHODS: Final[Sequence[tuple[str, Check]]] = (
     (r"Some participants were excluded from a test because a value was missing \(.*\)\.",
      when(lambda told: any(one["left_out"] for one in told.contrasts))),
     (r"Statements were rated on seven-point scales\.", always),
-    (r"Answers were treated as ordinal and are summarised by medians and quartiles \(linear interpolation, Hyndman & "
+    (r"Answers were treated as ordinal and summarised by medians and quartiles \(linear interpolation, Hyndman & "
      r"Fan type 7\)\.", always),
     (r"Mean differences from the first condition are shown with 95 % confidence intervals \(Student's t\)\.",
      when(lambda told: bool(told.block["effects"]))),
@@ -306,8 +307,9 @@ METHODS: Final[Sequence[tuple[str, Check]]] = (
     (rf"Each delay was compared with {R} ms using two one-sided t tests on paired differences, with equivalence "
      rf"bounds of ±{R} points?(?: \(stated before the first session\))? and (> )?{R} % confidence intervals\.",
      equivalence_tests),
-    (r"A delay was classified as equivalent only if a bootstrap that adds a participant as extreme as the most "
-     r"extreme one \(Gaffke 2005\) also showed equivalence, and only with at least (\d+) participants\.",
+    (r"A delay was classified as equivalent only if a bootstrap that includes one hypothetical participant as "
+     r"extreme as the most extreme participant in the sample \(Gaffke 2005\) also showed equivalence, and "
+     r"only with at least (\d+) participants\.",
      lambda match, told: int(match[1])
      == fewest(told.against[0]["found"]["alpha"], min(1 / 5, told.against[0]["found"]["bound"] / 6))),
     (r"It was classified as not equivalent if the whole confidence interval lay outside the bounds\.",

@@ -72,12 +72,12 @@ class Told:
     @property
     def of_statements(self) -> list[dict[str, str]]:
         """The tests of single statements that the test over all statements gates."""
-        return [*self.asked("settings differ"), *self.asked("answers follow the delay")]
+        return [*self.asked("conditions differ"), *self.asked("answers follow the delay")]
 
     @property
     def p_over_all(self) -> float:
         """The p of the test over all statements."""
-        return float(self.asked("settings differ, all statements")[0]["p"])
+        return float(self.asked("conditions differ, all statements")[0]["p"])
 
     def asked(self, question: str) -> list[dict[str, str]]:
         """Return the rows of tests.csv that answer a question."""

@@ -193,12 +193,12 @@ def test_r_computes_the_same_numbers(of_twelve: Path) -> None:
     done = run_in_r(of_twelve)
     assert (done.returncode, done.stderr) == (0, "")
     lines = done.stdout.splitlines()
-    assert lines[-1] == "every number that R computes is the report's"
+    assert lines[-1] == "all numbers that R computed agree with the report"
     told = re.compile(r"(.+?) +report +(\S+) +R +(\S+)")
     computed = {found[1]: float(found[3]) for line in lines if (found := told.match(line))}
     liquids, delays = numbers(of_twelve)["results"]["blocks"]
     for one in liquids["omnibus"]:
-        what = f"liquids {one['item']}, settings differ: Friedman chi2"
+        what = f"liquids {one['item']}, conditions differ: Friedman chi2"
         assert computed[what] == pytest.approx(one["outcome"]["statistic"], rel=1e-5)
     for one in delays["trends"]:
         what = f"delays {one['item']}, answers follow the delay:"
@@ -207,7 +207,7 @@ def test_r_computes_the_same_numbers(of_twelve: Path) -> None:
     for one in delays["against"]:
         what = f"delays {one['item']} ({one['delay_ms']:g} ms − 0 ms)"
         assert computed[f"{what}, a delay is equivalent: equivalence p"] == pytest.approx(one["found"]["p"], rel=1e-5)
-    pairs = [name for name in computed if name.endswith("two settings differ: p")]
+    pairs = [name for name in computed if name.endswith("two conditions differ: p")]
     assert len(pairs) == len(liquids["pairs"]) > 0
 
 

@@ -208,7 +208,7 @@ def test_a_form_is_named_with_its_questions_and_the_times_at_which_it_is_complet
     [
         ((0, 0, 0, 0), "The study does not contain any reaching trials, so reaching measures are not available."),
         ((5, 9, 0, 0), "recordings of 5 of 9 reaching trials (reasons for the others: lost). No data are available"),
-        ((5, 9, 4, 0), "of 5 of 9 reaching trials (reasons for the others: lost). All measured trials met the"),
+        ((5, 9, 4, 0), "of 5 of 9 reaching trials (reasons for the others: lost). All trials with measured timing"),
         ((5, 9, 4, 1), "(reasons for the others: lost). 1 trial exceeded the protocol's limits but is included"),
         ((5, 9, 4, 3), "(reasons for the others: lost). Three trials exceeded the protocol's limits but are incl"),
     ],

@@ -44,7 +44,7 @@ def main(studies: str = "200", *sizes: str) -> int:
     *_, (done, counts) = sweep(planned, tried, asked, SEED, Here())
     curves = [one for one in powers(planned, tried, done, asked, SEED, counts).curves if one.item is not None]
     wanted = {(one.block, one.item): (n, one.power[tried.index(n)]) for one in curves
-              if one.question in ("settings differ", "trend") and (n := one.needed(tried))}  # fmt: skip
+              if one.question in ("conditions differ", "trend") and (n := one.needed(tried))}  # fmt: skip
     found: Counter[tuple[int, str, str | None]] = Counter()
     for n in sorted({n for n, _ in wanted.values()}):
         for study in range(asked):

@@ -1,7 +1,8 @@
-# Computes the main numbers of the report again, in base R (4.0 or newer, no packages), and says where they differ:
-#   Rscript report.R [TABLES [TESTS]]   the folders of the exported tables and of tests.csv; default: this one
-# Exit code 1 if any number differs, or if there is nothing to compare. Exact p of trends and of pairs come from all
-# changes of signs; of Friedman's test only an approximate p is compared, and no p that was drawn at random.
+# Recomputes the main numbers of the report in base R (4.0 or newer, no packages) and lists those that differ:
+#   Rscript report.R [TABLES [TESTS]]   folders of the exported tables and of tests.csv; default: this folder
+# The exit code is 1 if any number differs or if there is nothing to compare. Exact p values of trends and of pairs are
+# computed from all changes of sign. For Friedman's test, only approximate p values are compared. Monte Carlo p values
+# are not compared.
 
 folders <- c(commandArgs(trailingOnly = TRUE), ".", ".")
 folders <- if (length(folders) == 3) folders[c(1, 1)] else folders[1:2]
@@ -10,7 +11,7 @@ exported <- function(name) {
   file <- list.files(folders[1], paste0("_description-", name, "_data\\.csv$"), full.names = TRUE)
   if (length(file) == 1) csv(file) else NULL
 }
-number <- function(texts) suppressWarnings(as.numeric(texts))  # answers to other questions may be texts
+number <- function(texts) suppressWarnings(as.numeric(texts))  # answers to other questions may be text
 answers <- exported("responses")
 answers <- answers[answers$counted == "true", ]
 answers$response <- number(answers$response)
@@ -26,7 +27,7 @@ same <- function(what, reported, computed) {
   cat(sprintf("%-64s report %12.6g   R %12.6g   %s\n", what, reported, computed, if (ok) "" else "DIFFERS"))
 }
 
-# Sums of independent whole numbers: chances[i] is that of the sum i - 1.
+# Distribution of a sum of independent whole numbers: chances[i] is the probability that the sum is i - 1.
 add <- function(chances, values, each = rep(1 / length(values), length(values))) {
   sums <- numeric(length(chances) + max(values))
   for (place in seq_along(values)) {
@@ -36,9 +37,9 @@ add <- function(chances, values, each = rep(1 / length(values), length(values)))
 }
 at_least <- function(chances, value) sum(chances[(value + 1):length(chances)])
 
-# One row a participant, one column a setting ("L1 L2", or "D1+D4 D2" where two codes present one delay); a
-# participant's repeated answers count by their median. Of sessions: one column a session, medians over the settings
-# that a participant answered in all of them.
+# One row per participant and one column per condition ("L1 L2", or "D1+D4 D2" if two codes have the same delay);
+# repeated answers are replaced by their median. With by_session: one column per session, which contains the median over
+# the conditions that the participant answered in all sessions.
 wide <- function(block, item, codes, by_session = FALSE) {
   codes <- strsplit(codes, " ")[[1]]
   columns <- rep(codes, lengths(strsplit(codes, "+", fixed = TRUE)))
@@ -105,10 +106,10 @@ for (place in seq_len(nrow(tests))) {
 }
 numbers <- sum(!is.na(tests[c("statistic", "p", "low", "high")]))
 
-# Blocks of levels: d' and criterion, exponents, and settings of the method of adjustment.
+# Blocks with levels: d' and criterion, exponents, and settings in the method of adjustment.
 judged <- exported("tracks")
 judged <- judged[judged$analysed == "true" & !is.na(judged$response), ]
-of <- function(row) {  # the trials that a row of an exported table is about
+of <- function(row) {  # the trials to which a row of an exported table refers
   rows <- judged[judged$block == row$block & judged$participant == row$participant, ]
   if (!is.null(row$condition) && !is.na(row$condition)) return(rows[rows$track == row$condition, ])
   if (is.null(row$standard)) rows else if (is.na(row$standard)) rows[is.na(rows$standard), ] else
@@ -150,7 +151,7 @@ power_law <- function(row) {
 settings <- function(row) {
   rows <- of(row); rows <- rows[!is.na(rows$setting), ]
   at <- number(rows$setting); start <- number(rows$level_asked)
-  log <- all(at > 0) && isTRUE(all.equal(number(row$pse), 10^mean(log10(at))))  # else levels are spaced evenly
+  log <- all(at > 0) && isTRUE(all.equal(number(row$pse), 10^mean(log10(at))))  # otherwise levels are spaced evenly
   u <- if (log) log10(at) else at; level <- function(u) if (log) 10^u else u
   high <- (if (log) log10(start) else start) > mean(range(if (log) log10(start) else start))
   half <- qt(0.975, length(u) - 1) * sd(u) / sqrt(length(u))
@@ -171,11 +172,11 @@ numbers <- numbers + sum(!is.na(thresholds[c("d_prime", "criterion")])) + NROW(e
 cat(compared, "of", numbers, "numbers compared\n")
 if (compared == 0) {
   cat("nothing to compare:", if (sealed)
-    "the key was sealed, and nothing is compared between settings; after liquid-study unblind, write these files again\n"
+    "the key was sealed, so conditions are not compared; run liquid-study unblind, then write these files again\n"
   else "no test, threshold or setting has a number that R computes\n")
   quit(status = 1)
 }
-if (differing == 0) cat("every number that R computes is the report's\n") else {
+if (differing == 0) cat("all numbers that R computed agree with the report\n") else {
   cat("numbers that differ:", differing, "\n")
   quit(status = 1)
 }
