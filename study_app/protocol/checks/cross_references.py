@@ -271,12 +271,19 @@ def check_groups(document: Mapping[str, Any]) -> Iterator[Fault]:
 
 def check_decisions(document: Document) -> Iterator[Fault]:
     """Check that decisions name existing statements once each, and existing liquids."""
-    questions = (item for _, item in entries(document, "questionnaires.*.items.*") if isinstance(item, Mapping))
-    items = {item["id"] for item in questions if isinstance(item.get("id"), str) and "kind" not in item}
+    questions = [item for _, item in entries(document, "questionnaires.*.items.*") if isinstance(item, Mapping)]
+    named_questions = [item for item in questions if isinstance(item.get("id"), str)]
+    statements = {item["id"] for item in named_questions if "kind" not in item}
+    kinds = {item["id"]: item["kind"] for item in named_questions if isinstance(item.get("kind"), str)}
     decided = {key: list(entries(document, f"analysis.{key}.*")) for key in _DECIDED_LISTS}
     for places in (*decided.values(), list(entries(document, "analysis.noticed"))):
         for path, name in places:
-            yield from _unknown_name(path, name, "item", items)
+            if isinstance(name, str) and name in kinds and name not in statements:
+                message = f'"{name}" is a {kinds[name]}, but the report tests only statements with {POINTS} points'
+                hint = "choose an item without a kind"
+                yield Fault(path, message, hint, kind="surplus")
+            else:
+                yield from _unknown_name(path, name, "item", statements)
         yield from _repeated_names(places)
     falling, named = ([name for _, name in decided[key]] for key in ("falling", "names"))
     for path, name in decided["rising"]:
