@@ -442,7 +442,8 @@ def said_of_presentations(result: BlockResult) -> tuple[str, ...]:
         )
     if most > 1:
         often = f"{most}" if fewest == most else f"{fewest} to {most}"
-        single = "; the detection threshold is estimated from all individual answers" if result.delays_ms else ""
+        has_threshold = result.findings.get("threshold") is not None
+        single = "; the detection threshold is estimated from all individual answers" if has_threshold else ""
         lines.append(
             f"Each participant rated each {settings_noun(result)} {often} times. The tests use the median of these "
             f"answers{single}."

@@ -75,11 +75,7 @@ def table_of_tests(
     intervals = dict.fromkeys(outcome.interval.method for outcome in outcomes if outcome.interval is not None)
     reasons = dict.fromkeys(outcome.no_interval for outcome in outcomes if outcome.no_interval)
     methods = dict.fromkeys(outcome.method for outcome in outcomes if outcome.p is not None)
-    family = dict.fromkeys(
-        (f"p adjusted ({test.correction}) across {test.members} tests" if test.members > 1 else "p not adjusted")
-        + f" (family “{test.family}”)"
-        for test in tests
-    )
+    family = dict.fromkeys(f"{_adjustment(test)} (family “{test.family}”)" for test in tests)
     two = isinstance(first.outcome, Paired) and len(compared) == 2
     above = f", above 0 if {compared[0]} was rated higher than {compared[1]}" if two else ""
     exact = f" ({method_words(methods)})" if methods else ""
@@ -114,6 +110,15 @@ def table_of_tests(
 
 _MOST_NAME: Final = 16
 """A heading names an effect size of so many letters; longer names are below the table."""
+
+
+def _adjustment(test: Tested) -> str:
+    """Return how the p value was adjusted for other tests: within its family, and by the test over all statements."""
+    if test.members > 1:
+        return f"p adjusted ({test.correction}) across {test.members} tests"
+    if test.outcome.p is not None and test.p_adjusted is not None and test.p_adjusted > test.outcome.p:
+        return "adjusted p: that of the test over all statements, which is larger than p"
+    return "p not adjusted"
 
 
 def _freedom(outcome: Outcome) -> str:

@@ -348,15 +348,32 @@ def _questionnaires(study: Study) -> Iterator[str]:
     asked_in = (question.where for question in study.others.questions if question.where.is_form)
     forms = Counter((where.id, where.title) for where in asked_in)
     for (form, title), questions in forms.items():
-        sessions = list(RecordedSessions.model_validate(study.protocol).every_session())
+        recorded = RecordedSessions.model_validate(study.protocol)
+        sessions = list(recorded.every_session())
         times = list(dict.fromkeys(_form_times(study, steps, form) for steps in sessions if form in steps))
         differ = ", depending on the group or session" if len(times) > 1 else ""
         if not differ and not all(form in steps for steps in sessions):
-            differ = ", in some groups or sessions"
+            differ = _sessions_with(recorded, form)
         yield (
             f"Participants completed the questionnaire “{title}” ({counted(questions, 'question')}) "
             f"{' or '.join(times)}{differ}."
         )
+
+
+def _sessions_with(recorded: RecordedSessions, form: str) -> str:
+    """Return in which sessions or groups a form is asked, if it is not asked in all: ", in session 1"."""
+    sessions = {group: range(1, (recorded.session_count(group) or 1) + 1) for group in recorded.groups or (None,)}
+    asked_in = {
+        group: [number for number in numbers if form in recorded.session_steps(group, number)]
+        for group, numbers in sessions.items()
+    }
+    groups = [str(group) for group, numbers in asked_in.items() if numbers]
+    if len(groups) < len(sessions) and all(len(asked_in[group]) in (0, len(sessions[group])) for group in sessions):
+        return f", in the group{'s' * (len(groups) > 1)} {listed(groups)}"
+    first, *others = asked_in.values()
+    if all(numbers == first for numbers in others):
+        return f", in session{'s' * (len(first) > 1)} {listed(list(map(str, first)))}"
+    return ", in some groups or sessions"
 
 
 def _form_times(study: Study, steps: tuple[str, ...], form: str) -> str:

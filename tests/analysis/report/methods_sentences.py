@@ -241,7 +241,8 @@ METHODS: Final[Sequence[tuple[str, Check]]] = (
     (r"Each participant rated each \w+ (\d+(?: to \d+)?) times\.", presentations),
     (r"The tests use the median of these answers(; the detection threshold is estimated from all individual "
      r"answers)?\.",
-     when(lambda told: told.block["presentations"][1] > 1)),
+     lambda match, told: told.block["presentations"][1] > 1
+     and bool(match[1]) == (told.block["threshold"] is not None)),
     (r"The answers from sessions (.*) are compared with each other, and are pooled in all other tests\.",
      lambda match, told: listed_in(match[1]) == {str(one) for one in told.block["sessions"]}),
     (r"Conditions were identified only by codes until the key was opened\.", when(lambda told: told.study.revealed)),

@@ -198,9 +198,30 @@ def test_a_form_is_named_with_its_questions_and_the_times_at_which_it_is_complet
     assert list(methods_module._questionnaires(study)) == [
         "Participants completed the questionnaire “Workload” (three questions) before the first block or after the "
         "last block, depending on the group or session.",
-        "Participants completed the questionnaire “Goodbye” (1 question) after the last block, in some groups or "
-        "sessions.",
+        "Participants completed the questionnaire “Goodbye” (1 question) after the last block, in the group late.",
     ]
+
+
+@pytest.mark.parametrize(
+    ("sequences", "when"),
+    [
+        ({"": [["load", "a"], ["a"], ["a"]]}, "in session 1"),
+        ({"": [["load", "a"], ["a"], ["load", "a"]]}, "in sessions 1 and 3"),
+        ({"early": [["load", "a"], ["a"]], "late": [["load", "a"], ["a"]]}, "in session 1"),
+        ({"early": [["a"], ["a"]], "late": [["load", "a"], ["load", "a"]]}, "in the group late"),
+        ({"early": [["load", "a"], ["a"]], "late": [["a"], ["load", "a"]]}, "in some groups or sessions"),
+        ({"early": [["load", "a"], ["a"]], "late": [["a"], ["a"]]}, "in some groups or sessions"),
+    ],
+)
+def test_a_form_of_some_sessions_is_named_with_them(sequences: dict[str, list[list[str]]], when: str) -> None:
+    groups = {group: {"sequences": steps} for group, steps in sequences.items()}
+    own = {"sequences": sequences[""]} if "" in sequences else {"groups": groups}
+    blocks = {"a": {"title": {"en": "First"}, "phase": "main"}}
+    question: Any = SimpleNamespace(where=SimpleNamespace(id="load", title="Workload", is_form=True))
+    head = {"study": {"languages": ["en"], "block_order": "fixed"}, "blocks": blocks, "questionnaires": {}}
+    study: Any = SimpleNamespace(others=SimpleNamespace(questions=(question,)), protocol=head | own)
+    (said,) = methods_module._questionnaires(study)
+    assert said == f"Participants completed the questionnaire “Workload” (1 question) before the first block, {when}."
 
 
 @pytest.mark.parametrize(
