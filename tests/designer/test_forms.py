@@ -13,6 +13,7 @@ from PySide6.QtWidgets import QApplication, QFileDialog, QLabel, QLineEdit, QPla
 from study_app.designer.document.elements import title_of
 from study_app.designer.document.steps import AddElement, AddKey, ChangeLanguage, RemoveKey, RenameElement
 from study_app.designer.document.toml_edits import Set, Unset
+from study_app.designer.form.special import Hypothesis
 from study_app.designer.window import focus_stops
 from study_app.gui.widgets.controls import IconButton
 from tests.gui.walk import settle
@@ -425,3 +426,19 @@ def test_typed_text_waits_for_an_open_list_and_a_pressed_button(
     line._flush_after_click()
     assert (designer.value("conditions", "late", "delay_ms") == 137) == (blocked is None)
     assert line.pending == line._rest.isActive() == (blocked is not None)
+
+
+def test_a_bound_that_is_not_a_number_is_refused_with_the_value_that_stays(qtbot: Any) -> None:
+    line, refusals, tables = Hypothesis("Hypothesis 1"), list[str](), list[Any]()
+    qtbot.addWidget(line)
+    line.show_value({"measure": "like_honey", "bound": 0.4}, ())
+    line.refused.connect(refusals.append)
+    line.changed.connect(tables.append)
+    for typed in ("a lot", "0.75"):
+        line.bound.setText(typed)
+        line.bound.typed.emit(typed)
+    assert len(refusals) == 2
+    assert "a lot" in refusals[0]
+    assert "0.4" in refusals[0]
+    assert refusals[1] == ""
+    assert tables == [{"measure": "like_honey", "bound": 0.75}]
