@@ -117,7 +117,7 @@ def _number(value: Any) -> float:
     return float(value)
 
 
-def _called(value: Any) -> Any:
+def _callable(value: Any) -> Any:
     if not callable(value):
         raise TypeError
     return value
@@ -135,7 +135,7 @@ def _two_numbers(value: Any) -> tuple[float, float]:
 
 _PATH: Final = _Permitted("a path, or a name", _path)
 _TEXT: Final = _Permitted("a text", partial(_instance, str))
-_FUNCTION: Final = _or_none(_Permitted("a function", _called))
+_FUNCTION: Final = _or_none(_Permitted("a function", _callable))
 _PEOPLE: Final = _whole(1, 100_000)
 _SEED: Final = _whole(0, 2**63 - 1)
 _NUMBER: Final = _Permitted("a number", _number)

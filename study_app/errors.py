@@ -32,10 +32,10 @@ class StudyError(Exception):
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Return how to recreate it without ``__init__``, whose parameters are not kept."""
-        return _restored, (type(self), self.args, self.__dict__)
+        return _restore_error, (type(self), self.args, self.__dict__)
 
 
-def _restored(kind: type[StudyError], args: tuple[Any, ...], fields: dict[str, Any]) -> StudyError:
+def _restore_error(kind: type[StudyError], args: tuple[Any, ...], fields: dict[str, Any]) -> StudyError:
     """Return an error from its pickled state."""
     error = kind.__new__(kind, *args)
     error.__dict__.update(fields)

@@ -136,17 +136,19 @@ def contrast_results(
 ) -> tuple[ContrastResult, ...]:
     """Test the contrasts of a study, with Holm's correction for differences and for equivalence; none while sealed."""
     alpha = study.decided.alpha
-    tests = [_tested(study, contrast, answers, levels, alpha / len(study.contrasts)) for contrast in study.contrasts]
+    tests = [
+        _test_contrast(study, contrast, answers, levels, alpha / len(study.contrasts)) for contrast in study.contrasts
+    ]
     adjusted = holm([test.largest_p for test in tests])
     with_bound = [place for place, test in enumerate(tests) if test.contrast.bound is not None]
     of_equal = dict(zip(with_bound, holm([tests[place].p_equivalent for place in with_bound]), strict=True))
     return tuple(
-        _judged(study, result, p, of_equal.get(place))
+        _with_verdict(study, result, p, of_equal.get(place))
         for place, (result, p) in enumerate(zip(tests, adjusted, strict=True))
     )
 
 
-def _judged(study: Study, tested: ContrastResult, p: float | None, p_equal: float | None) -> ContrastResult:
+def _with_verdict(study: Study, tested: ContrastResult, p: float | None, p_equal: float | None) -> ContrastResult:
     alpha = study.decided.alpha
     said: Any = verdict(p, None, alpha, primary=study.decided.binding)
     equivalent = None if tested.contrast.bound is None else p_equal is not None and p_equal <= alpha
@@ -163,7 +165,7 @@ def _judged(study: Study, tested: ContrastResult, p: float | None, p_equal: floa
     )
 
 
-def _compared(
+def _compare(
     study: Study, contrast: Contrast, answers: Sequence[BlockAnswers], levels: Sequence[LevelsResult]
 ) -> Compared:
     sides: list[Mapping[str, Measured]] = [
@@ -339,11 +341,11 @@ def _is_ratio(contrast: Contrast, levels: Sequence[LevelsResult]) -> bool:
     )
 
 
-def _tested(
+def _test_contrast(
     study: Study, contrast: Contrast, answers: Sequence[BlockAnswers], levels: Sequence[LevelsResult], strictest: float
 ) -> ContrastResult:
     """Return a contrast before correction, with enough resamples for an alpha of ``strictest``."""
-    compared = _compared(study, contrast, answers, levels)
+    compared = _compare(study, contrast, answers, levels)
     ratio, means = _is_ratio(contrast, levels), compared.means(strictest)
     names, within = _side_names(study, contrast), _within_names(study, contrast)
     is_ordinal = contrast.measure not in _STATISTICS and not contrast.is_interaction

@@ -55,7 +55,7 @@ def evaluate(study: Study, *, recordings: bool = True, progress: Progress = repo
     """
     failures = Failures()
     try:
-        return _evaluated(study, failures, partial(_ending, progress), recordings=recordings)
+        return _evaluate_study(study, failures, partial(_ending, progress), recordings=recordings)
     except Ended as ended:
         raise ended.error from None
 
@@ -68,7 +68,7 @@ def _ending(progress: Progress, what: str, share: float) -> None:
         raise Ended(error) from error
 
 
-def _evaluated(study: Study, failures: Failures, progress: Progress, *, recordings: bool) -> Results:
+def _evaluate_study(study: Study, failures: Failures, progress: Progress, *, recordings: bool) -> Results:
     collected = [
         failures.attempt("all tests", partial(block_answers, study, block, SEED, failures), block=block.id)
         for block in study.blocks
@@ -149,16 +149,16 @@ def _delivery_check(study: Study) -> tuple[Delivered, ...]:
     for block in study.blocks:
         rows = counted[counted["block"] == block.id]
         if not block.revealed:
-            delivery.append(_measured(block, None, None, rows))
+            delivery.append(_measure_delivery(block, None, None, rows))
             continue
         delivery += [
-            _measured(block, setting.code, setting.delay_ms, rows[rows["code"] == setting.code])
+            _measure_delivery(block, setting.code, setting.delay_ms, rows[rows["code"] == setting.code])
             for setting in block.settings
         ]
     return tuple(delivery)
 
 
-def _measured(block: Block, code: str | None, delay_ms: float | None, rows: pd.DataFrame) -> Delivered:
+def _measure_delivery(block: Block, code: str | None, delay_ms: float | None, rows: pd.DataFrame) -> Delivered:
     errors = rows["delay_error_mean_ms"].dropna().astype(float)
     mean = float(errors.mean()) if len(errors) else None
     return Delivered(

@@ -242,7 +242,7 @@ def _evaluate(study: Study, drawn: list[Picture], send: Send, stop: Callable[[],
     from study_app.analysis.report.study_figures import block_figure_tasks  # noqa: PLC0415
     from study_app.analysis.results import Failures  # noqa: PLC0415
 
-    going = partial(_going, send, stop)
+    going = partial(_report_progress, send, stop)
     going("testing", 0.0)
     results = evaluate(study, progress=lambda what, share: going(what, _EVALUATION * share))
     _send_proposed(study, results, send)
@@ -276,7 +276,7 @@ def _draw_groups(
     from study_app.analysis.report.study_figures import block_figure_tasks  # noqa: PLC0415
 
     for number, part in enumerate(_split(study)):
-        _going(send, stop, "drawing the groups", number / (1 + len(_groups(study))))
+        _report_progress(send, stop, "drawing the groups", number / (1 + len(_groups(study))))
         own = results
         if part.split != EACH_GROUP:
             blocks = evaluate(replace(part, levels=(), contrasts=()), recordings=False).blocks
@@ -296,12 +296,16 @@ def _write(order: WriteTables | WriteReport, send: Send, stop: Callable[[], bool
     warnings: list[str] = []
     make = partial(export, extras=order.extras) if isinstance(order, WriteTables) else report
     written = make(
-        order.folder, order.to, progress=partial(_going, send, stop), warn=warnings.append, failed=warnings.append
+        order.folder,
+        order.to,
+        progress=partial(_report_progress, send, stop),
+        warn=warnings.append,
+        failed=warnings.append,
     )
     return Done(written, tuple(warnings))
 
 
-def _going(send: Send, stop: Callable[[], bool], what: str, share: float) -> None:
+def _report_progress(send: Send, stop: Callable[[], bool], what: str, share: float) -> None:
     _go_on(stop)
     send(Progress(what, share))
 

@@ -103,7 +103,7 @@ def acting_report(scene: Scene) -> str:
         if not set(liquid.effects) - {"buoyancy", "current", "surface"}:
             continue
         alone = _alone(scene, liquid)
-        own, of_kalman = (_acting(alone, velocity) for velocity in (scene.velocity, Kalman()))
+        own, of_kalman = (_acting_by_delay(alone, velocity) for velocity in (scene.velocity, Kalman()))
         better = [ticks for ticks in _LATE_TICKS if of_kalman[ticks].error < own[ticks].error]
         lines.append(
             f"delivered force of {liquid.id} (hand: medium grip, 0.2 kg, {WHOLE}; estimator {scene.velocity.kind}): "
@@ -117,7 +117,7 @@ def acting_report(scene: Scene) -> str:
 _LATE_TICKS: Final = (2, 3)
 
 
-def _acting(scene: Scene, velocity: Velocity) -> dict[int, Acting]:
+def _acting_by_delay(scene: Scene, velocity: Velocity) -> dict[int, Acting]:
     """Return what acts of a scene's force with an estimator, by ticks of delay."""
     scene = without_buoyancy(scene.model_copy(update={"velocity": velocity}))
     return {ticks: acting_on_sine(case_of(scene, velocity.kind, ticks), scene) for ticks in _LATE_TICKS}

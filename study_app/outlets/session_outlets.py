@@ -87,14 +87,14 @@ class Outlets:
         self._withheld = self._double and samples == "single-blind"
         for address in addresses:
             kind = SINKS.get(address.partition(":")[0])
-            with self._failing("Triggers" if kind is None else kind.title):
+            with self._store_failure("Triggers" if kind is None else kind.title):
                 self._threads.append(SinkThread(open_sink(address, servo.now_ns)))
         if samples != "off" and not self._withheld:
-            with self._failing(SampleStream.title):
+            with self._store_failure(SampleStream.title):
                 self._samples = SampleStream(servo.telemetry, servo.rate_hz, servo.now_ns)
 
     @contextmanager
-    def _failing(self, title: str) -> Iterator[None]:
+    def _store_failure(self, title: str) -> Iterator[None]:
         """Store the reason if an outlet cannot be opened, whatever the error, since no session depends on it."""
         try:
             yield

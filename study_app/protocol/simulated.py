@@ -319,7 +319,7 @@ class Comparison:
         if draw() < self.observer.person.lapse:
             return design.answers[int(len(design.answers) * draw())]
         if isinstance(design, ForcedChoice):
-            taken = self._preferring(design, taken, course)
+            taken = self._add_biases(design, taken, course)
         return design.simulated(taken, mean, self)
 
     def _apart(self, sensed: Sequence[float], course: Course) -> Sequence[float]:
@@ -331,7 +331,7 @@ class Comparison:
         shares = [(one - least) / threshold for one in sensed]
         return [least + threshold * math.copysign(person.sensed(abs(share), course.done), share) for share in shares]
 
-    def _preferring(self, design: Design, taken: Sequence[float], course: Course) -> Sequence[float]:
+    def _add_biases(self, design: Design, taken: Sequence[float], course: Course) -> Sequence[float]:
         """Return the perceived values after biases towards the first interval and the last answer."""
         person, noise = self.observer.person, self.observer.delay_noise_s
         if not self.delays:
@@ -360,16 +360,16 @@ class Comparison:
         if design.reply == "choice":
             return self.choose(design, sensed, mean, draw, course)
         if isinstance(design, Rated):
-            taken, points = self._taken(sensed, draw), protocol.scales[design.scale].points
+            taken, points = self._perceived(sensed, draw), protocol.scales[design.scale].points
             ratio = taken / mean if mean > 0 and first > 0 else 1.0
             return min(points, max(1, math.floor((points + 1) / 2 + (ratio - 1) * (points - 1) + 0.5)))
         if self.observer.estimates is not None and first > 0 and sensed[-1] > 0:
             exponent, spread = self.observer.estimates
             return _MODULUS * math.exp(exponent * math.log(sensed[-1] / first) + spread * normal(draw))
-        taken = self._taken(sensed, draw)
+        taken = self._perceived(sensed, draw)
         return _MODULUS * math.sqrt(max(taken / first if mean > 0 and first > 0 else 1.0, 0.0))
 
-    def _taken(self, sensed: Sequence[float], draw: Draw) -> float:
+    def _perceived(self, sensed: Sequence[float], draw: Draw) -> float:
         """Return the perceived value of the last interval; noise is drawn for every interval."""
         return [self.noisy(one, draw) for one in sensed][-1]
 

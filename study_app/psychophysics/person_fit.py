@@ -244,7 +244,7 @@ def _normal_table() -> tuple[Floats, Floats]:
     return z, normal_cdf(z)
 
 
-def _moved(shares: ArrayLike, shift: ArrayLike) -> Floats:
+def _shift_probabilities(shares: ArrayLike, shift: ArrayLike) -> Floats:
     """Return decision probabilities after a preference shifts the decision variable by ``shift`` [SD]."""
     z, of_z = _normal_table()
     deviates = np.asarray(np.interp(np.asarray(shares, float), of_z, z), float)
@@ -279,7 +279,9 @@ def preferred(psi: ArrayLike, lapse: ArrayLike, shift: ArrayLike) -> Floats:
     if not np.any(shift):
         return psi
     unbiased = np.clip((psi - lapse) / (1.0 - 2.0 * lapse), CLIP, 1.0 - CLIP)
-    return np.asarray(np.clip(lapse + (1.0 - 2.0 * lapse) * _moved(unbiased, shift), CLIP, 1.0 - CLIP), float)
+    return np.asarray(
+        np.clip(lapse + (1.0 - 2.0 * lapse) * _shift_probabilities(unbiased, shift), CLIP, 1.0 - CLIP), float
+    )
 
 
 @lru_cache(maxsize=32)
@@ -287,5 +289,5 @@ def _moved_tables(grid: Grid, levels: Values, shift: float) -> tuple[Floats, Flo
     """Return log ψ and log(1 − ψ) at each level in each cell for two intervals, whose guess rate is one half."""
     unbiased = replace(grid, lapses=(0.0,), lapse_prior=(1.0,)).success(levels)
     lapses = np.array(grid.lapses)[:, None]
-    psi = np.clip(lapses + (1.0 - 2.0 * lapses) * _moved(unbiased, shift), CLIP, 1.0 - CLIP)
+    psi = np.clip(lapses + (1.0 - 2.0 * lapses) * _shift_probabilities(unbiased, shift), CLIP, 1.0 - CLIP)
     return np.log(psi), np.log1p(-psi)

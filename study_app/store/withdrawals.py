@@ -382,7 +382,7 @@ def _mentions_beside_studies(study: StudyFolder, participant: str) -> Iterator[s
             continue
         try:
             if name in os.fsencode(path.name) or name in read_regular(path):
-                yield from _naming(path, participant)
+                yield from _naming_problem(path, participant)
         except (OSError, StoreError) as error:
             yield f"{path} cannot be searched ({error})"
 
@@ -394,10 +394,10 @@ def _remaining_mentions(study: StudyFolder, participant: str, *folders: Path) ->
     """
     for path in (path for folder in folders or (study.path,) for path in paths_in(folder)):
         if path != study.withdrawals and not path.is_relative_to(study.allocated):
-            yield from _naming(path, participant)
+            yield from _naming_problem(path, participant)
 
 
-def _naming(path: Path, participant: str) -> Iterator[str]:
+def _naming_problem(path: Path, participant: str) -> Iterator[str]:
     """Yield that a file names the participant, unless it is a recording."""
     if path.parent.name == "recordings" or not path.is_file():
         return

@@ -158,9 +158,9 @@ class Camera:
                 if self._closed:
                     return
                 scaler.size = self._fitted or scaler.size
-                self._take(frame, scaler, numbers)
+                self._store_frame(frame, scaler, numbers)
 
-    def _take(self, frame: Any, scaler: Scaler, numbers: _Numbers) -> None:
+    def _store_frame(self, frame: Any, scaler: Scaler, numbers: _Numbers) -> None:
         number = numbers.of(frame.time)
         width, height, stride, pixels = scaler.pixels(frame)
         ready_ns, age_ns = self._now_ns(), _age_ns(frame.time)
@@ -309,7 +309,7 @@ class Footage:
                 while not self._closed:
                     play = self._play
                     for frame in self._decoded(container, play):
-                        if not self._put(frame, play):
+                        if not self._queue_frame(frame, play):
                             break
         except Exception as error:  # noqa: BLE001 - FFmpeg's errors have no other common base class
             with self._changed:
@@ -343,7 +343,7 @@ class Footage:
                 raise VideoError("it does not contain any frames")
             offset_ns += end_ns
 
-    def _put(self, frame: VideoFrame, play: int) -> bool:
+    def _queue_frame(self, frame: VideoFrame, play: int) -> bool:
         """Queue a frame when there is room; return whether it is still needed."""
         with self._changed:
             while len(self._frames) >= _AHEAD and play == self._play and not self._closed:

@@ -73,7 +73,7 @@ def reaches(times_ns: NDArray[np.int64], positions_m: Array, targets: Targets) -
     """Return the completed reaches of a trial from times (n,) and hand positions (n, 3)."""
     seconds = (times_ns - times_ns[0]) / 1e9 if len(times_ns) else np.zeros(0)
     movements = []
-    for number, held in enumerate(_held(times_ns, positions_m, targets)):
+    for number, held in enumerate(_target_samples(times_ns, positions_m, targets)):
         lit, entered, reached = held.lit, held.entered, held.reached
         target = number % len(targets.centres_m)
         way = positions_m[lit : entered + 1]
@@ -99,7 +99,7 @@ class _Held(NamedTuple):
     reached: int
 
 
-def _held(times_ns: NDArray[np.int64], positions_m: Array, targets: Targets) -> Iterator[_Held]:
+def _target_samples(times_ns: NDArray[np.int64], positions_m: Array, targets: Targets) -> Iterator[_Held]:
     """Yield those samples for each target that was reached, in order."""
     dwell_ns = round(targets.dwell_s * 1e9)
     lit = number = 0
@@ -232,7 +232,7 @@ def performance(study: Study, each: Callable[[int, int], object] = lambda _done,
     for number, row in enumerate(reaching.to_dict("records")):
         each(number, len(reaching))
         targets = tasks[str(row["block"])]
-        reached = _why_not(study.folder, row) if targets is None else _reached(study.folder, row, targets)
+        reached = _why_not(study.folder, row) if targets is None else _read_reaches(study.folder, row, targets)
         if isinstance(reached, str):
             unread[reached] = unread.get(reached, 0) + 1
         else:
@@ -278,7 +278,7 @@ def _targets(protocol: Mapping[str, Any], block: Block) -> Targets | None:
     return Targets(np.asarray(task["targets_mm"], dtype=float) / 1000, task["radius_mm"] / 1000, task["dwell_s"])
 
 
-def _reached(folder: Path, row: Mapping[Any, Any], targets: Targets) -> Reached | str:
+def _read_reaches(folder: Path, row: Mapping[Any, Any], targets: Targets) -> Reached | str:
     """Return the reaches of a trial, or why they are unknown."""
     if reason := _why_not(folder, row):
         return reason

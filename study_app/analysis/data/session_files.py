@@ -185,7 +185,7 @@ def read_session(folder: SessionFolder, key: Key | None, like: Session | None = 
             "session": folder.number,
             **{name: receipt[name] for name in ("simulated", "pilot", "status", "language", "started_at", "ended_at")},
             "device": receipt["device"].get("name"),
-            "motors_masked": _masking(receipt.get("motors_masked")),
+            "motors_masked": _masking_text(receipt.get("motors_masked")),
             "protocol_version": version,
             "key_hash": receipt["key_hash"],
             **{name: receipt.get(name) for name in ("seed", "protocol_hash", "version", "group")},
@@ -250,7 +250,7 @@ def mean_dynamics(records: Sequence[Session]) -> OwnDynamics | None:
     return OwnDynamics(**means._asdict(), sessions=len(known), of=len(records))
 
 
-def _masking(answer: Mapping[str, Any] | None) -> str | None:
+def _masking_text(answer: Mapping[str, Any] | None) -> str | None:
     """Return the answer about masking of motor noise as text, None if it was not asked."""
     if answer is None:
         return None

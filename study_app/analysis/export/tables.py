@@ -78,7 +78,7 @@ def _level_tables(study: Study) -> Iterator[Delivered]:
     yield _select_columns("intervals", (*intervals, *JUDGED, TRIALS_MISSING), study.intervals)
     if not study.revealed:
         return
-    frame = _named(study, tracks(study)).rename(columns={"level": "level_asked"})
+    frame = _add_conditions(study, tracks(study)).rename(columns={"level": "level_asked"})
     # the frame has no column for an interval that no trial reached
     of_tracks = (*_TRACKS, *_may_miss((*OPENED, ACHIEVED)), *_of_intervals(study))
     yield _select_columns("tracks", of_tracks, frame.reindex(columns=list(header(of_tracks))))
@@ -169,12 +169,12 @@ def exported_tables(study: Study) -> tuple[Delivered, ...]:
     judged = (*JUDGED, TRIALS_MISSING) if study.levels else JUDGED
     tables = (
         _select_columns(
-            "responses", (*RESPONSES, *judged, *_may_miss(achieved)), _named(study, _with_delay_error(study))
+            "responses", (*RESPONSES, *judged, *_may_miss(achieved)), _add_conditions(study, _with_delay_error(study))
         ),
         _select_columns(
             "trials",
             (*trials, *judged, *(_may_miss(achieved) if study.levels else achieved)),
-            _named(study, study.trials),
+            _add_conditions(study, study.trials),
         ),
         _select_columns("aggregate", (*_aggregate_head(), *opened, *_MEASURED), _aggregate(study)),
         *_level_tables(study),
@@ -182,7 +182,7 @@ def exported_tables(study: Study) -> tuple[Delivered, ...]:
     return tuple(_with_site(study, table) for table in tables)
 
 
-def _named(study: Study, table: pd.DataFrame) -> pd.DataFrame:
+def _add_conditions(study: Study, table: pd.DataFrame) -> pd.DataFrame:
     """Add the condition of each code; empty for answers in forms and while the key is sealed."""
     pairs = zip(table["block"], table["code"], strict=True)
     settings = [setting.of or setting for setting in (study.settings.get(pair, _OF_A_FORM) for pair in pairs)]
@@ -219,7 +219,7 @@ def _aggregate(study: Study) -> pd.DataFrame:
         names = [*header(_aggregate_head()), *header(OPENED), *header(_MEASURED)]
         return pd.DataFrame({name: pd.Series(dtype=object) for name in names})
     frame = pd.concat(frames, ignore_index=True)
-    return _named(study, frame.assign(study=study.name, simulated=study.simulated, pilot=study.pilot))
+    return _add_conditions(study, frame.assign(study=study.name, simulated=study.simulated, pilot=study.pilot))
 
 
 @dataclass(frozen=True, slots=True)

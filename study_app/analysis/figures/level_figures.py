@@ -480,7 +480,7 @@ def _draw_settings(result: LevelsResult, look: Look) -> Sheet:
     levels = (
         level
         for estimate in shown
-        for level in (*estimate.levels, estimate.low, estimate.high, _compared(estimate))
+        for level in (*estimate.levels, estimate.low, estimate.high, _standard_level(estimate))
         if level is not None
     )
     ends = _ends(result, levels, 0.08, 1.05, 0.08)
@@ -493,7 +493,7 @@ def _draw_settings(result: LevelsResult, look: Look) -> Sheet:
     return panels(look, level_words(result), names, draw, "Setting")
 
 
-def _compared(estimate: SettingEstimate) -> float | None:
+def _standard_level(estimate: SettingEstimate) -> float | None:
     """Return the standard as a level to draw among the settings; None if none was presented."""
     return estimate.standard if estimate.constant_error is not None else None
 
@@ -503,7 +503,7 @@ def _settings_panel(axes: Axes, estimate: SettingEstimate) -> None:
     if estimate.low is not None and estimate.high is not None:
         axes.axhspan(estimate.low, estimate.high, color=style.BAND, linewidth=0, zorder=1)
     axes.axhline(estimate.pse, color=style.ACCENT, linewidth=1.0, zorder=2)
-    if (standard := _compared(estimate)) is not None:
+    if (standard := _standard_level(estimate)) is not None:
         axes.axhline(standard, color=style.AXIS, linewidth=0.8, linestyle=(0, (4, 3)), zorder=2)
     places, levels = np.arange(1.0, estimate.n + 1), np.array(estimate.levels)
     high = np.array(estimate.started_high, dtype=bool)

@@ -649,7 +649,7 @@ _MEASURES: Final = ("Movement time, s", "Path, mm", "Overshoot, mm", "Submovemen
 """The titles of `OF_REACHES`."""
 
 
-def _kept(block: Block, results: Results) -> str:
+def _limits_sentence(block: Block, results: Results) -> str:
     """Return a sentence on the number of trials within the limits."""
     here = [delivered for delivered in results.delivered if delivered.block == block.id]
     judged, valid = sum(delivered.judged for delivered in here), sum(one.valid for one in here)
@@ -698,7 +698,7 @@ class Movement(Finding[None]):
             f"Reaching movements as a function of the requested delay ({drawing.simulated}n = {people} with "
             f"recordings). Thin lines: {answer_figures.line_words(people)}; thick line: median; band: interquartile "
             "range. Movement time is measured from the moment a target lights up until the hand enters it for the "
-            f"last time. The axes do not start at zero. {_kept(block, drawing.results)}"
+            f"last time. The axes do not start at zero. {_limits_sentence(block, drawing.results)}"
         )
         delays_ms = [setting.delay_ms or 0.0 for setting in block.settings]
         draw = partial(answer_figures.draw_answers, plots, delays_ms, [None] * len(plots), foot, own_scales=scales)

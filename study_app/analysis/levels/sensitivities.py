@@ -137,7 +137,7 @@ def _of_ratings(person: str, rows: pd.DataFrame, lowest: float, level: float) ->
     noise, signal = (rows.loc[rows["level"] == at, "value"].dropna().to_numpy(float) for at in (lowest, level))
     sensitivity = rating(noise, signal)
     estimate = SensitivityEstimate(participant=person, n=len(noise) + len(signal), shares={}, level=float(level))
-    return None if sensitivity is None else _measured(estimate, sensitivity)
+    return None if sensitivity is None else _with_sensitivity(estimate, sensitivity)
 
 
 def _of_choices(
@@ -152,7 +152,7 @@ def _of_choices(
     estimate = SensitivityEstimate(participant=person, n=len(rows), shares=shares, **where)  # type: ignore[arg-type]  # standard or comparison
     if sensitivity is None:
         return estimate
-    measured = _measured(estimate, sensitivity)
+    measured = _with_sensitivity(estimate, sensitivity)
     return _with_ends(measured, design, counts, sensitivity.model) if design.kind in _FROM_SHARE_CORRECT else measured
 
 
@@ -167,7 +167,7 @@ def _with_ends(
     return replace(estimate, low=d_prime_at(task, share.low), high=d_prime_at(task, share.high))
 
 
-def _measured(estimate: SensitivityEstimate, sensitivity: Sensitivity) -> SensitivityEstimate:
+def _with_sensitivity(estimate: SensitivityEstimate, sensitivity: Sensitivity) -> SensitivityEstimate:
     half = math.nan if sensitivity.variance is None else Z_95 * math.sqrt(sensitivity.variance)
     return replace(
         estimate,

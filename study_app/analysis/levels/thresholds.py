@@ -141,7 +141,7 @@ def given_by(stimulus: Stimulus, rows: pd.DataFrame) -> Given:
     )
 
 
-def _answered(block: LevelBlock, opened: pd.DataFrame) -> pd.DataFrame:
+def _ordered_answers(block: LevelBlock, opened: pd.DataFrame) -> pd.DataFrame:
     """Return the answers in trial order, with the correct interval and the previous answer as ±1."""
     rows = opened[(opened["block"] == block.id) & opened["success"].notna()]
     rows = rows.sort_values(["participant", "session", "trial"])
@@ -158,7 +158,7 @@ def thresholds(block: LevelBlock, opened: pd.DataFrame) -> Iterator[ThresholdEst
     assumed, stimulus = block.assumed, block.stimulus
     if assumed is None or stimulus is None:
         return
-    for standard, at_standard in _answered(block, opened).groupby("standard", dropna=False, sort=True):
+    for standard, at_standard in _ordered_answers(block, opened).groupby("standard", dropna=False, sort=True):
         fits, priors = _fits(block, assumed, at_standard[at_standard["analysed"]])
         heard = dict(list(at_standard.groupby("participant")))
         own = [_own(block, stimulus, standard, fit, heard[fit.person]) for fit in fits]
@@ -227,7 +227,7 @@ def thresholds_compared(
     """
     blocks, of_blocks = (first, second), []
     for block in blocks:
-        rows = _answered(block, opened)
+        rows = _ordered_answers(block, opened)
         at_standards = rows[rows["analysed"]].groupby("standard", dropna=False, sort=True)
         of_blocks.append([_flat_fits(block, at_standard) for _, at_standard in at_standards])
     stimuli = [
@@ -369,7 +369,7 @@ def psychometric_bands(
     if assumed is None or stimulus is None:
         return {}
     u = np.linspace(*ends, _PLACES)
-    rows = _answered(block, opened)
+    rows = _ordered_answers(block, opened)
     fits, _ = _fits(block, assumed, rows[rows["analysed"]])
     return {str(fit.person): np.array([u, *fit.posterior.band(u)]) for fit in fits if fit.person in people}
 
@@ -404,7 +404,7 @@ def courses(block: LevelBlock, opened: pd.DataFrame, most: int) -> Iterator[Trac
     assumed, stimulus = block.assumed, block.stimulus
     if assumed is None or stimulus is None:
         return
-    rows = _answered(block, opened)
+    rows = _ordered_answers(block, opened)
     at_standards = rows[rows["analysed"]].groupby("standard", dropna=False, sort=True)
     fits: list[tuple[Any, _FittedPerson]] = [
         (standard, person) for standard, own in at_standards for person in _fits(block, assumed, own)[0]

@@ -54,7 +54,7 @@ def tracks(study: Study) -> pd.DataFrame:
     rows = study.trials[study.trials["block"].isin(list(by_id))]
     rows = rows.sort_values("attempt").drop_duplicates(_PRESENTATION[:-1], keep="last").sort_index()
     answers = answers_timed(study)[[*_PRESENTATION, "response", "value", "response_s"]]
-    frame = rows.merge(_presented(study.intervals), on=_PRESENTATION, how="left")
+    frame = rows.merge(_presentations(study.intervals), on=_PRESENTATION, how="left")
     frame = frame.merge(answers, on=_PRESENTATION, how="left")
     frame["slot"] = frame.groupby(TRACK).cumcount() + 1
     track_rows = [_track_row(by_id[row["block"]], row) for row in frame[list(_READ)].to_dict("records")]
@@ -173,7 +173,7 @@ def _level_delivered(stimulus: Stimulus, standard: float | None, comparison: flo
     return stimulus.level_between(standard if pd.isna(of_standard) else float(of_standard), float(value))
 
 
-def _presented(intervals: pd.DataFrame) -> pd.DataFrame:
+def _presentations(intervals: pd.DataFrame) -> pd.DataFrame:
     """Return one row per presentation: standard, level, arrangement, and force and speed of each interval."""
     ordered = intervals.sort_values([*_PRESENTATION, "interval"])
     letters = ordered["presented"].map({"comparison": "C", "standard": "S"}).fillna("?")

@@ -375,7 +375,13 @@ def power_markdown(power: Powers) -> str:
         for question, (head, first) in _HEADS.items():
             curves = [curve for curve in power.curves if (curve.block, curve.question) == (block.id, question)]
             if curves:
-                lines += ["", f"## {block.title}: {head[:1].lower()}{head[1:]}", "", *_explained(question, power), ""]
+                lines += [
+                    "",
+                    f"## {block.title}: {head[:1].lower()}{head[1:]}",
+                    "",
+                    *_test_sentences(question, power),
+                    "",
+                ]
                 lines += _markdown_table(
                     curves, power, first, lambda curve, at: whole_percent(curve.power[at]), needed=True
                 )
@@ -392,7 +398,7 @@ def power_markdown(power: Powers) -> str:
                     first,
                     lambda curve, at: _difference_text(curve.points(at), 2),
                 )
-    return "\n".join([*lines, *_between(power)]) + "\n"
+    return "\n".join([*lines, *_untested_contrasts(power)]) + "\n"
 
 
 def _preface(power: Powers) -> list[str]:
@@ -484,7 +490,7 @@ def _summary(power: Powers) -> Iterator[str]:
         yield from ("", f"## Power with {planned}{sizes[place]} participants", "", *lines)
 
 
-def _between(power: Powers) -> Iterator[str]:
+def _untested_contrasts(power: Powers) -> Iterator[str]:
     """Yield a table for each contrast of a statement between groups or of a form, which have no simulated effect."""
     plan = power.plan
     titles = {block.id: block.title for block in plan.blocks}
@@ -535,7 +541,7 @@ def _truly_equal(curves: Sequence[Curve]) -> list[Curve]:
     ]
 
 
-def _explained(question: Question, found: Powers) -> list[str]:
+def _test_sentences(question: Question, found: Powers) -> list[str]:
     match question:
         case "conditions differ":
             return [

@@ -93,7 +93,7 @@ class Plan:
 def plan(protocol: Protocol, features: ConditionFeatures) -> Plan:
     """Return the plan for a protocol; raise AnalysisError if no block compares settings by questions."""
     language = display_language({"study": {"languages": protocol.study.languages}})
-    asked = _compared(protocol)
+    asked = _compared_blocks(protocol)
     if not asked:
         raise AnalysisError(
             f"{protocol.study.name} does not contain any comparisons: a power analysis needs a main block with two or "
@@ -109,7 +109,7 @@ def plan(protocol: Protocol, features: ConditionFeatures) -> Plan:
         name=protocol.study.name,
         title=text_in(protocol.study.title, language),
         version=protocol.study.version,
-        blocks=tuple(_planned(protocol, block, features, language) for block in asked),
+        blocks=tuple(_plan_block(protocol, block, features, language) for block in asked),
         decided=read_decided([table]),
         kinds=compared_kinds(protocol.simulated_participants),
         participants=None if protocol.analysis is None else protocol.analysis.participants,
@@ -134,14 +134,14 @@ def group_shares(protocol: Protocol, contrast: Contrast) -> tuple[float, float] 
 
 def compares_statements(protocol: Protocol) -> bool:
     """Return whether a main block compares conditions by statements."""
-    return bool(_compared(protocol))
+    return bool(_compared_blocks(protocol))
 
 
-def _compared(protocol: Protocol) -> list[Block]:
+def _compared_blocks(protocol: Protocol) -> list[Block]:
     return [block for block in protocol.main_blocks if _statements(protocol, block) and len(block.conditions) > 1]
 
 
-def _planned(protocol: Protocol, block: Block, features: ConditionFeatures, language: str) -> Planned:
+def _plan_block(protocol: Protocol, block: Block, features: ConditionFeatures, language: str) -> Planned:
     conditions = {name: protocol.conditions[name] for name in block.conditions}
     kind = protocol.compared_in(block.id)
     assert kind is not None  # noqa: S101 - a main block
@@ -470,7 +470,7 @@ def _holm(ps: Sequence[Array], others: int) -> Array:
     return np.asarray(np.apply_along_axis(lambda each: np.array(holm(each.tolist())), -1, family))
 
 
-def _counted(found: NDArray[np.bool_], shown: NDArray[np.bool_], effects: int) -> dict[str, NDArray[np.bool_]]:
+def _count_findings(found: NDArray[np.bool_], shown: NDArray[np.bool_], effects: int) -> dict[str, NDArray[np.bool_]]:
     """Return which studies (studies, effects, …) show the findings (effects · studies, items), in all and each."""
     by_effect = found.reshape(effects, -1, found.shape[-1]).swapaxes(0, 1)
     return {"found": by_effect, "any": np.any(by_effect, axis=2), "all": shown.reshape(effects, -1).T}
@@ -483,7 +483,7 @@ def _liquids(
     effects = len(answers)
     if block.k == 2:
         ps = signed(answers.reshape(-1, *answers.shape[2:]), rng)
-    return _counted(_family(block, decided, ps) & shown[:, None], shown, effects)
+    return _count_findings(_family(block, decided, ps) & shown[:, None], shown, effects)
 
 
 def _delays(
@@ -496,7 +496,7 @@ def _delays(
     flat = rising.reshape(-1, *rising.shape[2:])
     ps = slopes(flat, block, both_ways) if decided.trends == "slopes" else trend(ranks(flat), both_ways, rng)
     found = _family(block, decided, ps) & shown[:, None]
-    counted = _counted(found, shown, effects)
+    counted = _count_findings(found, shown, effects)
     at_full = found.reshape(effects, studies, -1)[FULL]
     first = rising.shape[3] if decided.trends == "slopes" else rising.shape[3] - 1
     counted["lowest"] = _step_down(rising[FULL], at_full, both_ways, decided.alpha, rng, first)

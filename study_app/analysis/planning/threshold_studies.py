@@ -329,7 +329,13 @@ def threshold_markdown(precisions: Precisions) -> str:
     planned = plans(precisions.protocol, ())
     blocks = precisions.protocol.blocks
     for block in dict.fromkeys(block for block, _ in precisions.found):
-        lines += ["", f"## {text_in(blocks[block].title, language)} (block {block})", "", _assumed(planned[block]), ""]
+        lines += [
+            "",
+            f"## {text_in(blocks[block].title, language)} (block {block})",
+            "",
+            _assumption_sentences(planned[block]),
+            "",
+        ]
         trials_of, unknown = "trials" + next(iter(planned[block].values())).per, False
         lines += [f"| {' | '.join((trials_of, *heads))} |", "|---:" * (1 + len(heads)) + "|"]
         for (of_block, trials), found in precisions.found.items():
@@ -450,7 +456,7 @@ def _spreads(precisions: Precisions, contrast: Contrast) -> Iterator[tuple[str, 
             yield str(trials), math.hypot(math.log(BETWEEN_PEOPLE), *spreads)
 
 
-def _assumed(plans_of_block: Mapping[int, _Plan]) -> str:
+def _assumption_sentences(plans_of_block: Mapping[int, _Plan]) -> str:
     """Return sentences on the simulated participants of a block and on the group's interval."""
     plan = next(iter(plans_of_block.values()))
     if isinstance(plan, ThresholdPlan):

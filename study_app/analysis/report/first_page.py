@@ -492,7 +492,7 @@ def first_page(
                 "verdict": card.badge,
                 "state": card.verdict.replace(" ", "-"),
                 "small": is_small,
-                "sentences": [_unbroken(line) for line in card.sentences],
+                "sentences": [_with_fixed_spaces(line) for line in card.sentences],
                 "figure": "" if figure is None else picture(figure, beside=True),
                 "caption": "" if figure is None else figure.caption,
             }
@@ -504,7 +504,7 @@ def first_page(
     )
 
 
-def _unbroken(sentence: str) -> str:
+def _with_fixed_spaces(sentence: str) -> str:
     return _BREAKS.sub(lambda match: match[0].replace(" ", "\u00a0"), sentence)
 
 

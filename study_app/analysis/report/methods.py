@@ -54,7 +54,7 @@ def _sentences(study: Study, results: Results) -> Iterator[str]:
     blocks = [block for block in results.blocks if block.n]
     yield _sample(study)
     yield _groups(study)
-    yield _planned(study, results)
+    yield _sample_size_sentences(study, results)
     yield _exclusions(study)
     yield _exclusion_rules(study, results)
     yield _apparatus(study)
@@ -117,7 +117,7 @@ def _groups(study: Study) -> str:
     return ""
 
 
-def _planned(study: Study, results: Results) -> str:
+def _sample_size_sentences(study: Study, results: Results) -> str:
     """Return sentences on the planned sample size, the planned looks, and the current look."""
     decided = results.decided
     if decided.looks:
@@ -237,7 +237,7 @@ def _design(study: Study, results: Results) -> Iterator[str]:
     """Yield sentences on the presentation and order of trials in each block with questions, and on block order."""
     blocks = {block.id: block for block in study.blocks}
     for result in results.blocks:
-        yield _presented(study, blocks[result.id], result)
+        yield _presentation_sentence(study, blocks[result.id], result)
         yield from said_of_presentations(result)
     others = [*_other_questions(study, results)]
     yield from others
@@ -269,7 +269,7 @@ def _other_questions(study: Study, results: Results) -> Iterator[str]:
         )
 
 
-def _presented(study: Study, block: Block, result: BlockResult) -> str:
+def _presentation_sentence(study: Study, block: Block, result: BlockResult) -> str:
     order = _ORDERS.get(study.protocol.get("blocks", {}).get(result.id, {}).get("order", ""), "")
     noun = (
         {"delays": "visual delay"}.get(result.kind, result.kind.removesuffix("s")) if result.revealed else "condition"

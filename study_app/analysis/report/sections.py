@@ -575,7 +575,7 @@ def conduct(study: Study, results: Results) -> Iterator[str]:
     if reversed_ones := [*_reversed_exclusions(study)]:
         yield heading(3, "Exclusions that were reversed")
         yield bullets(_first(reversed_ones))
-    yield from _missing(study)
+    yield from _missing_trials(study)
     if study.doubts:
         yield heading(3, "Files that have changed since recording")
         yield bullets(
@@ -634,7 +634,7 @@ class _LostTrials(NamedTuple):
     missing: MissingTrials
 
 
-def _missing(study: Study) -> Iterator[str]:
+def _missing_trials(study: Study) -> Iterator[str]:
     """Yield how many interval trials each participant lost, which and why; nothing without such trials."""
     if not study.levels:
         return
@@ -710,7 +710,7 @@ def _delivered(study: Study, results: Results) -> Iterator[str]:
         ("mean error", shown(lambda delivered: _signed_ms(delivered.error_mean_ms))),
         ("worst trial", shown(lambda delivered: _signed_ms(delivered.error_worst_ms))),
         ("trials", trials),
-        ("within limits", _within),
+        ("within limits", _within_limits),
         words=2,
     )
     limits = study.protocol.get("limits", {})
@@ -753,7 +753,7 @@ def _limit(what: str, limit: float) -> str:
     return f"{quantity or words.replace('_', ' ')} {value}".lstrip()
 
 
-def _within(delivered: Delivered) -> str:
+def _within_limits(delivered: Delivered) -> str:
     return f"{delivered.valid} of {delivered.judged}" if delivered.judged else "not measured"
 
 
@@ -832,7 +832,7 @@ def _movement_measures(measured: Performance, result: BlockResult, **wanted: str
 def _motion_rows(
     result: BlockResult, measured: Performance, measures: Sequence[str], delivered: Sequence[Delivered]
 ) -> list[list[str]]:
-    kept = {one.code: _within(one) for one in delivered if one.block == result.id}
+    kept = {one.code: _within_limits(one) for one in delivered if one.block == result.id}
     rows = []
     for setting in result.settings:
         here = {moved.measure: moved for moved in _movement_measures(measured, result, code=setting.code) if moved.n}

@@ -98,7 +98,7 @@ def tost(
         )
     array = checked_values(differences, "participants")
     kept = np.sort(array[~np.isnan(array)])
-    equivalence = _compared(tuple(kept.tolist()), float(bound), alpha, seed, largest)
+    equivalence = _compare_sorted(tuple(kept.tolist()), float(bound), alpha, seed, largest)
     return replace(equivalence, dropped=len(array) - len(kept))
 
 
@@ -131,7 +131,9 @@ def fewest_participants(alpha: float, bound: float, largest: float | None = STEP
 
 
 @lru_cache(maxsize=4096)
-def _compared(differences: tuple[float, ...], bound: float, alpha: float, seed: int, largest: float) -> Equivalence:
+def _compare_sorted(
+    differences: tuple[float, ...], bound: float, alpha: float, seed: int, largest: float
+) -> Equivalence:
     """Return the comparison of sorted ``differences``, which often repeat since answers are whole points."""
     kept = np.array(differences)
     equivalence = _described(kept, bound, alpha, largest)

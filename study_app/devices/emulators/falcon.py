@@ -301,7 +301,7 @@ class EmulatedFalcon(FalconDevice):
 
     @classmethod
     def of(cls, request: OpenRequest) -> Self:
-        return cls(request.random, **cls._given(request))
+        return cls(request.random, **cls._device_options(request))
 
     def take_fault(self, fault: str) -> None:
         self.hand.set_fault(fault)

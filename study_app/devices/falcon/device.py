@@ -78,10 +78,10 @@ class FalconDevice(FramedDevice):
 
     @classmethod
     def of(cls, request: OpenRequest) -> Self:
-        return cls(request.argument, **cls._given(request))
+        return cls(request.argument, **cls._device_options(request))
 
     @staticmethod
-    def _given(request: OpenRequest) -> dict[str, Any]:
+    def _device_options(request: OpenRequest) -> dict[str, Any]:
         firmware = request.options.get("firmware")
         return {"firmware": firmware, "progress": request.progress, "cancelled": request.cancelled, **request.limits}
 

@@ -345,7 +345,7 @@ def physical_candidates(scene: Scene) -> tuple[tuple[Candidate, ...], Candidate]
     carried: tuple[Effect, ...] = ()
     for effect in ("added_mass", "history"):
         carried = (*carried, effect)
-        candidates.append(_carrying(exact, REFERENCE, carried))
+        candidates.append(_effects_candidate(exact, REFERENCE, carried))
     candidates.append(_UnsteadyDrag("unsteady drag", "unsteady drag", "effects", with_effects(exact, "unsteady_drag")))
     gated = resolve(_with_only(scene, scene.liquids[0].model_copy(update={"effects": "auto"}))).liquids[0]
     carried = tuple(it for it in _WORDS if it in gated.effects)
@@ -354,7 +354,7 @@ def physical_candidates(scene: Scene) -> tuple[tuple[Candidate, ...], Candidate]
     if "drag" not in gated.effects:
         choice: Candidate = Candidate("no resistance", "no resistance", "effects", with_effects(exact, *carried))
     else:
-        choice = _carrying(exact, gated.drag.law, carried)
+        choice = _effects_candidate(exact, gated.drag.law, carried)
     same = next(
         (candidate for candidate in candidates if type(candidate) is Candidate and candidate.scene == choice.scene),
         None,
@@ -362,7 +362,7 @@ def physical_candidates(scene: Scene) -> tuple[tuple[Candidate, ...], Candidate]
     return (tuple(candidates), same) if same is not None else ((*candidates, choice), choice)
 
 
-def _carrying(exact: Scene, law: Law, carried: tuple[Effect, ...]) -> Candidate:
+def _effects_candidate(exact: Scene, law: Law, carried: tuple[Effect, ...]) -> Candidate:
     words, (name, short) = [_WORDS[it] for it in carried], _LAWS[law]
     of = with_effects(exact, "drag", *carried, law=law)
     return Candidate(" + ".join([name, *words]), " + ".join([short, *words]), "effects", of)

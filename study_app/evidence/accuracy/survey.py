@@ -84,11 +84,11 @@ def survey_scenes(
         if liquid.viscosity_pa_s is None or liquid.drag.law == "linear":
             continue
         progress(name)
-        surveyed.append(_surveyed(name, scene, liquid, liquid.viscosity_pa_s))
+        surveyed.append(_survey_liquid(name, scene, liquid, liquid.viscosity_pa_s))
     return tuple(sorted(surveyed, key=lambda it: it.reynolds))
 
 
-def _surveyed(name: str, scene: Scene, liquid: Liquid, viscosity_pa_s: float) -> Surveyed:
+def _survey_liquid(name: str, scene: Scene, liquid: Liquid, viscosity_pa_s: float) -> Surveyed:
     models, model = candidates.physical_candidates(scene)
     alone = models[0].scene
 
@@ -146,7 +146,7 @@ def survey_evidence(found: tuple[Surveyed, ...]) -> Evidence:
     laws = []
     for reynolds in _REYNOLDS:
         drags = [law(reynolds) for law in (*PUBLISHED.values(), finite_reynolds)]
-        values = [f"{24 / reynolds * ratio:.3g}" for ratio in (*drags, _measured(reynolds))]
+        values = [f"{24 / reynolds * ratio:.3g}" for ratio in (*drags, _measured_drag_ratio(reynolds))]
         laws.append((f"{reynolds:,g}", *values, _percent(_law_spread(reynolds))))
     tables = (
         Table(_HEADINGS, liquids, left=(0, 2)),
@@ -172,7 +172,7 @@ _WHAT: Final = (
 )
 
 
-def _measured(reynolds: float) -> float:
+def _measured_drag_ratio(reynolds: float) -> float:
     """Return C_d Re/24 as measured in experiments."""
     liquid = Liquid(id="any", density_kg_m3=1.0, viscosity_pa_s=1.0)
     return float(measured_drag_n(liquid, 1.0, np.array([reynolds]))[0]) / (3 * math.pi * reynolds)

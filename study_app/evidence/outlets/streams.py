@@ -136,7 +136,7 @@ def measure_streams(
                 servo.load(FULL)
                 for number in paced_steps(seconds, _MARKER_EVERY_S, ending=ending, progress=progress):
                     servo.check()
-                    sent.append(_numbered(number, servo.now_ns(), origin_ns))
+                    sent.append(_trial_marker(number, servo.now_ns(), origin_ns))
                     sink.mark(sent[-1])
             finally:
                 servo.stop()
@@ -146,17 +146,17 @@ def measure_streams(
     finally:
         samples.close()
         sink.close()
-    return _found(seconds, samples, sent, received)
+    return _stream_result(seconds, samples, sent, received)
 
 
-def _numbered(number: int, now_ns: int, origin_ns: int) -> Marker:
+def _trial_marker(number: int, now_ns: int, origin_ns: int) -> Marker:
     """Return a marker for an event at this moment in a trial with this number."""
     marker = marker_of("trial_started", 1e-9 * (now_ns - origin_ns), origin_ns, {"trial": number, "code": "L1"})
     assert marker is not None  # noqa: S101 - such events are markers
     return marker
 
 
-def _found(seconds: float, samples: _MeasuredStream, sent: list[Marker], received: dict[str, Any]) -> Streamed:
+def _stream_result(seconds: float, samples: _MeasuredStream, sent: list[Marker], received: dict[str, Any]) -> Streamed:
     times_ns = {marker.text: marker.time_ns for marker in sent}
     markers = received["markers"]
     since_ns = [[it[key] - times_ns[it["text"]] for key in ("time_ns", "arrived_ns")] for it in markers]
@@ -219,7 +219,7 @@ def compare_streams(
             marking.wait()
             if over.is_set():
                 return
-            sink.mark(_numbered(number, servo.now_ns(), 0))
+            sink.mark(_trial_marker(number, servo.now_ns(), 0))
             time.sleep(_MARKER_EVERY_S)
 
     def lateness_ns(active: bool, _round: int) -> NDArray[np.int64]:

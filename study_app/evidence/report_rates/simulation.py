@@ -84,14 +84,15 @@ def simulate_answers(
         thought = draw_opinions(simulation, participants, seed, study)
         rng = np.random.default_rng([seed, study, participants])
         return tuple(
-            _opined(block, opinions, extent, rng) for block, opinions in zip(simulation.blocks, thought, strict=True)
+            _simulate_answers(block, opinions, extent, rng)
+            for block, opinions in zip(simulation.blocks, thought, strict=True)
         )
     rng = np.random.default_rng([seed, study])
     leaning, slope = _LEANING * rng.normal(size=participants), 1 + _SLOPE * rng.normal(size=participants)
     return tuple(_probit(simulation, block, extent, leaning, slope, rng) for block in simulation.blocks)
 
 
-def _opined(block: Block, opinions: Opinions, extent: _Extent, rng: np.random.Generator) -> Array:
+def _simulate_answers(block: Block, opinions: Opinions, extent: _Extent, rng: np.random.Generator) -> Array:
     """Return the answers of the answer model; equal conditions have equal effects."""
     if extent == "empty":
         return opinions.answers(0.0, PEOPLE)
@@ -366,10 +367,10 @@ def _claims(result: BlockResult) -> bool:
     pairs = [pair.tested for pair in Pairs.of(result)]
     tests = [*SettingsDiffer.of(result), *DelayTrend.of(result), *MeanTests.of(result), *pairs]
     low = any(lowest.over_all_ms is not None for lowest in LowestDelay.of(result))
-    return any(test.verdict in FOUND for test in tests) or low or _recognised(result) or _printed(result)
+    return any(test.verdict in FOUND for test in tests) or low or _recognised(result) or _has_threshold(result)
 
 
-def _modelled(result: BlockResult) -> Iterator[tuple[Event, bool]]:
+def _mean_test_events(result: BlockResult) -> Iterator[tuple[Event, bool]]:
     """Yield, for each statement, whether the test of means finds a difference."""
     yield (
         ("difference found by the test of means", "at most 5 %"),
@@ -384,7 +385,7 @@ def _in_liquids(asked: BlockAnswers, result: BlockResult, cell: Cell, _truth: Ar
             any(test.verdict in FOUND for test in SettingsDiffer.of(result)),
         )
         yield ("liquids recognised", "at most 5 %"), _recognised(result)
-        yield from _modelled(result)
+        yield from _mean_test_events(result)
     equal = _equal_pairs(asked.block, cell.extent)
     if equal:
         found_equal = any(
@@ -418,8 +419,8 @@ def _in_delays(asked: BlockAnswers, result: BlockResult, cell: Cell, truth: Arra
     null = [block.settings[at].delay_ms or 0.0 for at in _equal_settings(block, cell.extent)]
     if cell.extent in _NO_EFFECT:
         yield ("trend in a statement", "at most 5 %"), any(test.verdict in FOUND for test in DelayTrend.of(result))
-        yield ("detection threshold printed", "at most 5 %"), _printed(result)
-        yield from _modelled(result)
+        yield ("detection threshold printed", "at most 5 %"), _has_threshold(result)
+        yield from _mean_test_events(result)
     if null:
         low = any(
             lowest.over_all_ms is not None and lowest.over_all_ms <= max(null) for lowest in LowestDelay.of(result)
@@ -432,10 +433,10 @@ def _in_delays(asked: BlockAnswers, result: BlockResult, cell: Cell, truth: Arra
             ("shortest delay with a trend stated", "counted"),
             any(lowest.over_all_ms is not None for lowest in LowestDelay.of(result)),
         )
-        yield ("detection threshold printed", "counted"), _printed(result)
+        yield ("detection threshold printed", "counted"), _has_threshold(result)
 
 
-def _printed(result: BlockResult) -> bool:
+def _has_threshold(result: BlockResult) -> bool:
     threshold = DetectionThreshold.of(result)
     return threshold is not None and threshold.effect is not None
 

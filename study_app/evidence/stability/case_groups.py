@@ -215,7 +215,7 @@ def evenly_chosen(cases: Sequence[Case], count: int | None) -> tuple[Case, ...]:
     return tuple(Random(count).sample(cases, count))  # noqa: S311 - no secret
 
 
-def _believing(less: int) -> Callable[[Case], Case | None]:
+def _underestimate_delay(less: int) -> Callable[[Case], Case | None]:
     """Return a function that makes a loop underestimate its delay by ``less`` ticks, or returns None if it cannot."""
 
     def change(case: Case) -> Case | None:
@@ -225,7 +225,7 @@ def _believing(less: int) -> Callable[[Case], Case | None]:
     return change
 
 
-def _measuring(less: int) -> Callable[[Case], Case | None]:
+def _underestimate_until_measured(less: int) -> Callable[[Case], Case | None]:
     """Return a function that makes a loop start with an underestimated delay on a device that measures it."""
 
     def change(case: Case) -> Case | None:
@@ -236,13 +236,13 @@ def _measuring(less: int) -> Callable[[Case], Case | None]:
 
 
 _CHANGES: Final[Mapping[str, Callable[[Case], Case | None]]] = {
-    "delay believed one tick too short": _believing(1),
-    "delay believed one tick too long": _believing(-1),
+    "delay believed one tick too short": _underestimate_delay(1),
+    "delay believed one tick too long": _underestimate_delay(-1),
     "device slower by a tick after 0.5 s": lambda case: (
         dataclasses.replace(case, slows_to=case.delay + 1) if case.delay < 4 else None
     ),
-    "delay two ticks too short, measured": _measuring(2),
-    "delay three ticks too short, measured": _measuring(3),
+    "delay two ticks too short, measured": _underestimate_until_measured(2),
+    "delay three ticks too short, measured": _underestimate_until_measured(3),
     "10 % of samples lost": lambda case: dataclasses.replace(case, lost=0.1),
     "5 % of samples repeated": lambda case: dataclasses.replace(case, duplicated=0.05),
     "no sample for 20 ms, again and again": lambda case: dataclasses.replace(case, burst_ms=20.0),

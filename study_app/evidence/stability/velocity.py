@@ -316,19 +316,19 @@ def _lines(rows: Sequence[Row]) -> Iterator[str]:
         yield f"{row.name:{width}} {values}{goal}{judged}{bound}"
 
 
-def _each(measured: Callable[[Velocity], Any]) -> tuple[Any, ...]:
+def _for_each_estimator(measured: Callable[[Velocity], Any]) -> tuple[Any, ...]:
     return tuple(measured(velocity) for velocity in _ESTIMATORS)
 
 
-def _imposed() -> Iterator[Row]:
-    by_estimator: tuple[Mapping[Stroke, float], ...] = _each(errors)
+def _imposed_motion_rows() -> Iterator[Row]:
+    by_estimator: tuple[Mapping[Stroke, float], ...] = _for_each_estimator(errors)
     for stroke in (*_SMOOTH, *_FASTEST, *_SHOWN):
         goal = _SMOOTH_PERCENT if stroke in _SMOOTH else _FASTEST_PERCENT if stroke in _FASTEST else None
         yield Row(f"error of v·|v|, {stroke} [%]", tuple(found[stroke] for found in by_estimator), goal)
 
 
 def _noise() -> Iterator[Row]:
-    noise: tuple[Mapping[float, float], ...] = _each(noise_mmps)
+    noise: tuple[Mapping[float, float], ...] = _for_each_estimator(noise_mmps)
     for speed_mps in _NOISE_MPS:
         values = tuple(found[speed_mps] for found in noise)
         where = f"at {1e3 * speed_mps:g} mm/s" if speed_mps else "at rest"
@@ -336,7 +336,7 @@ def _noise() -> Iterator[Row]:
 
 
 def _boundaries() -> Iterator[Row]:
-    limits = _each(lambda velocity: slope_limit(_PERIOD_S, 1, velocity))
+    limits = _for_each_estimator(lambda velocity: slope_limit(_PERIOD_S, 1, velocity))
     yield Row("slope limit, 1 tick of delay [N·s/m]", limits, _LEAST_LIMIT_NSPM, least=True)
     for delay, believed in _LOOPS:
         for mass_kg in _MASSES_KG:
@@ -350,11 +350,11 @@ def _boundaries() -> Iterator[Row]:
             yield Row(f"stable damping, {mass_kg:g} kg, delay {delay}{mistaken} [N·s/m]", values, goal, least=True)
 
 
-def _held() -> Iterator[Row]:
-    errors = _each(_plain_errors)
+def _held_handle_rows() -> Iterator[Row]:
+    errors = _for_each_estimator(_plain_errors)
     yield Row("held, 1–3 Hz ±20 mm, mean error [%]", tuple(map(statistics.mean, errors)), _HELD_PERCENT)
     yield Row("held, 1–3 Hz ±20 mm, largest error [%]", tuple(map(max, errors)))
-    quick = _each(lambda velocity: statistics.mean(_plain_errors(velocity, (_QUICK,))))
+    quick = _for_each_estimator(lambda velocity: statistics.mean(_plain_errors(velocity, (_QUICK,))))
     yield Row(f"held, {_QUICK}, mean error [%]", quick)
 
 
@@ -368,14 +368,14 @@ def _whole() -> Iterator[Row]:
 
 
 def _cost() -> Iterator[Row]:
-    yield Row("extra time compared with a plain difference [ns per tick]", _each(_cost_ns), _MOST_COST_NS)
+    yield Row("extra time compared with a plain difference [ns per tick]", _for_each_estimator(_cost_ns), _MOST_COST_NS)
 
 
 PARTS: Final[Mapping[str, Callable[[], Iterator[Row]]]] = {
-    "errors in imposed motions": _imposed,
+    "errors in imposed motions": _imposed_motion_rows,
     "noise": _noise,
     "stable damping": _boundaries,
-    "closed loops": _held,
+    "closed loops": _held_handle_rows,
     "whole forces": _whole,
     "cost": _cost,
 }

@@ -116,7 +116,7 @@ def measure_withheld_force(
         )
         for estimator, mode, liquid in itertools.product(estimators, MODES, names or shipped)
     ]
-    return run(_measured, planned, executor)
+    return run(_measure_withheld, planned, executor)
 
 
 def withheld_force_evidence(found: Sequence[Withheld]) -> Evidence:
@@ -153,12 +153,12 @@ def _goal(met: bool) -> str:
     return "met" if met else "not met"
 
 
-def _measured(case: Case, mode: str) -> Withheld:
-    strokes = tuple(_share(_played(case, _stroke_m(stroke, _STROKE_S), mode)) for stroke in STROKES)
+def _measure_withheld(case: Case, mode: str) -> Withheld:
+    strokes = tuple(_share(_play_path(case, _stroke_m(stroke, _STROKE_S), mode)) for stroke in STROKES)
     after = []
     for shake in QUICK:
         shaken_m = _stroke_m(shake, _SHAKE_S)
-        trace = _played(case, np.concatenate([shaken_m, _stirring_m(shaken_m[-1])]), mode)
+        trace = _play_path(case, np.concatenate([shaken_m, _stirring_m(shaken_m[-1])]), mode)
         seconds = np.split(trace[len(shaken_m) :], SECONDS)
         after.append(tuple(_share(second) for second in seconds))
     return Withheld(liquid=case.liquid, estimator=case.estimator, mode=mode, strokes=strokes, after=tuple(after))
@@ -176,7 +176,7 @@ def _stirring_m(from_m: NDArray[np.float64]) -> NDArray[np.float64]:
     return from_m + _STIRRING_M * np.column_stack([np.cos(angle) - 1.0, np.zeros_like(angle), np.sin(angle)])
 
 
-def _played(case: Case, path_m: NDArray[np.float64], mode: str) -> Any:
+def _play_path(case: Case, path_m: NDArray[np.float64], mode: str) -> Any:
     bench = Bench(case)
     handle = bench.handle
     handle.hand_kg, handle.stiffness_npm, handle.damping_nspm = _HAND_KG, _HAND_NPM, _HAND_NSPM

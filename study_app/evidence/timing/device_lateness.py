@@ -89,10 +89,10 @@ def time_devices(
 
         arms = {name: partial(lateness_ns, name) for name in names}
         late_ns = take_turns(arms, max(round(seconds / TURN_S), 2), ending=ending, progress=progress)
-    return tuple(_compared(name, late_ns) for name in names)
+    return tuple(_compare_lateness(name, late_ns) for name in names)
 
 
-def _compared(name: str, late_ns: dict[str, list[NDArray[np.int64]]]) -> DeviceLateness:
+def _compare_lateness(name: str, late_ns: dict[str, list[NDArray[np.int64]]]) -> DeviceLateness:
     own, reference = late_ns[name], late_ns[_REFERENCE]
     rng = np.random.default_rng(1)
     draws = [_ratio(own, reference, rng.integers(0, len(own), len(own))) for _ in range(_DRAWS)]

@@ -121,12 +121,12 @@ def read_measurement(path: Path) -> Measured | FlowCurve:
     except ValueError as error:
         raise StudyError(f"{path}, {error}") from error
     try:
-        return _measured(np.array(rows), names)
+        return _parse_measurement(np.array(rows), names)
     except StudyError as error:
         raise StudyError(f"{path}: {error}") from error
 
 
-def _measured(rows: Floats, names: tuple[str, ...]) -> Measured | FlowCurve:
+def _parse_measurement(rows: Floats, names: tuple[str, ...]) -> Measured | FlowCurve:
     if names == FLOW_CURVE:
         return FlowCurve(rows[:, 0], rows[:, 1])
     if names == _ALONG_A_LINE:

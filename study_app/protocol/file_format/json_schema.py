@@ -163,7 +163,7 @@ def _distinguishing_value(node: _Node) -> str:
 def _table_lines(node: _Node, root: _Node, headings: Mapping[str, str]) -> list[str]:
     rows = [
         f"| `{key}` | {_values_text(part, headings)} | {_default_text(key, part, node)} "
-        f"| {_cell_text(_meaning(part, root))} |"
+        f"| {_cell_text(_description(part, root))} |"
         for key, part in node.get("properties", {}).items()
     ]
     return ["| key | value | default | meaning |", "| --- | --- | --- | --- |", *rows]
@@ -225,7 +225,7 @@ def _default_text(key: str, part: _Node, node: _Node) -> str:
     )
 
 
-def _meaning(part: _Node, root: _Node) -> str:
+def _description(part: _Node, root: _Node) -> str:
     """Return the description of a key, of its only alternative to null, or of its only nested model."""
     alternatives = [branch for branch in part.get("anyOf", ()) if branch.get("type") != "null"]
     meant = (part, *alternatives) if len(alternatives) == 1 else (part,)

@@ -103,7 +103,7 @@ class Condition(Table):
 
 
 @lru_cache(maxsize=64)  # each trial needs the levels; with the cache of `_running_grid` it takes a third less time
-def _spaced(low: float, high: float, log: bool, count: int) -> tuple[float, ...]:
+def _spaced_levels(low: float, high: float, log: bool, count: int) -> tuple[float, ...]:
     if count == 1:
         return (high,)
     shares = [number / (count - 1) for number in range(count)]
@@ -247,7 +247,7 @@ class Stimulus(Table):
 
     def spaced(self, count: int) -> tuple[float, ...]:
         """Return ``count`` levels, evenly spaced over the range, smallest first."""
-        return _spaced(*self.levels, self.spacing == "log", count)
+        return _spaced_levels(*self.levels, self.spacing == "log", count)
 
     @property
     def grid(self) -> tuple[float, ...]:

@@ -441,7 +441,7 @@ def precision_rows(protocol: Protocol, block: Block) -> Iterator[tuple[str, str]
     kind, most = found.worst
     median, worst = (f"×/÷ {10.0**half:.1f}" if log else f"±{half:.2g}{plan.unit}" for half in (found.median, most))
     one = median if median == worst else f"{median} (at worst {worst}, {kind})"
-    people, precision = _planned(protocol)
+    people, precision = _planned_sample(protocol)
     over = "" if found.standards == 1 else " across all standards"
     group = ""
     if people is not None:
@@ -453,7 +453,7 @@ def precision_rows(protocol: Protocol, block: Block) -> Iterator[tuple[str, str]
 
 def imprecise(protocol: Protocol, block: Block) -> Iterator[str]:
     """Yield warnings that planned participants and trials do not reach the planned precision."""
-    plan, (people, precision) = precision_plan(protocol, block), _planned(protocol)
+    plan, (people, precision) = precision_plan(protocol, block), _planned_sample(protocol)
     if plan is None or people is None or precision is None:
         return
     found = expected_of(plan)
@@ -484,7 +484,7 @@ def imprecise(protocol: Protocol, block: Block) -> Iterator[str]:
     )
 
 
-def _planned(protocol: Protocol) -> tuple[int | None, float | None]:
+def _planned_sample(protocol: Protocol) -> tuple[int | None, float | None]:
     """Return the planned number of participants and the planned precision."""
     decided = protocol.analysis
     return (None, None) if decided is None else (decided.participants, decided.precision)

@@ -118,7 +118,7 @@ def lost_trials() -> Iterator[str]:
     levels: Any = (SimpleNamespace(id="b", title="Tracks"),)
     some = replace(DELAYS, levels=levels, participants=people, protocol={"limits": {MISSING_PERCENT: 12.5}})
     none = replace(some, participants=people[1:], protocol={})
-    yield from (text_of(sections._missing(one)) for one in (some, none, replace(none, levels=())))
+    yield from (text_of(sections._missing_trials(one)) for one in (some, none, replace(none, levels=())))
     yield methods._missing_trials(none)
 
 
@@ -165,7 +165,9 @@ def methods_of_a_study() -> Iterator[str]:
     for order in ("fixed", "shuffled", "constrained", "williams", "latin"):
         for of in (LIQUIDS, DELAYS):
             shown_in = replace(of, protocol={"blocks": {"b": {"order": order}}})
-            yield methods._presented(shown_in, of.blocks[0], replace(result_of(of), revealed=order != "latin"))
+            yield methods._presentation_sentence(
+                shown_in, of.blocks[0], replace(result_of(of), revealed=order != "latin")
+            )
 
 
 def planned() -> Iterator[str]:

@@ -176,10 +176,10 @@ def test_the_planned_sample_is_a_number_of_participants_or_of_looks(look: int | 
     decided = replace(DECIDED, alpha=0.0123, planned_alpha=0.04, looks=(7, 12), spending="pocock", look=look)
     planned: Any = SimpleNamespace(protocol={"analysis": {"participants": 31}})
     results: Any = SimpleNamespace(decided=replace(decided, looks=()) if look is None else decided, people=("P1",) * 7)
-    said = methods_module._planned(planned, results)
+    said = methods_module._sample_size_sentences(planned, results)
     if look is None:
         assert said == "The planned sample size was 31 participants."
-        assert methods_module._planned(SimpleNamespace(protocol={"analysis": None}), results) == ""
+        assert methods_module._sample_size_sentences(SimpleNamespace(protocol={"analysis": None}), results) == ""
         return
     first, second = (f"{level:.3g}" for level in alpha_of_looks((7, 12), 0.04, "pocock"))
     assert decided.look_words(7) in said

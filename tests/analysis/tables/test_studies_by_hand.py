@@ -204,7 +204,7 @@ def test_bench_masking_and_estimators_of_receipts_are_read() -> None:
     bench = session_files._own_dynamics({"damping_nspm": [1, 3], "friction_n": [5, 5.5], "mass_kg": [0.5]})
     assert bench == (2.0, 5.25, 0.5)
     masked = [
-        session_files._masking(one) for one in (None, {"means": "headphones"}, {"means": "noise", "noise_db": 60})
+        session_files._masking_text(one) for one in (None, {"means": "headphones"}, {"means": "noise", "noise_db": 60})
     ]
     assert masked == [None, "headphones", "noise of 60 dB"]
 
