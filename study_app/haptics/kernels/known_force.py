@@ -94,7 +94,7 @@ def _begin_motion(parameters: Record, filtered: Record) -> None:
 def _feedthrough(rules: Record, interval_s: float) -> float:
     """Return the immediate response of the high-pass filter."""
     x = rules.fast_radps * interval_s
-    return 1.0 / (1.0 + x * (2.0 * rules.fast_damping + x))
+    return float(1.0 / (1.0 + x * (2.0 * rules.fast_damping + x)))
 
 
 @part
