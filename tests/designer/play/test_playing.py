@@ -102,7 +102,12 @@ def play_to_the_end(qtbot: Any, designer: Any) -> Player:
     player, pilots = Player(), designer.playing
     press_f5(qtbot, designer)
     assert pilots.is_under_way, (designer.messages, designer.place.header.strip.notice)
+    controls = designer.place.header.play
+    assert not controls.play.isEnabled()
+    assert not controls.device.isEnabled()
     qtbot.waitUntil(lambda: not pilots.is_under_way, timeout=SESSION_MS)
+    assert controls.play.isEnabled()
+    assert controls.device.isEnabled()
     assert not designer.messages
     return player
 

@@ -307,6 +307,10 @@ def test_a_written_report_is_opened_and_of_exported_tables_the_folder(
         opened.click(button)
         dialog: Any = opened.place.writing
         dialog.editors["to"].show_value(str(file.parent))
+        chosen = () if button is opened.place.report else ("wide", "psych-ds")
+        for name in chosen:
+            dialog.editors[name].control.setChecked(True)
+        assert dialog.asked == (file.parent, chosen)
         dialog.show_written([file], ())
         assert dialog.go_on.text() == label
         opened.click(dialog.go_on)

@@ -13,8 +13,8 @@ from PySide6.QtWidgets import QApplication, QWidget
 
 from study_app.errors import StudyError
 from study_app.gui.widgets.background import Background, wait_for_jobs
-from study_app.gui.widgets.labels import label
-from study_app.gui.widgets.live_plots import TracePlot
+from study_app.gui.widgets.labels import Clamped, label
+from study_app.gui.widgets.live_plots import TracePlot, tick_text
 
 
 def test_what_was_changed_is_painted_at_once_and_not_again_later(qtbot: Any, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -109,3 +109,26 @@ def test_a_role_goes_with_its_widget(qtbot: Any) -> None:
         made.setParent(None)
         made.deleteLater()
         QTest.qWait(0)
+
+
+@pytest.mark.parametrize(
+    ("value", "text"), [(0.0, "0"), (-20.0, "−20"), (10_000.0, "10\u2009000"), (-1234.5, "−1\u2009234.5")]
+)
+def test_a_tick_has_a_minus_sign_and_thin_spaces(value: float, text: str) -> None:
+    assert tick_text(value) == text
+
+
+def test_a_clamped_text_is_replaced_and_its_tip_has_what_was_left_out(qtbot: Any) -> None:
+    clamped = Clamped("Honey", 2)
+    qtbot.addWidget(clamped)
+    clamped.show()
+    clamped.resize(90, 60)
+    assert (clamped.text(), clamped.toolTip()) == ("Honey", "")
+    long = "Glycerin with a little more water than in the block before, at a delay of 35 ms"
+    clamped.show_text(long)
+    shown = clamped.text().splitlines()
+    assert len(shown) == 2
+    assert shown[0].startswith("Glycerin")
+    assert shown[1].endswith("…")
+    assert clamped.accessibleName() == long
+    assert "35 ms" in clamped.toolTip()
