@@ -59,8 +59,8 @@ LIBRARIES = (
 """What the process loads whose forks run the tests."""
 DECORATORS = ("@kernel", "@part", "@evidence_kernel")
 """What compiles a function; it is the last decorator."""
-PASSED = re.compile(rb" (?:kernel|part|evidence_kernel)\((?:\w+\.)*(\w+)\)")
-"""A function that is compiled without a decorator."""
+PASSED = re.compile(r"(?<!def )\b(?:kernel|part|evidence_kernel|c_function|device_functions)\(([^()]*)\)")
+"""What is passed to a function that compiles it."""
 PROBE = """
 import builtins, os
 
@@ -274,16 +274,18 @@ def drawn_faults(folder: Path) -> dict[str, Fault]:
     }
 
 
-@cache
-def _passed_names(folder: Path) -> frozenset[str]:
-    sources = [path.read_bytes() for path in (folder / "sound" / "study_app" / "haptics").rglob("*.py")]
-    return frozenset(name.decode() for source in sources for name in PASSED.findall(source))
-
-
 def is_compiled(folder: Path, fault: Fault) -> bool:
-    """Return whether the function of a fault is compiled."""
-    lines = (folder / "sound" / fault.path).read_text(encoding="utf-8").splitlines()
-    return lines[fault.lines[0] - 2].strip() in DECORATORS or fault.function in _passed_names(folder)
+    """Return whether the function of a fault is compiled: by a decorator, or passed on in its module or as M.NAME."""
+    source = (folder / "sound" / fault.path).read_text(encoding="utf-8")
+    has_decorator = source.splitlines()[fault.lines[0] - 2].strip() in DECORATORS
+    is_passed = fault.function in re.findall(r"\w+", " ".join(PASSED.findall(source)))
+    return has_decorator or is_passed or (fault.package == "haptics" and fault.function in _names_of_members(folder))
+
+
+@cache
+def _names_of_members(folder: Path) -> frozenset[str]:
+    sources = [path.read_text(encoding="utf-8") for path in (folder / "sound/study_app/haptics").rglob("*.py")]
+    return frozenset(re.findall(r"\w+\.(\w+)", " ".join(text for source in sources for text in PASSED.findall(source))))
 
 
 def environment_of(folder: Path, copy: Path, run: str) -> dict[str, str]:
