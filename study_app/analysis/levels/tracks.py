@@ -31,6 +31,8 @@ _TYPES: Final = {
     "level_delivered": "Float64",
 }
 """What follows from a trial's arrangement, level and answer."""
+_UNKNOWN: Final = "?"
+"""Stands for an interval whose contents are still sealed: its session is damaged, so `unblind` did not change it."""
 _READ: Final = ("block", "code", "index", "counted", "arrangement", "standard", "level", "response", *_DELIVERED)
 
 
@@ -138,6 +140,9 @@ def _track_row(block: LevelBlock, row: Mapping[Any, Any]) -> dict[str, Any]:
     modulus = block.design.first is not None and int(row["index"]) == 1
     found["analysed"] = bool(row["counted"]) and not modulus
     letters = row["arrangement"]
+    if not pd.isna(letters) and _UNKNOWN in letters:
+        found["analysed"] = False
+        return found
     if pd.isna(letters) or len(letters) < block.design.intervals:  # the trial ended before its last interval
         return found
     if letters.count("C") == 1 and block.design.intervals > 1:
@@ -176,7 +181,7 @@ def _level_delivered(stimulus: Stimulus, standard: float | None, comparison: flo
 def _presentations(intervals: pd.DataFrame) -> pd.DataFrame:
     """Return one row per presentation: standard, level, arrangement, and force and speed of each interval."""
     ordered = intervals.sort_values([*_PRESENTATION, "interval"])
-    letters = ordered["presented"].map({"comparison": "C", "standard": "S"}).fillna("?")
+    letters = ordered["presented"].map({"comparison": "C", "standard": "S"}).fillna(_UNKNOWN)
     frame = ordered.groupby(_PRESENTATION, sort=False)[["standard", "level", "catch", "setting"]].first()
     presented: dict[Any, str] = {}
     for which, letter in zip(zip(*(ordered[name] for name in _PRESENTATION), strict=True), letters, strict=True):

@@ -245,7 +245,7 @@ def _check_journal(folder: SessionFolder, findings: Findings, *, running: bool) 
     if done.reached_end and missing.exceed != (done.ended == events.INCOMPLETE):
         findings.error(folder.journal, f"its status is {done.ended!r}, although {missing or 'no trial is missing'}")
     if done.ended is None:
-        if not running:
+        if not running and contents.damage is None:
             findings.warning(folder.path, "is unfinished but can be resumed")
     elif not isinstance(contents.lines[-1], events.SessionEnded):
         findings.error(folder.journal, "contains lines after the session's end")

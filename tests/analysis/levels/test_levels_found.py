@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from study_app.analysis.data.blocks import LevelBlock, Setting
-from study_app.analysis.levels import thresholds
+from study_app.analysis.levels import thresholds, tracks
 from study_app.analysis.levels.answers import Answers
 from study_app.analysis.levels.evaluate import level_results
 from study_app.analysis.levels.statistic import statistics
@@ -165,3 +165,26 @@ def test_only_pairs_with_a_correct_answer_are_fitted_as_two_intervals(
     )
     rows = pd.DataFrame({"participant": ["P1", "P2"], "session": [1, 1]})
     assert thresholds._flat_fits(block, rows) == {"P1": ("grid", two), "P2": ("grid", two)}
+
+
+@pytest.mark.parametrize("design", ["abx", "samedifferent", "2ifc"])
+def test_a_trial_whose_intervals_are_still_sealed_is_not_analysed(design: str) -> None:
+    made = block(design, STIMULUS, ONE)
+    intervals = pd.DataFrame(
+        {name: ["P001"] * made.design.intervals for name in ("participant", "session", "block", "trial", "attempt")}
+        | {"interval": range(1, made.design.intervals + 1)}
+        | dict.fromkeys(("presented", "standard", "level", "catch", "setting"), pd.NA)
+        | dict.fromkeys(("value_delivered", "delay_error_mean_ms", *tracks.OF_INTERVALS), np.nan)
+    )
+    (presented,) = tracks._presented(intervals).to_dict("records")
+    answered = {
+        "block": "b",
+        "code": ONE[0].code,
+        "index": 4,
+        "counted": True,
+        "response": next(iter(made.design.answers)),
+    }
+    found = tracks._track_row(made, presented | answered)
+    assert found["analysed"] is False
+    assert pd.isna(found["right"])
+    assert pd.isna(found["success"])
