@@ -280,7 +280,8 @@ class Sensitivities(LevelStatistic[SensitivityEstimate]):
         over = "across all presented levels" if self.found.vary is not None else "for each comparison"
         if self.found.summary == "mean":
             over = "for each level relative to the lowest (d_a from the area under the ROC curve)"
-        bias, model = _BIASES.get(self.found.design, ""), _MODELS.get(self.rows[0].model or "", "")
+        has_bias = self.found.design in _FROM_SHARE_CORRECT or any(row.criterion is not None for row in self.rows)
+        bias, model = _BIASES.get(self.found.design, "") if has_bias else "", _MODELS.get(self.rows[0].model or "", "")
         return (
             f"d′ {over}, calculated from rates with the log-linear correction (Hautus 1995; Macmillan & Creelman "
             f"2005); the group value is the mean across participants with a t-based confidence interval.{model}{bias} "

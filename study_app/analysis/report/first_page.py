@@ -423,7 +423,8 @@ def _number_words(numbers: Numbers, presented: Mapping[str, Presented] = _NOT_PR
     if numbers.bounds is None and not numbers.is_score and len(means) == 1:
         values = [*next(held for _, held in numbers.by_setting if held).values()]
         spread = f"SD {number(float(np.std(values, ddof=1)))}, " if n > 1 else ""
-        return f"{what} was {number(means[0][1].value)} ({spread}range {min(values):g} to {max(values):g}, n = {n})."
+        low, high = (f"{end:g}" if float(end).is_integer() else number(end) for end in (min(values), max(values)))
+        return f"{what} was {number(means[0][1].value)} ({spread}range {low} to {high}, n = {n})."
     scale = "" if numbers.bounds is None else " on a scale from {:g} to {:g}".format(*numbers.bounds).replace("-", "−")
     text = f"{what} was {listed(parts)}{scale} (95 % confidence interval{'s' * (len(parts) > 1)}, n = {n})."
     if len(means) != 2:

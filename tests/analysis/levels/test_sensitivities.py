@@ -153,6 +153,16 @@ def test_what_is_said_of_abx_names_its_assumption_and_where_the_other_model_is()
     assert Sensitivities.table == "thresholds"
 
 
+@pytest.mark.parametrize(("settings", "has_k"), [(ROVING, True), (ONE, False)])
+def test_k_of_same_different_is_explained_only_if_the_table_shows_it(settings: Any, has_k: bool) -> None:
+    frame = rows("samedifferent", {0: 0.8, 1: 0.8, 2: 0.3, 3: 0.3}, ("same", "different"))
+    people = list(sensitivities(block("samedifferent", settings=settings), frame))
+    statistics = {Sensitivities.key: people}
+    of_block = SimpleNamespace(title="Pairs", design="samedifferent", vary="damping", summary="", statistics=statistics)
+    note = Sensitivities(cast("Any", of_block)).explained()
+    assert ("k is the perceived difference" in note) is has_k
+
+
 def test_without_a_correct_answer_only_shares_are_known() -> None:
     stimulus = Stimulus(vary="damping_nspm", level="value", levels=(1, 20), standards=(8.0,))
     one = own(block("2ifc", stimulus), rows("2ifc", {0: 0.7, 1: 0.5}, ("first", "second")))

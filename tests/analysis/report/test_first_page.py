@@ -248,6 +248,10 @@ def test_a_form_has_a_card_only_if_it_says_more_than_a_hypothesis(blocks: str, p
         ),
         (Numbers("Age", None, False, (("", {"P1": 20.0}),)), "The mean of “Age” was 20.0 (range 20 to 20, n = 1)."),
         (
+            Numbers("Years", None, False, (("", {"P1": 29.714, "P2": 35.047, "P3": 12.0}),)),
+            "The mean of “Years” was 25.6 (SD 12.1, range 12 to 35.0, n = 3).",
+        ),
+        (
             Numbers("SUS", None, True, (("", {"P1": 2.0, "P2": 6.0}),)),
             "The mean SUS score was 4.00 [−21.4, 29.4] (95 % confidence interval, n = 2).",
         ),
