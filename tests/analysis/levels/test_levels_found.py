@@ -176,7 +176,7 @@ def test_a_trial_whose_intervals_are_still_sealed_is_not_analysed(design: str) -
         | dict.fromkeys(("presented", "standard", "level", "catch", "setting"), pd.NA)
         | dict.fromkeys(("value_delivered", "delay_error_mean_ms", *tracks.OF_INTERVALS), np.nan)
     )
-    (presented,) = tracks._presented(intervals).to_dict("records")
+    (presented,) = tracks._presentations(intervals).to_dict("records")
     answered = {
         "block": "b",
         "code": ONE[0].code,
