@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 import shiboken6
 from PySide6.QtCore import QEvent, QPoint, QPointF, Qt
-from PySide6.QtGui import QFocusEvent
+from PySide6.QtGui import QFocusEvent, QTextCursor
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QFileDialog, QLabel, QLineEdit, QPlainTextEdit, QWidget, QWidgetItem
 
@@ -442,3 +442,16 @@ def test_a_bound_that_is_not_a_number_is_refused_with_the_value_that_stays(qtbot
     assert "0.4" in refusals[0]
     assert refusals[1] == ""
     assert tables == [{"measure": "like_honey", "bound": 0.75}]
+
+
+def test_the_caret_is_at_the_end_of_a_text_that_is_not_or_completely_selected(designer: Any) -> None:
+    designer.open("kitchen")
+    designer.go_to("pages", "welcome")
+    text: Any = designer.window.findChildren(QPlainTextEdit)[0]
+    text.show_text("Stir slowly\nand rest")
+    for anchor, caret, is_at_end in ((0, 0, False), (20, 20, True), (19, 19, False), (0, 20, True), (3, 20, False)):
+        cursor = text.textCursor()
+        cursor.setPosition(anchor)
+        cursor.setPosition(caret, QTextCursor.MoveMode.KeepAnchor)
+        text.setTextCursor(cursor)
+        assert text.is_at_end() == is_at_end, (anchor, caret)
