@@ -211,7 +211,7 @@ def _unpaced_blocks(protocol: Protocol, block: Block) -> Iterator[str]:
 
 
 def _imperceptible_settings(protocol: Protocol, without_force: str) -> Iterator[str]:
-    """Yield settings that have no perceptible effect: a delay of an undrawn part, a missing force."""
+    """Yield settings that have no perceptible effect: a delay in seconds or of an undrawn part, a missing force."""
     for block in protocol.blocks_in_order:
         conditions = {name: protocol.conditions[name] for name in protocol.conditions_in(block.id)}
         vary = None if block.stimulus is None else protocol.stimuli[block.stimulus].vary
@@ -225,6 +225,9 @@ def _imperceptible_settings(protocol: Protocol, without_force: str) -> Iterator[
             stroke = protocol.tasks[block.task].fastest_stroke(protocol.device.workspace_m)
             gives_none = force_n(protocol.scene_for(name), stroke) < LEAST_N
             for key, place in places.items():
+                value = getattr(condition, key)
+                if key.endswith("_ms") and 0 < value < 1:
+                    yield f"{place}: {value:g} ms cannot be perceived: write {1000 * value:g} for {value:g} s"
                 if key == DELAY and name in hides:
                     yield f'{place}: the ball is hidden, so participants cannot see its delay: write ball = "shown"'
                 elif key in OF_LINK and (without_force or gives_none):
