@@ -4,7 +4,7 @@
 faults and runs the quick and the slow tests once (about 25 minutes on two cores) in a copy of the work tree. In the
 copy, each function with a fault, and the statement with the fault, record which test runs them, also in programs that
 the test starts. Compiled functions cannot record anything; the quick tests of their package therefore run again as
-plain Python, and only these tests judge them.
+plain Python. These tests judge them first, and then, compiled with the fault, the tests of their folder and package.
 
 ``python tests/benchmarks/project/faults.py judge FOLDER [--workers 2] [--seed 1]`` then runs the recorded tests with
 each fault, the quick ones first; the first failure ends it. ``FOLDER/verdicts.jsonl`` holds the verdicts; the command
@@ -25,6 +25,7 @@ import json
 import os
 import random
 import re
+import resource
 import shutil
 import signal
 import subprocess
@@ -41,6 +42,7 @@ from pathlib import Path
 from typing import Any, NamedTuple, NoReturn
 from xml.etree import ElementTree
 
+import psutil
 import pytest
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -49,6 +51,10 @@ UNCOMPILED = "uncompiled"
 """The run of the tests of compiled functions, as plain Python."""
 LIMIT_S = 240.0
 """A test that takes longer hangs, also on a machine that computes something else; the first one includes the start."""
+COMPILING_S = 600.0
+"""This limit where the first test compiles the force model."""
+MEMORY_B = 8 * 2**30
+"""Most memory that a process may use; a fault may fill all of it."""
 USUAL_S = 45.0
 """How long the tests chosen for a fault usually take in a circle."""
 LIBRARIES = (
@@ -288,13 +294,13 @@ def _names_of_members(folder: Path) -> frozenset[str]:
     return frozenset(re.findall(r"\w+\.(\w+)", " ".join(text for source in sources for text in PASSED.findall(source))))
 
 
-def environment_of(folder: Path, copy: Path, run: str) -> dict[str, str]:
-    """Return the variables of a run of tests in a copy of the program."""
+def environment_of(folder: Path, copy: Path, run: str, compiled: Path | None = None) -> dict[str, str]:
+    """Return the variables of a run of tests in a copy of the program; ``compiled`` holds what is compiled there."""
     return {
         "PYTHONPATH": str(copy),
         "LIQUID_STUDY_WORKSPACE": str(copy),
         "LIQUID_STUDY_CONFIG": str(copy / "config"),
-        "NUMBA_CACHE_DIR": str(folder / "compiled"),
+        "NUMBA_CACHE_DIR": str(compiled or folder / "compiled"),
         "NUMBA_DISABLE_JIT": str(int(run == UNCOMPILED)),
     }
 
@@ -317,8 +323,8 @@ def record_tests(folder: Path, tests: list[str]) -> None:
 def _probed_copy(folder: Path, name: str, faults: dict[str, Fault]) -> Path:
     """Return a copy of the sound program in which the functions of these faults record the tests."""
     copy = copy_program(folder, folder / name)
-    with (copy / "study_app" / "__init__.py").open("a", encoding="utf-8", newline="\n") as module:
-        module.write(PROBE.replace("{HITS}", str(folder / "hits")))
+    with (copy / "study_app" / "__init__.py").open("ab") as module:
+        module.write(PROBE.replace("{HITS}", str(folder / "hits")).encode())
     for path in {fault.path for fault in faults.values()}:
         source = Source(copy / path, copy)
         edits = [edit for name, fault in faults.items() if fault.path == path for edit in source.probes(fault, name)]
@@ -340,7 +346,7 @@ def _run_recorded(folder: Path, copy: Path, run: str, options: list[str]) -> Non
         "no:cacheprovider",
         "--timeout=1800",
     ]
-    with (folder / f"{run}.log").open("w", encoding="utf-8", newline="\n") as log:
+    with (folder / f"{run}.log").open("wb") as log:
         subprocess.run(
             [*command, "--regenerate", f"--junitxml={folder / run}.xml", *options],
             check=False, cwd=copy, env=os.environ | environment_of(folder, copy, run), stdout=log, stderr=log,
@@ -370,17 +376,26 @@ def read_hits(folder: Path, name: str) -> dict[str, set[str]]:
 
 
 def choose_tests(folder: Path, name: str, fault: Fault, run: str) -> list[str]:
-    """Return tests that run the function: first those of the faulty statement, of its package, quick ones."""
+    """Return tests that run the function: first those of its statement, folder, package, and short ones."""
     times_s, hits = durations(folder, run), read_hits(folder, name)
     at_statement = read_hits(folder, f"{name}-statement")
     modules = {test.partition("::")[0] for test, phases in hits.items() if "setup" in phases}
     package = (f"tests/{fault.package}/", f"tests/test_{fault.package}.py")
+    folder_of_tests = f"tests/{Path(fault.path).parent.relative_to('study_app').as_posix()}/"
     tests = {test for test in times_s if test in hits or test.partition("::")[0] in modules}
-    if "" in hits:
+    if "" in hits or (is_compiled(folder, fault) and run != UNCOMPILED):
         tests |= {test for test in times_s if test.startswith(package)}
 
-    def rank(test: str) -> tuple[bool, bool, bool, float, str]:
-        return test not in at_statement, test not in hits, not test.startswith(package), times_s[test], test
+    def rank(test: str) -> tuple[bool, bool, bool, bool, float, str]:
+        is_near = test.startswith(folder_of_tests)
+        return (
+            test not in at_statement,
+            test not in hits,
+            not is_near,
+            not test.startswith(package),
+            times_s[test],
+            test,
+        )
 
     total_s, chosen = 0.0, list[str]()
     for test in sorted(tests, key=rank):
@@ -401,7 +416,7 @@ class FirstFailure:
 
     def write(self) -> None:
         """Write the test and how it failed."""
-        self._file.write_text(f"{self.how}\n{self.test}", encoding="utf-8", newline="\n")
+        self._file.write_bytes(f"{self.how}\n{self.test}".encode())
 
     def pytest_runtest_logstart(self, nodeid: str) -> None:
         """Note which test begins."""
@@ -417,17 +432,17 @@ class FirstFailure:
             self.write()
 
 
-def first_failure(folder: Path, copy: Path, tests: list[str], run: str) -> tuple[str, str]:
+def first_failure(copy: Path, tests: list[str], environment: dict[str, str], limit_s: float) -> tuple[str, str]:
     """Return which of the tests failed first in a fork of this process, and how: ("", "") if all passed."""
     temporary = copy.parent / "t"
     shutil.rmtree(temporary, ignore_errors=True)
     temporary.mkdir()
-    file, begun_s = temporary / "failure", time.time()
-    file.write_text(f"crash\n{tests[0]}", encoding="utf-8", newline="\n")
+    file = temporary / "failure"
+    file.write_bytes(f"crash\n{tests[0]}".encode())
     if (child := os.fork()) == 0:
-        _run_tests(folder, copy, tests, run, file)
+        _run_tests(copy, tests, environment, file)
     status = None
-    while status is None and time.time() - file.stat().st_mtime < LIMIT_S:
+    while status is None and time.time() - file.stat().st_mtime < limit_s:
         time.sleep(0.05)
         ended, code = os.waitpid(child, os.WNOHANG)
         status = code if ended else None
@@ -437,19 +452,23 @@ def first_failure(folder: Path, copy: Path, tests: list[str], run: str) -> tuple
     if status is None:
         os.waitpid(child, 0)
         how = "timeout"
-    restore_recordings(folder, copy, begun_s)
+    for process in psutil.process_iter():
+        with contextlib.suppress(psutil.Error):
+            if process.environ().get("TMPDIR") == str(temporary):  # also in a session of its own
+                process.kill()
     return test, how
 
 
-def _run_tests(folder: Path, copy: Path, tests: list[str], run: str, file: Path) -> NoReturn:
+def _run_tests(copy: Path, tests: list[str], environment: dict[str, str], file: Path) -> NoReturn:
     """Run tests in this process, a fork, and end it."""
     try:
         os.setsid()
+        resource.setrlimit(resource.RLIMIT_AS, (MEMORY_B, MEMORY_B))
         log = os.open(file.with_name("log"), os.O_WRONLY | os.O_CREAT)
         os.dup2(log, 1)
         os.dup2(log, 2)
         os.chdir(copy)
-        os.environ.update(environment_of(folder, copy, run), TMPDIR=str(file.parent))
+        os.environ.update(environment, TMPDIR=str(file.parent))
         tempfile.tempdir = None
         sys.path[0] = str(copy)
         sys.modules["__main__"] = importlib.import_module("pytest.__main__")  # for processes that the tests start
@@ -471,19 +490,31 @@ def _run_tests(folder: Path, copy: Path, tests: list[str], run: str, file: Path)
 def judge_fault(folder: Path, temporary: Path, name: str) -> dict[str, Any]:
     """Return the circle whose tests notice a fault and how, or "none"; a test that fails without it does not count."""
     copy, fault, begun_s = _own_copy(folder, temporary), drawn_faults(folder)[name], time.perf_counter()
-    sound = (copy / fault.path).read_bytes()
+    sound, compiles = (copy / fault.path).read_bytes(), is_compiled(folder, fault)
+    own_cache = copy.parent / "compiled"
+    shutil.rmtree(own_cache, ignore_errors=True)
     verdict = {"fault": name, "circle": "none", "how": "not run", "test": ""}
-    for run in (UNCOMPILED,) if is_compiled(folder, fault) else CIRCLES:
+
+    def failure(tests: list[str], run: str, source: bytes) -> tuple[str, str]:
+        uses_own = compiles and run != UNCOMPILED and source != sound
+        environment = environment_of(folder, copy, run, own_cache if uses_own else None)
+        write_source(copy / fault.path, source)
+        since_s = time.time()
+        try:
+            return first_failure(copy, tests, environment, COMPILING_S if uses_own else LIMIT_S)
+        finally:
+            write_source(copy / fault.path, sound)
+            restore_recordings(folder, copy, since_s)
+
+    for run in (UNCOMPILED, *CIRCLES) if compiles else CIRCLES:
         tests = choose_tests(folder, name, fault, run)
         while tests and verdict["circle"] == "none":
             verdict["how"] = "passed"
-            write_source(copy / fault.path, apply_edits(sound, fault.edits))
-            failed, how = first_failure(folder, copy, tests, run)
-            write_source(copy / fault.path, sound)
+            failed, how = failure(tests, run, apply_edits(sound, fault.edits))
             if not how:
                 break
             named = [test for test in tests if test.startswith(failed)][:1] or tests[:1]
-            if first_failure(folder, copy, named, run)[1]:
+            if failure(named, run, sound)[1]:
                 tests = [test for test in tests if test not in named]
             else:
                 verdict |= {"circle": run, "how": how, "test": failed}
@@ -535,8 +566,8 @@ def judge(folder: Path, workers: int, seed: int | None) -> None:
     with tempfile.TemporaryDirectory() as temporary, ProcessPoolExecutor(workers, get_context("fork")) as pool:
         for future in as_completed([pool.submit(judge_fault, folder, Path(temporary), name) for name in left]):
             verdicts.append(future.result())
-            with file.open("a", encoding="utf-8", newline="\n") as lines:
-                lines.write(json.dumps(verdicts[-1]) + "\n")
+            with file.open("ab") as lines:
+                lines.write(f"{json.dumps(verdicts[-1])}\n".encode())
             print(_row(verdicts[-1], faults[verdicts[-1]["fault"]]), flush=True)
     verdicts = [verdict for verdict in verdicts if verdict["fault"] in faults]
     for group in sorted({fault.package for fault in faults.values()}):
@@ -587,7 +618,7 @@ def main() -> None:
     folder.mkdir(parents=True)
     copy_work_tree(folder / "sound")
     options = {"seeds": given.seeds, "functions": given.functions, "package": given.package}
-    (folder / "draw.json").write_text(json.dumps(options), encoding="utf-8", newline="\n")
+    (folder / "draw.json").write_bytes(json.dumps(options).encode())
     record_tests(folder, given.tests)
 
 
