@@ -84,7 +84,7 @@ class Segments(Themed, QWidget):
 
 
 FIELD_PX, LABEL_PX = 34, 116
-"""Height of a field, and width of a label beside it, in the form [px]."""
+"""Height of a field and width of its label in the form [px]."""
 _W = TypeVar("_W", bound=QWidget)
 
 

@@ -80,7 +80,7 @@ def _decision_fields(by: str, who: str, example: str) -> tuple[Field, Field]:
 
 
 class LeaveOutDialog(Question):
-    """Asks which session, or which trial of it, to exclude, by whom and why.
+    """Asks which session or trial to exclude, who decides, and why.
 
     Parameters
     ----------

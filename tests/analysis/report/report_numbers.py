@@ -171,7 +171,7 @@ def people(told: Told) -> int:
 
 
 def always(_match: re.Match[str], _told: Told) -> bool:
-    """A sentence that states no number of the study."""
+    """A sentence without a number from the study."""
     return True
 
 

@@ -82,7 +82,7 @@ def test_the_display_offset_is_shown_with_its_screen_and_handed_on_as_it_was_typ
     form.keep.click()
     form.editors["spread"].control.setText("")
     form.keep.click()
-    form.editors["mean"].control.setText("no number")
+    form.editors["mean"].control.setText("twelve")
     form.keep.click()
     assert kept == [(17.25, 1.25, "data sheet"), (17.25, 0.0, "data sheet")]
     with qtbot.waitSignal(form.forgotten):
