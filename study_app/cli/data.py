@@ -248,7 +248,8 @@ def withdraw(results: Path, participant: str, by: str, reason: str, also: tuple[
         click.echo(f"warning: output created at {output.at} outside the workspace ({state}): {output.to}", err=True)
     for sentence in done.left:
         click.echo(f"warning: {sentence}", err=True)
-    click.echo(f"searched   {workspace().results}; if there are copies elsewhere, repeat the command with --also DIR")
+    searched = ", ".join(map(str, (workspace().results, *also)))
+    click.echo(f"searched   {searched}; if there are copies elsewhere, repeat the command with --also DIR")
 
 
 def _parse_sites(_context: click.Context, _parameter: click.Parameter, texts: tuple[str, ...]) -> dict[str, Path]:
@@ -278,7 +279,7 @@ def merge(sites: dict[str, Path], to: Path) -> None:
     Participant IDs are prefixed with the site's name (A-P001), and each site keeps its own sealed key. Use the
     merged folder as RESULTS in report, export, plot, verify, unblind, exclude and withdraw.
     """
-    from study_app.store.sites import merge_sites
+    from study_app.store.sites import damaged_sessions, merge_sites
 
     with progress() as show:
         show("reading the sites")
@@ -286,6 +287,10 @@ def merge(sites: dict[str, Path], to: Path) -> None:
     for site in made.sites:
         new = "merged" if site.name in sites else "kept  "
         click.echo(f"{new}  site {site.name}: {counted(site.sessions, 'session')}, key {site.key_hash[:12]}")
+    for name, folder in sites.items():
+        for session in damaged_sessions(folder):
+            warning = f"warning: site {name}: the journal of {session} is damaged, so its results may be incomplete"
+            click.echo(f"{warning}; the verify command describes the damage", err=True)
     click.echo(f"study {made.study}, protocol {made.protocol_hash[:12]}: {to}")
 
 

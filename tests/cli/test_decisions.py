@@ -62,6 +62,14 @@ def test_sites_are_merged_and_those_that_were_there_are_kept(labs: Path) -> None
     ]
     c = f"merged  site C: 2 sessions, key {keys['C']}"
     assert run("merge", "C=C", "--to", pooled)[0] == [f"kept    {a}", f"kept    {b}", c, last]
+    damaged = StudyFolder(labs / "C").session("P002", 1)
+    with damaged.journal.open("ab") as file:
+        file.write(b"damage\n")
+    warnings = run("merge", "A=A", "C=C", "--to", labs / "others")[1]
+    assert warnings == [
+        f"warning: site C: the journal of {damaged.path} is damaged, so its results may be incomplete; the verify "
+        "command describes the damage"
+    ]
     sites = json.loads((pooled / "sites.json").read_bytes())["sites"]
     assert [(site["name"], site["sessions"], site["withdrawals"]) for site in sites] == [
         ("A", 2, 0), ("B", 1, 1), ("C", 2, 0),
@@ -158,7 +166,9 @@ def test_a_withdrawal_names_what_it_erased_and_what_it_left(
         proof, searched,
     ]  # fmt: skip
     assert warnings == []
-    again, _ = run("withdraw", study, *person, "--by", "BM", "--reason", "twice")
+    twice = ("--by", "BM", "--reason", "twice", "--also", labs / "B", "--also", labs / "C")
+    again, _ = run("withdraw", study, *person, *twice)
+    searched = searched.replace(f"{labs};", f"{labs}, {labs / 'B'}, {labs / 'C'};")
     nothing = f"nothing to erase: participant P001 already withdrew at {tombstone.at}"
     assert [line for line in again if line] == [proof, nothing, searched]
     outputs = tuple(Output(to=tmp_path / name, at=f"at {name}", files=("a.csv",)) for name in ("gone", "tables"))

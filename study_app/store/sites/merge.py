@@ -43,7 +43,7 @@ from study_app.store.integrity.folder_lock import (
     refuse_if_open,
 )
 from study_app.store.merged import FOLDER, Merged, Site, merged_above, read_merged
-from study_app.store.tables.study_files import described_study
+from study_app.store.tables.study_files import described_study, row_of
 from study_app.store.withdrawals import describe_session, tombstones
 
 _MAX_SITE_LENGTH: Final = 16
@@ -120,6 +120,15 @@ def merge_sites(given: Mapping[str, Path], to: Path, progress: ReportProgress | 
                 raise StoreError(f"{to} was changed by another program during the merge: merge again")
             _add_sites(made, new, progress)
     return made
+
+
+def damaged_sessions(folder: Path) -> list[Path]:
+    """Return the session folders of a study whose journals are damaged; see `study_files.row_of`."""
+    return [
+        session.path
+        for session in StudyFolder(folder).sessions()
+        if any(row["status"] == "damaged" for row in row_of(session, None))
+    ]
 
 
 def _check_names(given: Mapping[str, Path], merged: Merged | None) -> None:

@@ -181,7 +181,7 @@ def _check_files(
         if ended:
             _check_checksums(place, lines, told, hashes, findings, recordings=recordings)
         if recordings:
-            _check_recordings(folder, told, key, hashes, findings, ended=ended)
+            _check_recordings(folder, told, key, hashes, findings, ended=ended, damaged=contents.damage is not None)
     for name in system_files(folder):
         if name not in hashes:
             what = "was created by the operating system, or is a copy made by a file-sharing program"
@@ -546,6 +546,7 @@ def _check_recordings(
     findings: Findings,
     *,
     ended: bool,
+    damaged: bool,
 ) -> None:
     """Check that exactly the recordings named in the journal exist, complete and of the right trials."""
     listed: set[str] = set()
@@ -585,7 +586,7 @@ def _check_recordings(
         if name not in of_trials:
             findings.error(folder.path / name, "belongs to a trial that never started, according to the journal")
         else:
-            then = "" if ended else "; resuming the session adds it"
+            then = "" if ended or damaged else "; resuming the session adds it"
             findings.warning(folder.path / name, f"does not appear in the journal{then}")
 
 

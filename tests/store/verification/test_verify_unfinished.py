@@ -83,6 +83,11 @@ def test_what_a_running_session_is_just_recording_is_not_said_to_be_left(study: 
     assert ".trial-002.parquet.0123abcd.tmp: is an incomplete file" in left
     assert "trial-001.parquet: does not appear in the journal; resuming the session adds it" in left
     assert "recordings: trial 1, attempt 1 was not recorded, and the journal does not state why" in left
+    with store.folder.journal.open("ab") as file:
+        file.write(b"damage\n")
+    left = warned(verify_study(study)).splitlines()
+    assert f"{place}/recordings/trial-001.parquet: does not appear in the journal" in "\n".join(left)
+    assert not any("resuming the session" in line for line in left), "a damaged session cannot be resumed"
 
 
 def test_a_session_that_a_program_opens_while_it_is_checked_is_checked_again_as_running(
