@@ -1,4 +1,4 @@
-"""Texts, tables and figures of results made up from their types, compared with reviewed files."""
+"""Texts and figures of results made up from their types, compared with reviewed files."""
 
 import sys
 import typing
@@ -13,13 +13,10 @@ import pytest
 from matplotlib.figure import Figure
 
 from study_app.evidence.accuracy import accuracy_report, comparison, survey
-from study_app.evidence.outlets import streams, triggers
-from study_app.evidence.report_rates import simulation
 from study_app.evidence.soak import soak
-from study_app.evidence.stability import force_delay, stability_report, velocity, withheld_force
 from study_app.evidence.table import Evidence
-from study_app.evidence.thresholds import known_values, noticed_delays
-from study_app.evidence.timing import delays, device_lateness, report
+from study_app.evidence.thresholds import noticed_delays
+from study_app.evidence.timing import delays, report
 from study_app.evidence.timing.delays import Shown
 from tests.filled import filled
 from tests.golden import CHANGING, compare, each_once
@@ -67,25 +64,10 @@ def soaked(to: Path) -> tuple[Path, ...]:
 
 
 GIVEN: dict[str, Any] = {
-    "acted": lambda rng: tuple(rng.choice([0.0, 0.03, 0.4], len(stability_report.LIMITER_NAMES)).tolist()),
-    "shown": shown, "candidate": candidate, "truths": (), "studies": 400,
-    "hits": lambda rng: int(rng.choice([0, 12, 24, 390])),
+    "shown": shown, "candidate": candidate, "truths": (),
     "delay": lambda rng: int(rng.integers(1, 4)),
-    "strokes": lambda rng: tuple(rng.choice([0.0, 0.03, 0.2], len(withheld_force.STROKES)).tolist()),
-    "after": lambda rng: tuple(tuple(rng.choice([0.0, 0.0004, 0.1], 4).tolist()) for _ in withheld_force.QUICK),
-    "reasons": lambda rng: tuple(rng.choice(["not finite", "noise"], int(rng.integers(0, 3)), replace=False)),
 }  # fmt: skip
-QUICK = {
-    "timing_report-text": report.timing_evidence, "delay_report-text": delays.delays_evidence,
-    "device_lateness-text": device_lateness.lateness_evidence, "outlet_report-stream_text": streams.streams_evidence,
-    "outlet_report-trigger_text": triggers.triggers_evidence,
-    "verdicts-write": known_values.known_values_evidence,
-    "noticed_delays-markdown": noticed_delays.noticed_delays_evidence,
-    "rates-write": simulation.report_rates_evidence,
-    "stability_report-in_words": stability_report.verdict_text, "stability_report-summary": stability_report.summary,
-    "force_delay-report": force_delay.force_delay_evidence, "criteria-report": velocity.velocity_evidence,
-    "withheld_force-report": withheld_force.withheld_force_evidence,
-}  # fmt: skip
+QUICK = {"noticed_delays-markdown": noticed_delays.noticed_delays_evidence}
 SLOW = {
     "timing_report-write": report.timing_evidence, "delay_report-write": delays.delays_evidence,
     "accuracy_report-write": accuracy_report.accuracy_evidence, "liquid_survey-survey_markdown": survey.survey_evidence,

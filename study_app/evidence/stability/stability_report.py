@@ -353,7 +353,7 @@ def _grade_line(swept: Swept) -> str:
     """Return the numbers of unstable and noisy cases with safety on, and the greatest force of the noisy ones."""
     unstable, noisy = swept.of_grade(UNSTABLE), swept.of_grade(NOISY)
     judged = sum(len(group.verdicts) for group in swept.groups)
-    line = f"{judged} cases with safety on: {len(unstable)} unstable, {len(noisy)} noisy"
+    line = f"{judged} {'case' if judged == 1 else 'cases'} with safety on: {len(unstable)} unstable, {len(noisy)} noisy"
     if not noisy:
         return line
     force_n = max(verdict.fast_n for verdict in noisy)

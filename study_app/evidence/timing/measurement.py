@@ -320,9 +320,9 @@ class Timed:
         return loop.late_us(percent) / max(bare.late_us(percent), 1e-3) if bare is not None else float("nan")
 
     def limits(self) -> tuple[Limit, ...]:
-        return tuple(limit for level in self.levels for limit in self._of(level))
+        return tuple(limit for level in self.levels for limit in self._limits_at(level))
 
-    def _of(self, level: Level) -> Sequence[Limit]:
+    def _limits_at(self, level: Level) -> Sequence[Limit]:
         servo, bare, thread = (self.loop(kind, level) for kind in ("servo", "bare", "thread"))
         if servo is None or bare is None or thread is None:
             return ()
@@ -330,8 +330,8 @@ class Timed:
         ratio = self.ratio(servo, 99)
         took_us = servo.busy_us(99)
         late = (
-            f"{servo.late:,} ticks more than 1 ms late, {_fewer(thread, servo)} than with a Python thread (at least "
-            f"{_FEWER_LATE:g} times fewer; the bare loop: {_fewer(thread, bare)})"
+            f"{servo.late:,} {'tick' if servo.late == 1 else 'ticks'} more than 1 ms late, {_fewer(thread, servo)} "
+            f"than with a Python thread (at least {_FEWER_LATE:g} times fewer; the bare loop: {_fewer(thread, bare)})"
         )
         return tuple(
             Limit(level, said, held)
