@@ -68,7 +68,7 @@ class _Permitted(NamedTuple):
     convert: Callable[[Any], Any]
 
 
-def _checked(**permitted: _Permitted) -> Callable[[Callable[P, R]], Callable[P, R]]:
+def _check_arguments(**permitted: _Permitted) -> Callable[[Callable[P, R]], Callable[P, R]]:
     """Let a function raise a StudyError before it does anything if an argument is not ``permitted``."""
 
     def decorated(function: Callable[P, R]) -> Callable[P, R]:
@@ -149,7 +149,7 @@ def __getattr__(name: str) -> Any:
     return getattr(import_module(_ELSEWHERE[name]), name)
 
 
-@_checked(study=_PATH)
+@_check_arguments(study=_PATH)
 def load(study: str | Path) -> Protocol:
     """Return a study, checked.
 
@@ -168,7 +168,7 @@ def load(study: str | Path) -> Protocol:
     return loading.load(study)
 
 
-@_checked(
+@_check_arguments(
     scene=_PATH,
     liquid=_TEXT,
     motion=_Permitted("a path, or times and positions", partial(_instance, (str, Path, tuple))),
@@ -217,7 +217,7 @@ def simulate_force(
     return offline.simulate(chosen, motions.read_motion(Path(motion)))
 
 
-@_checked(study=_PATH, people=_PEOPLE, seed=_SEED, progress=_FUNCTION)
+@_check_arguments(study=_PATH, people=_PEOPLE, seed=_SEED, progress=_FUNCTION)
 def simulate_study(
     study: str | Path, people: int, *, seed: int, progress: Callable[[str], object] | None = None
 ) -> dict[str, pd.DataFrame]:
@@ -235,7 +235,7 @@ def simulate_study(
         return read(results)
 
 
-@_checked(levels=_Permitted("two numbers", _two_numbers), design=_TEXT, spacing=_TEXT)
+@_check_arguments(levels=_Permitted("two numbers", _two_numbers), design=_TEXT, spacing=_TEXT)
 def fit(
     trials: pd.DataFrame,
     *,
@@ -307,7 +307,7 @@ def fit(
     return pd.DataFrame([asdict(estimate) for estimate in thresholds_of(trials, stimulus, default_design(design))])
 
 
-@_checked(results=_PATH)
+@_check_arguments(results=_PATH)
 def read(results: str | Path) -> dict[str, pd.DataFrame]:
     """Return the tables of a study folder by name, as written by ``export``: responses, trials and others.
 
@@ -319,7 +319,7 @@ def read(results: str | Path) -> dict[str, pd.DataFrame]:
     return {table.name: table.frame for table in exported_tables(load_study(Path(results)))}
 
 
-@_checked(results=_PATH, by=_TEXT, reason=_TEXT)
+@_check_arguments(results=_PATH, by=_TEXT, reason=_TEXT)
 def unblind(results: str | Path, *, by: str, reason: str) -> None:
     """Open the sealed key of a study folder, so that `read` and `report` name conditions; record name and reason.
 
@@ -334,7 +334,7 @@ def unblind(results: str | Path, *, by: str, reason: str) -> None:
         raise StudyError("the key was opened, but not everything was written: " + "; ".join(left))
 
 
-@_checked(results=_PATH, to=_PATH)
+@_check_arguments(results=_PATH, to=_PATH)
 def report(results: str | Path, to: str | Path) -> Path:
     """Write the report of a study folder into the folder ``to``; return the path of ``report.html``."""
     from study_app.analysis.report import report as write
@@ -342,7 +342,7 @@ def report(results: str | Path, to: str | Path) -> Path:
     return write(Path(results), Path(to))[0]
 
 
-@_checked(study=_PATH, people=_PEOPLE, seed=_SEED, results=_or_none(_PATH))
+@_check_arguments(study=_PATH, people=_PEOPLE, seed=_SEED, results=_or_none(_PATH))
 def rehearse(
     study: str | Path, people: int, *, seed: int, results: str | Path | None = None, recordings: bool = True
 ) -> Path:
@@ -384,7 +384,7 @@ class Session:
         return self._store.fingerprint
 
 
-@_checked(
+@_check_arguments(
     study=_PATH,
     participant=_TEXT,
     results=_PATH,
@@ -495,7 +495,7 @@ class ForceLoop:
         """The number of samples lost because `read` was called too late."""
         return self._reader.dropped
 
-    @_checked(liquid=_TEXT)
+    @_check_arguments(liquid=_TEXT)
     def set_liquid(self, liquid: str, **parameters: object) -> None:
         """Change the liquid, or only its parameters; the force changes within the slew limit, or fades in.
 
@@ -558,7 +558,7 @@ class ForceLoop:
         self._rig = None
 
 
-@_checked(scene=_PATH, device=_TEXT, force_limit_n=_or_none(_NUMBER), options=_OPTIONS)
+@_check_arguments(scene=_PATH, device=_TEXT, force_limit_n=_or_none(_NUMBER), options=_OPTIONS)
 @contextmanager
 def open_force(
     scene: str | Path,

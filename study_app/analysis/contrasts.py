@@ -726,7 +726,7 @@ def contrast_section(results: Results) -> Iterator[str]:
         yield paragraph(_effect_size_notes(contrasts), "soft")
     yield heading(3, "Descriptive statistics")
     yield table_of(
-        [described for contrast in contrasts for described in _described(results, contrast)],
+        [described for contrast in contrasts for described in _describe_sides(results, contrast)],
         ("Values", lambda row: row.name),
         ("n", lambda row: str(len(row.values))),
         ("mean", lambda row: number(row.mean)),
@@ -765,7 +765,7 @@ class _Described(NamedTuple):
     standard_error: float | None
 
 
-def _described(results: Results, contrast: ContrastResult) -> Iterator[_Described]:
+def _describe_sides(results: Results, contrast: ContrastResult) -> Iterator[_Described]:
     for side in contrast.sides:
         name = _row_words(results, contrast, side.name)
         yield _Described(

@@ -60,7 +60,7 @@ def planned_exclusions(study: Study, results: Results) -> PlannedExclusions | No
     return PlannedExclusions(
         proposals=proposed,
         included=evaluate(whole, recordings=False),
-        left_out=evaluate(_without(whole, {proposal.what for proposal in proposed}), recordings=False),
+        left_out=evaluate(_exclude_sessions(whole, {proposal.what for proposal in proposed}), recordings=False),
     )
 
 
@@ -192,7 +192,7 @@ def undecided(study: Study, results: Results | None) -> tuple[Exclusion, ...]:
     )
 
 
-def _without(study: Study, sessions: Collection[tuple[str, int]]) -> Study:
+def _exclude_sessions(study: Study, sessions: Collection[tuple[str, int]]) -> Study:
     """Return the study as if these sessions were excluded."""
 
     def masked(table: pd.DataFrame) -> pd.DataFrame:

@@ -57,7 +57,7 @@ for command in (devices, outlets, plugins):  # the module's other commands belon
     commands.add_command(command)
 
 
-def _shortened(message: str) -> str:
+def _shorten_message(message: str) -> str:
     """Return a message without unprintable letters, in which words longer than `SHOWN` letters are truncated."""
     return re.sub(rf"(\S{{{SHOWN}}})\S+", r"\1…", "\n".join(map(printable, message.split("\n"))))
 
@@ -91,27 +91,27 @@ def main() -> None:
     except click.UsageError as error:
         command = error.ctx.command_path if error.ctx else "liquid-study"
         example = f"; example: {usage}" if error.ctx and (usage := example_of(error.ctx)) else ""
-        click.echo(f"{command}: {_shortened(error.format_message())} (see {command} --help{example})", err=True)
+        click.echo(f"{command}: {_shorten_message(error.format_message())} (see {command} --help{example})", err=True)
         sys.exit(EXIT_USER_ERROR)
     except (click.Abort, KeyboardInterrupt):
         sys.exit(130)
     except StudyError as error:
         if isinstance(error, PlugInError):
             logging.getLogger(__name__).info("%s", error, exc_info=True)  # the terminal shows only the line
-        click.echo(f"liquid-study: {_shortened(str(error))}", err=True)
+        click.echo(f"liquid-study: {_shorten_message(str(error))}", err=True)
         sys.exit(EXIT_USER_ERROR)
     except (Exception, SystemExit) as error:
         if isinstance(error, SystemExit) and explain_error(error) is error:
             raise
         if isinstance(error, OSError) and error.errno == errno.ENAMETOOLONG and error.filename:
-            click.echo(f"liquid-study: {_shortened(str(error.filename))}: the file name is too long", err=True)
+            click.echo(f"liquid-study: {_shorten_message(str(error.filename))}: the file name is too long", err=True)
             sys.exit(EXIT_USER_ERROR)
         log = logging.getLogger(__name__)
         if (said := explain_error(error)) is error:
             log.critical("a bug ended the program", exc_info=True)
             raise
         log.info("%s", said, exc_info=True)  # only in the log: the terminal shows the line below
-        click.echo(f"liquid-study: {_shortened(str(said))}", err=True)
+        click.echo(f"liquid-study: {_shorten_message(str(said))}", err=True)
         sys.exit(EXIT_USER_ERROR)
     code = code if isinstance(code, int) else 0
     if code > _BY_SIGNAL and (qt := sys.modules.get("PySide6.QtCore")):

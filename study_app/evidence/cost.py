@@ -90,10 +90,13 @@ def _pairs(scene: Scene) -> dict[tuple[str, Effect], tuple[Scene, Scene]]:
     for verdict in effect_verdicts(scene):
         effect, liquid = verdict.effect, liquids[verdict.liquid]
         others: tuple[Effect, ...] = NAMED[effect].through[:1]
-        pairs[liquid.id, effect] = _with(scene, liquid, (*others, effect)), _with(scene, liquid, others)
+        pairs[liquid.id, effect] = (
+            _select_effects(scene, liquid, (*others, effect)),
+            _select_effects(scene, liquid, others),
+        )
     return pairs
 
 
-def _with(scene: Scene, liquid: Liquid, effects: tuple[Effect, ...]) -> Scene:
+def _select_effects(scene: Scene, liquid: Liquid, effects: tuple[Effect, ...]) -> Scene:
     changed = liquid.model_copy(update={"effects": effects})
     return scene.model_copy(update={"liquids": tuple(changed if it is liquid else it for it in scene.liquids)})

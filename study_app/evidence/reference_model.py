@@ -35,7 +35,7 @@ def respond(scene: Scene, motion: Motion) -> Response:
     liquid = scene.liquids[0]
     interval_s = np.clip(np.diff(motion.t_s, prepend=motion.t_s[0] - 1 / scene.rate_hz), 0.2e-3, 20e-3)
     interval_s[0] = 1 / scene.rate_hz
-    given = motion.velocity_mps if motion.velocity_mps is not None else _filtered(scene, motion, interval_s)
+    given = motion.velocity_mps if motion.velocity_mps is not None else _filter_velocity(scene, motion, interval_s)
     velocity_mps = (
         given if liquid.drag.law == "linear" else np.array([compress_speed(row, scene.knee) for row in given])
     )
@@ -71,7 +71,7 @@ def resistance_nspm(scene: Scene, speed_mps: float) -> float:
     return float(pressure_kg_m * coefficient * speed_mps)
 
 
-def _filtered(scene: Scene, motion: Motion, interval_s: Floats) -> Floats:
+def _filter_velocity(scene: Scene, motion: Motion, interval_s: Floats) -> Floats:
     """Return the exponentially weighted velocity (n, 3), zero at the first row."""
     if not isinstance(scene.velocity, Ewma):
         raise TypeError(f"the reference definition supports only ewma, not {scene.velocity.kind}")
@@ -379,7 +379,7 @@ def non_newtonian_n(scene: Scene, w_mps: Floats, interval_s: Floats, *, slack_m:
     law = liquid.non_newtonian
     speeds_mps = np.linalg.norm(w_mps, axis=1)
     if isinstance(law, Maxwell):
-        met_mps = _relaxed(w_mps, interval_s, law.relaxation_time_s)
+        met_mps = _relax_velocity(w_mps, interval_s, law.relaxation_time_s)
         held, speeds_mps = np.zeros_like(w_mps), np.linalg.norm(met_mps, axis=1)
     else:
         met_mps, held = w_mps, np.zeros_like(w_mps)
@@ -393,7 +393,7 @@ def non_newtonian_n(scene: Scene, w_mps: Floats, interval_s: Floats, *, slack_m:
     return force_n
 
 
-def _relaxed(w_mps: Floats, interval_s: Floats, relaxation_s: float) -> Floats:
+def _relax_velocity(w_mps: Floats, interval_s: Floats, relaxation_s: float) -> Floats:
     """Return v (n, 3) [m/s] that solves v' = (w − v)/λ, exact for a constant velocity in each tick."""
     v = np.zeros_like(w_mps)
     for k, w in enumerate(w_mps):

@@ -114,7 +114,7 @@ class Workbench:
         edited = replace(it, scene=with_parameter(it.scene, name, value))
         if edited == it:
             return replace(self, held=key if held and goes_on else None)
-        return self._edited(self.presented, edited, held=key if held else None, goes_on=goes_on)
+        return self._edit_workbench(self.presented, edited, held=key if held else None, goes_on=goes_on)
 
     def choose(self, side: Side, name: str, scene: Scene) -> Workbench:
         """Return a copy with another liquid on a side.
@@ -126,11 +126,11 @@ class Workbench:
         """
         self._refuse_blind("exchanged")
         the_liquid(scene)
-        return self._edited(side, Setting(name, scene, scene))
+        return self._edit_workbench(side, Setting(name, scene, scene))
 
     def copy_to_other(self) -> Workbench:
         self._refuse_blind("copied")
-        return self._edited(other_side(self.presented), self.in_hand)
+        return self._edit_workbench(other_side(self.presented), self.in_hand)
 
     def undo(self) -> Workbench:
         """Return a copy with the last edit undone; the same if there is none."""
@@ -160,7 +160,7 @@ class Workbench:
     def revealed(self) -> Workbench:
         return replace(self, blind=False, first="A")
 
-    def _edited(
+    def _edit_workbench(
         self, side: Side, setting: Setting, *, held: tuple[Side, str] | None = None, goes_on: bool = False
     ) -> Workbench:
         past = self.past if goes_on else (*self.past, (self.a, self.b))[-_MOST_STEPS:]

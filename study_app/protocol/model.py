@@ -679,14 +679,14 @@ class Analysis(Table):
 _T = TypeVar("_T")
 
 
-def _with_ids(tables: Any) -> Any:
+def _set_ids(tables: Any) -> Any:
     """Set each table's name as its ``id``."""
     if not isinstance(tables, Mapping):
         return tables
     return {name: {**table, "id": name} if isinstance(table, Mapping) else table for name, table in tables.items()}
 
 
-Named: TypeAlias = Annotated[dict[Id, _T], BeforeValidator(_with_ids)]
+Named: TypeAlias = Annotated[dict[Id, _T], BeforeValidator(_set_ids)]
 
 
 class Protocol(Sessions, Table):

@@ -176,7 +176,7 @@ class Instrument(NamedTuple):
         if not lacking:
             return table, {}
         scales = {
-            self.scale_name(name): _merged({"labels": scale.get("labels", {})}, {}, languages)
+            self.scale_name(name): _merge_table({"labels": scale.get("labels", {})}, {}, languages)
             for name, scale in self.table.get("scales", {}).items()
         }
         table |= {key: filled[key] for key in ("intro", "items") if key in filled}
@@ -236,14 +236,14 @@ def _fill_in(
             else:
                 faults.extend(missing_text((*place, *path, key), language) for language in lacking)
 
-    made = _merged({key: source[key] for key in ("title", "intro") if key in source}, table, languages)
+    made = _merge_table({key: source[key] for key in ("title", "intro") if key in source}, table, languages)
     if "title" not in table and set(made.get("title", ())) != set(languages):
         made["title"] = dict.fromkeys(languages, standard.published_name)
     ask(() if "intro" in table else None, of, made, "intro")
     items = []
     for name, item in known.items():
         path, written = own.get(name, (None, {}))
-        whole = _merged(item, written, languages)
+        whole = _merge_table(item, written, languages)
         if isinstance(short := whole.get("short", {}), Mapping):
             whole["short"] = {**dict.fromkeys(languages, name.replace("_", " ").capitalize()), **short}
         if "scale" in item and "scale" not in written:
@@ -268,7 +268,7 @@ def _fill_in(
                 if option_id not in possible
             ]
             whole["options"] = tuple(
-                _merged(option, choices.get(option["id"], ((), {}))[1], languages) for option in item["options"]
+                _merge_table(option, choices.get(option["id"], ((), {}))[1], languages) for option in item["options"]
             )
             for option in whole["options"]:
                 if path is not None and option["id"] in choices:
@@ -278,9 +278,9 @@ def _fill_in(
         items.append(whole)
     for scale, labelled in source.get("scales", {}).items():
         own_name = standard.scale_name(scale)
-        known_labels = _merged({key: labelled[key] for key in ("labels",) if key in labelled}, {}, languages)
+        known_labels = _merge_table({key: labelled[key] for key in ("labels",) if key in labelled}, {}, languages)
         if own_name in scales and isinstance(scales[own_name], Mapping):
-            scales[own_name] = {**scales[own_name], **_merged(known_labels, scales[own_name], languages)}
+            scales[own_name] = {**scales[own_name], **_merge_table(known_labels, scales[own_name], languages)}
         elif set(known_labels.get("labels", ())) == set(languages):
             scales[own_name] = known_labels
         else:
@@ -294,7 +294,7 @@ def _fill_in(
     return {"scores": scores, **made, "items": tuple(items)}, faults
 
 
-def _merged(known: Mapping[str, Any], own: Mapping[str, Any], languages: tuple[str, ...]) -> dict[str, Any]:
+def _merge_table(known: Mapping[str, Any], own: Mapping[str, Any], languages: tuple[str, ...]) -> dict[str, Any]:
     """Return the known part of a table in these languages, overridden by the study's own keys."""
     made = dict(known)
     for key in made.keys() & set(_TEXTS):

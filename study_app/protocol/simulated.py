@@ -360,16 +360,16 @@ class Comparison:
         if design.reply == "choice":
             return self.choose(design, sensed, mean, draw, course)
         if isinstance(design, Rated):
-            taken, points = self._perceived(sensed, draw), protocol.scales[design.scale].points
+            taken, points = self._perceive_last_interval(sensed, draw), protocol.scales[design.scale].points
             ratio = taken / mean if mean > 0 and first > 0 else 1.0
             return min(points, max(1, math.floor((points + 1) / 2 + (ratio - 1) * (points - 1) + 0.5)))
         if self.observer.estimates is not None and first > 0 and sensed[-1] > 0:
             exponent, spread = self.observer.estimates
             return _MODULUS * math.exp(exponent * math.log(sensed[-1] / first) + spread * normal(draw))
-        taken = self._perceived(sensed, draw)
+        taken = self._perceive_last_interval(sensed, draw)
         return _MODULUS * math.sqrt(max(taken / first if mean > 0 and first > 0 else 1.0, 0.0))
 
-    def _perceived(self, sensed: Sequence[float], draw: Draw) -> float:
+    def _perceive_last_interval(self, sensed: Sequence[float], draw: Draw) -> float:
         """Return the perceived value of the last interval; noise is drawn for every interval."""
         return [self.noisy(one, draw) for one in sensed][-1]
 

@@ -126,14 +126,14 @@ def _setting(key: Key, block: str, code: str, presented: str) -> Setting:
     """Return the setting of a code: a condition, or a track of a design such as "8/1", with its standard."""
     conditions = key.tables["conditions"]
     if presented in conditions:
-        return _of_condition(conditions[presented], code, presented)
+        return _setting_of_condition(conditions[presented], code, presented)
     stimulus = key.tables["stimuli"][key.tables["blocks"][block]["stimulus"]]
     name = stimulus["condition"] or next(iter(conditions))
-    of = _of_condition(conditions[name], name, name)
+    of = _setting_of_condition(conditions[name], name, name)
     return Setting(code=code, condition=presented, of=replace(of, delay_ms=None) if stimulus["vary"] == DELAY else of)
 
 
-def _of_condition(condition: Mapping[str, Any], code: str, name: str) -> Setting:
+def _setting_of_condition(condition: Mapping[str, Any], code: str, name: str) -> Setting:
     liquids = " + ".join(condition["liquids"] if condition["liquid"] is None else [condition["liquid"]])
     link = ", ".join(link_descriptions(*(condition.get(key, 0.0) for key in OF_LINK)))
     view = condition.get("view", "tank") + (" alone" if condition.get("overlay") == "hidden" else "")
@@ -176,7 +176,7 @@ def _block(protocol: Mapping[str, Any], block: Mapping[str, Any], title: str, ke
     settings = _settings_in(protocol, block["id"], key)
     kind: Kind = block.get("compares") or ("delays" if block["code_prefix"] == _DELAY_PREFIX else "liquids")
     if key is not None:
-        kind = _opened(key, block["id"], block["codes"], block.get("compares"))[1]
+        kind = _settings_from_key(key, block["id"], block["codes"], block.get("compares"))[1]
     return Block(
         id=block["id"],
         title=title,
@@ -196,7 +196,7 @@ def _settings_in(protocol: Mapping[str, Any], block: str, key: Key | None) -> tu
     table = protocol["blocks"][block]
     if key is None:
         return tuple(Setting(code=code) for code in table["codes"])
-    return _opened(key, block, table["codes"], table.get("compares"))[0]
+    return _settings_from_key(key, block, table["codes"], table.get("compares"))[0]
 
 
 def setting_name(setting: Setting, others: Sequence[Setting]) -> str:
@@ -225,7 +225,9 @@ def _presented_name(setting: Setting, others: Sequence[Setting]) -> str:
     return f"{named}, {setting.link}" if setting.link else named
 
 
-def _opened(key: Key, block: str, codes: Sequence[str], kind: Kind | None) -> tuple[tuple[Setting, ...], Kind]:
+def _settings_from_key(
+    key: Key, block: str, codes: Sequence[str], kind: Kind | None
+) -> tuple[tuple[Setting, ...], Kind]:
     """Return the settings by name: delays in ascending order, others in the protocol's order.
 
     Without ``kind``, as in receipts of earlier versions, one liquid with several delays is a block of delays.
@@ -350,7 +352,7 @@ def _level_block(protocol: Mapping[str, Any], step: str, key: Key | None, whole:
         if block.stimulus is not None:
             stimulus, method = whole.stimulus_of(block), whole.method_of(block)
         if block.standard is not None:
-            reference = _of_condition(key.tables["conditions"][block.standard], block.standard, block.standard)
+            reference = _setting_of_condition(key.tables["conditions"][block.standard], block.standard, block.standard)
         if whole.analysis is not None:
             published = tuple(published for published in whole.analysis.published if published.block == step)
     elif (written := protocol.get("designs", {}).get(table["design"])) is not None:

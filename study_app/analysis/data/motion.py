@@ -232,7 +232,11 @@ def performance(study: Study, each: Callable[[int, int], object] = lambda _done,
     for number, row in enumerate(reaching.to_dict("records")):
         each(number, len(reaching))
         targets = tasks[str(row["block"])]
-        reached = _why_not(study.folder, row) if targets is None else _read_reaches(study.folder, row, targets)
+        reached = (
+            _explain_missing_recording(study.folder, row)
+            if targets is None
+            else _read_reaches(study.folder, row, targets)
+        )
         if isinstance(reached, str):
             unread[reached] = unread.get(reached, 0) + 1
         else:
@@ -280,7 +284,7 @@ def _targets(protocol: Mapping[str, Any], block: Block) -> Targets | None:
 
 def _read_reaches(folder: Path, row: Mapping[Any, Any], targets: Targets) -> Reached | str:
     """Return the reaches of a trial, or why they are unknown."""
-    if reason := _why_not(folder, row):
+    if reason := _explain_missing_recording(folder, row):
         return reason
     try:
         samples = read_samples(_file(folder, row))
@@ -302,7 +306,7 @@ def _read_reaches(folder: Path, row: Mapping[Any, Any], targets: Targets) -> Rea
     )
 
 
-def _why_not(folder: Path, row: Mapping[Any, Any]) -> str:
+def _explain_missing_recording(folder: Path, row: Mapping[Any, Any]) -> str:
     if pd.isna(row["recording"]):
         return "no recording was stored"
     if pd.isna(row["duration_s"]):

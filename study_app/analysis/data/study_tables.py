@@ -118,7 +118,7 @@ def _pooled_questions(sites: Mapping[str, OtherQuestions]) -> OtherQuestions:
     return OtherQuestions(questions({site: asked.questions for site, asked in sites.items()}), scores)
 
 
-def _of_site(site: str, settings: Settings, table: pd.DataFrame) -> pd.DataFrame:
+def _add_site(site: str, settings: Settings, table: pd.DataFrame) -> pd.DataFrame:
     """Return a table of a site with the site in the participant IDs and the merged study's codes."""
     if "participant" not in table:
         return table
@@ -362,7 +362,7 @@ def pool_sites(folder: Path, sites: Mapping[str, Study], withdrawn: Sequence[Tom
     estimators = [study.estimator.split(" or ") for study in studies if study.estimator is not None]
 
     def table(name: str) -> pd.DataFrame:
-        tables = [_of_site(site, study.settings, getattr(study, name)) for site, study in sites.items()]
+        tables = [_add_site(site, study.settings, getattr(study, name)) for site, study in sites.items()]
         return pd.concat(tables, ignore_index=True)
 
     def rows(name: str) -> tuple[Exclusion, ...]:
@@ -411,17 +411,17 @@ def _load(folder: Path, *, sealed: bool = False, planned: bool = True) -> Study:
     listed = tuple(row for row in exclusions(place.path) if planned or row.rule_or_person not in RULES)
     records = [read_session(sessions[0], key)]
     records += [read_session(session, key, like=records[0]) for session in sessions[1:]]
-    listed += tuple(_undecided(place, records, listed))
+    listed += tuple(_find_missing_exclusions(place, records, listed))
     for session in records[1:]:
         _check_alike(records[0], session)
     responses, trials = read_tables(records, "responses"), read_tables(records, "trials")
     if key is None:  # tables of earlier versions have these columns
-        trials = _without_columns(trials, SEALED)
+        trials = _drop_columns(trials, SEALED)
     check_there(place, trials, listed)
     after_trials = responses[responses["trial"].notna()]
     both = pd.concat([after_trials, trials])[[*_TRIAL, "attempt"]]
     last = both.groupby(_TRIAL)["attempt"].max().rename("last_attempt")
-    counted = _with_counted(with_excluded(after_trials, listed), last)
+    counted = _add_counted(with_excluded(after_trials, listed), last)
     of_forms = with_excluded(responses[responses["trial"].isna()], listed)
     answers_count = of_forms["session_status"].isin(REACHED_END) & ~of_forms["excluded"]
     of_forms = of_forms.assign(counted=answers_count.astype(bool))
@@ -434,11 +434,11 @@ def _load(folder: Path, *, sealed: bool = False, planned: bool = True) -> Study:
         version=records[0].version,
         blocks=records[0].blocks,
         settings={} if key is None else settings_of(key),
-        responses=_of_statements(counted),
+        responses=_statement_answers(counted),
         answered=answered,
         levels=records[0].levels,
         intervals=_intervals(records, listed, last, opened=key is not None),
-        trials=_with_counted(with_excluded(trials, listed), last),
+        trials=_add_counted(with_excluded(trials, listed), last),
         participants=participants.assign(counted=participants["status"].isin(REACHED_END) & ~participants["excluded"]),
         exclusions=listed,
         late=late_exclusions(place.path, listed),
@@ -457,7 +457,9 @@ def _load(folder: Path, *, sealed: bool = False, planned: bool = True) -> Study:
     )
 
 
-def _undecided(place: StudyFolder, records: Sequence[Session], listed: Sequence[Exclusion]) -> Iterator[Exclusion]:
+def _find_missing_exclusions(
+    place: StudyFolder, records: Sequence[Session], listed: Sequence[Exclusion]
+) -> Iterator[Exclusion]:
     """Yield the missing exclusion of each incomplete session whose program ended before writing it."""
     decided = {exclusion.what for exclusion in (*listed, *reversals(place.path))}
     for record in records:
@@ -480,11 +482,11 @@ def _intervals(
     if not has_intervals(records[0].protocol):
         return pd.DataFrame()
     table = read_tables(records, "intervals")
-    table = table if opened else _without_columns(table, {column.name for column in INTERVALS if column.sealed})
-    return _with_counted(with_excluded(table, listed), last)
+    table = table if opened else _drop_columns(table, {column.name for column in INTERVALS if column.sealed})
+    return _add_counted(with_excluded(table, listed), last)
 
 
-def _without_columns(table: pd.DataFrame, columns: AbstractSet[str]) -> pd.DataFrame:
+def _drop_columns(table: pd.DataFrame, columns: AbstractSet[str]) -> pd.DataFrame:
     return table.assign(**{name: table[name].mask(table[name].notna()) for name in columns & {*table.columns}})
 
 
@@ -541,7 +543,7 @@ def _check_alike(first: Session, other: Session) -> None:
         )
 
 
-def _with_counted(table: pd.DataFrame, last: pd.Series[int]) -> pd.DataFrame:
+def _add_counted(table: pd.DataFrame, last: pd.Series[int]) -> pd.DataFrame:
     """Add ``counted``: the last attempt at each main trial of completed sessions, unless excluded."""
     joined = table.join(last, on=_TRIAL)
     counted = (
@@ -553,7 +555,7 @@ def _with_counted(table: pd.DataFrame, last: pd.Series[int]) -> pd.DataFrame:
     return table.assign(counted=counted.astype(bool))
 
 
-def _of_statements(table: pd.DataFrame) -> pd.DataFrame:
+def _statement_answers(table: pd.DataFrame) -> pd.DataFrame:
     """Return the answers to statements as scale points."""
     statements = table[table["kind"] == STATEMENT]
     return statements.assign(response=statements["value"].astype("Int64"))

@@ -141,10 +141,10 @@ def variables(columns: Mapping[str, tuple[Column, ...]]) -> list[dict[str, Any]]
         table = file.partition("_description-")[2].partition("_")[0]
         for column in of_table:
             found.setdefault(column.name, {})[table] = column.variable
-    return [_in_all(described) for described in found.values()]
+    return [_combine_descriptions(described) for described in found.values()]
 
 
-def _in_all(described: Mapping[str, dict[str, Any]]) -> dict[str, Any]:
+def _combine_descriptions(described: Mapping[str, dict[str, Any]]) -> dict[str, Any]:
     """Return one description of a column from those of its tables."""
     first, *others = described.values()
     tables: dict[str, list[str]] = {}

@@ -45,7 +45,7 @@ def wide_sav(study: Study, table: Delivered, cells: Mapping[str, Cells | Questio
             frame[name], coded[name] = _question(study, cell, frame[name], frame["participant"])
             continue
         rows = by_cell.get((cell.block.id, cell.setting.code, cell.item.id), answers.head(0))
-        frame[name] = _with_codes(frame[name], frame["participant"], rows)
+        frame[name] = _code_missing_answers(frame[name], frame["participant"], rows)
         coded[name] = _levels(dict(zip(LEVELS, cell.block.labels, strict=True)), cell.block.cannot_judge or "")
     numbered = {name for name, found in coded.items() if found}
     columns = tuple(replace(column, kind="number") if column.name in numbered else column for column in table.columns)
@@ -72,13 +72,13 @@ def _question(
         if asked.question.names_several:
             return values, {}
         numbers = {option: number for number, option in enumerate(asked.levels, start=1)}
-        coded = _with_codes(values.map(numbers), people, rows)
+        coded = _code_missing_answers(values.map(numbers), people, rows)
         return coded, _levels({numbers[option]: words for option, words in asked.levels.items()}, "")
     levels = {int(point): words for point, words in asked.levels.items()}
-    return _with_codes(values, people, rows), _levels(levels, asked.cannot_judge or "")
+    return _code_missing_answers(values, people, rows), _levels(levels, asked.cannot_judge or "")
 
 
-def _with_codes(values: pd.Series[Any], people: pd.Series[Any], rows: pd.DataFrame) -> pd.Series[Any]:
+def _code_missing_answers(values: pd.Series[Any], people: pd.Series[Any], rows: pd.DataFrame) -> pd.Series[Any]:
     """Return one cell per participant, with a code for the reason of a missing answer; ``rows`` are all answers."""
     counted = rows[rows["counted"]]
     judged = set(counted.loc[counted["cannot_judge"].fillna(False), "participant"])

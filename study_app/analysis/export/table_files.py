@@ -52,7 +52,7 @@ def table_files(
 
 def codebook_bytes(study: Study, files: Mapping[str, Iterable[Column]]) -> bytes:
     """Return the codebook as JSON; ``files`` maps file names to their columns."""
-    described = {name: [_described(column) for column in columns] for name, columns in files.items()}
+    described = {name: [_describe_column(column) for column in columns] for name, columns in files.items()}
     text = json.dumps(_codebook(study, described), indent=2, ensure_ascii=False)
     return f"{text}\n".encode("utf-8", "backslashreplace")
 
@@ -195,7 +195,7 @@ def _levels_entry(block: LevelBlock) -> dict[str, Any]:
     }
 
 
-def _described(column: Column) -> dict[str, Any]:
+def _describe_column(column: Column) -> dict[str, Any]:
     described: dict[str, Any] = {"name": column.name, "type": column.kind, "description": column.description}
     if column.unit:
         described["unit"] = column.unit

@@ -45,7 +45,7 @@ class Delivered:
 SITE: Final = Column("site", "text", "The participant's site (the part of the ID before the dash).")
 
 
-def _with_site(study: Study, table: Delivered) -> Delivered:
+def _add_site(study: Study, table: Delivered) -> Delivered:
     """Return a table of a merged study with the column ``site`` after the participants; other tables unchanged."""
     if not study.sites or "participant" not in header(table.columns):
         return table
@@ -80,7 +80,7 @@ def _level_tables(study: Study) -> Iterator[Delivered]:
         return
     frame = _add_conditions(study, tracks(study)).rename(columns={"level": "level_asked"})
     # the frame has no column for an interval that no trial reached
-    of_tracks = (*_TRACKS, *_may_miss((*OPENED, ACHIEVED)), *_of_intervals(study))
+    of_tracks = (*_TRACKS, *_may_miss((*OPENED, ACHIEVED)), *_interval_columns(study))
     yield _select_columns("tracks", of_tracks, frame.reindex(columns=list(header(of_tracks))))
     results = level_results(study, frame.rename(columns={"level_asked": "level"}))
     about = {"study": study.name, "simulated": study.simulated, "pilot": study.pilot}
@@ -99,7 +99,7 @@ def _level_tables(study: Study) -> Iterator[Delivered]:
             )
 
 
-def _of_intervals(study: Study) -> tuple[Column, ...]:
+def _interval_columns(study: Study) -> tuple[Column, ...]:
     """Return the force and speed columns, for the largest number of intervals per trial."""
     most = max(block.design.intervals for block in study.levels)
     return tuple(
@@ -169,7 +169,7 @@ def exported_tables(study: Study) -> tuple[Delivered, ...]:
     judged = (*JUDGED, TRIALS_MISSING) if study.levels else JUDGED
     tables = (
         _select_columns(
-            "responses", (*RESPONSES, *judged, *_may_miss(achieved)), _add_conditions(study, _with_delay_error(study))
+            "responses", (*RESPONSES, *judged, *_may_miss(achieved)), _add_conditions(study, _add_delay_error(study))
         ),
         _select_columns(
             "trials",
@@ -179,7 +179,7 @@ def exported_tables(study: Study) -> tuple[Delivered, ...]:
         _select_columns("aggregate", (*_aggregate_head(), *opened, *_MEASURED), _aggregate(study)),
         *_level_tables(study),
     )
-    return tuple(_with_site(study, table) for table in tables)
+    return tuple(_add_site(study, table) for table in tables)
 
 
 def _add_conditions(study: Study, table: pd.DataFrame) -> pd.DataFrame:
@@ -197,7 +197,7 @@ def _add_conditions(study: Study, table: pd.DataFrame) -> pd.DataFrame:
     return named
 
 
-def _with_delay_error(study: Study) -> pd.DataFrame:
+def _add_delay_error(study: Study) -> pd.DataFrame:
     """Return the responses with the delay error of the preceding trial."""
     if not study.revealed:
         return study.answered
@@ -261,7 +261,7 @@ def wide_table(study: Study) -> tuple[Delivered, dict[str, Cells | QuestionCells
         held[name], description, (least, most) = found
         kind = next(kind for kind, dtype in _TYPES.items() if dtype == held[name].dtype.name)
         columns.append(optional(name, kind, description, minimum=least, maximum=most))
-    return _with_site(study, Delivered("wide", tuple(columns), pd.DataFrame(held))), cells
+    return _add_site(study, Delivered("wide", tuple(columns), pd.DataFrame(held))), cells
 
 
 def _wide_cells(study: Study) -> dict[str, Cells | QuestionCells]:

@@ -270,12 +270,12 @@ def counts(study: Study, block: Block) -> list[str]:
     lacking = asked - int(table["n"].sum())
     words = f"n = {counted(n, 'participant')}"
     if people != {n}:
-        words = f"n = {_listed(people)} of {n} participants per {_noun(block)}"
+        words = f"n = {_range_text(people)} of {n} participants per {_noun(block)}"
     missing = f", {lacking} of {asked} ratings missing" if lacking else ""
-    return [f"{words}{missing}", f"n = {_listed(people)}{missing}"]
+    return [f"{words}{missing}", f"n = {_range_text(people)}{missing}"]
 
 
-def _listed(values: set[int]) -> str:
+def _range_text(values: set[int]) -> str:
     low, high = min(values), max(values)
     return str(low) if low == high else f"{low} to {high}"
 

@@ -236,7 +236,14 @@ def _levels_panel(axes: Axes, result: LevelsResult, person: str | None, *, first
             if answer.standard == standard and answer.catch and answer.participant == person
         ]
         heights = [_height(result, answers.value) for answers in caught]
-        axes.plot([shifted[_where(answers)] for answers in caught], heights, "x", color=colour, markersize=4, zorder=4)
+        axes.plot(
+            [shifted[_level_or_comparison(answers)] for answers in caught],
+            heights,
+            "x",
+            color=colour,
+            markersize=4,
+            zorder=4,
+        )
 
 
 def _line(
@@ -250,7 +257,7 @@ def _line(
             np.mean([_height(result, answers.value) for answers in shown if answers.participant is None])
             - heights.mean()
         )
-    xs, marker = [places[_where(point)] for point in points], "" if len(places) > 1 else "."
+    xs, marker = [places[_level_or_comparison(point)] for point in points], "" if len(places) > 1 else "."
     axes.plot(xs, heights, marker=marker, markersize=4, color=style.PARTICIPANT, linewidth=0.5, alpha=0.7)
 
 
@@ -282,7 +289,10 @@ def _coordinate(result: LevelsResult, level: float) -> float:
 def _answer_points(
     axes: Axes, points: Sequence[LevelAnswers], places: Mapping[Any, float], result: LevelsResult, colour: str
 ) -> None:
-    xs, ys = [places[_where(point)] for point in points], [_height(result, point.value) for point in points]
+    xs, ys = (
+        [places[_level_or_comparison(point)] for point in points],
+        [_height(result, point.value) for point in points],
+    )
     if Thresholds.own(result):
         sizes = [_SIZE_PT2 * point.n for point in points]
         axes.scatter(xs, ys, s=sizes, facecolors="none", edgecolors=colour, linewidths=0.7, zorder=3)
@@ -294,7 +304,7 @@ def _answer_points(
             axes.plot([x, x], [_height(result, point.low), _height(result, point.high)], color=colour, linewidth=0.9)
 
 
-def _where(answers: LevelAnswers) -> Any:
+def _level_or_comparison(answers: LevelAnswers) -> Any:
     return answers.comparison if answers.level is None else answers.level
 
 
@@ -304,7 +314,9 @@ def _height(result: LevelsResult, value: float) -> float:
 
 def _places(result: LevelsResult) -> dict[Any, float]:
     """Return the horizontal position of each level, logarithmic if levels are so spaced."""
-    levels = list(dict.fromkeys(_where(answer) for answer in Answers.of(result) if answer.participant is None))
+    levels = list(
+        dict.fromkeys(_level_or_comparison(answer) for answer in Answers.of(result) if answer.participant is None)
+    )
     if result.vary is None:
         return {level: float(place) for place, level in enumerate(levels)}
     if result.spacing == "linear":

@@ -246,7 +246,7 @@ def _level_answers(
         by = ["standard", "level", "catch"]
     units = _own_units(block, rows)
     for _, at_level in rows.groupby(by, dropna=False, sort=True):
-        yield from _at_level(block, at_level, bounds, units)
+        yield from _answers_at_level(block, at_level, bounds, units)
 
 
 def _own_units(block: LevelBlock, rows: pd.DataFrame) -> Mapping[str, float]:
@@ -261,7 +261,7 @@ def _own_units(block: LevelBlock, rows: pd.DataFrame) -> Mapping[str, float]:
     return dict(own - own.mean())
 
 
-def _at_level(
+def _answers_at_level(
     block: LevelBlock, rows: pd.DataFrame, bounds: tuple[float, float] | None, units: Mapping[str, float]
 ) -> Iterator[LevelAnswers]:
     summary = SUMMARIES[block.design.reply]
@@ -276,7 +276,7 @@ def _at_level(
         comparison=first["comparison"] if isinstance(first["comparison"], str) else number_or_none(first["comparison"]),
         catch=bool(first["catch"]),
     )
-    summarised = partial(_summarised, summary, (0.0, 1.0) if share else bounds)
+    summarised = partial(_summarise_mean, summary, (0.0, 1.0) if share else bounds)
     people = rows["participant"].to_numpy()
     own = {person: numbers[people == person] for person in sorted(set(people))}
     mean = summarised(np.array([one.mean() - units.get(person, 0.0) for person, one in own.items()]))
@@ -299,7 +299,7 @@ class _Mean(NamedTuple):
     high: float | None
 
 
-def _summarised(summary: Summary, bounds: tuple[float, float] | None, values: Array) -> _Mean:
+def _summarise_mean(summary: Summary, bounds: tuple[float, float] | None, values: Array) -> _Mean:
     """Return the back-transformed mean of shares, points or logarithms and its 95 % interval within bounds."""
     low, high = student_interval(values)
     if summary == "geometric mean":
@@ -358,7 +358,7 @@ class Answers(LevelStatistic[LevelAnswers]):
         yield from drawn_figure(self.pictures, f"levels-{result.block}")
         if not result.adaptive:
             for standard in sorted({row.standard for row in self.rows}, key=lambda one: one or 0.0):
-                yield self._of_people(standard)
+                yield self._people_table(standard)
 
     def _value(self, value: float) -> str:
         return f"{100 * value:.0f} %" if self.found.summary == "share" else f"{value:.3g}"
@@ -384,7 +384,7 @@ class Answers(LevelStatistic[LevelAnswers]):
             words=1 if result.vary is None else 0,
         )
 
-    def _of_people(self, standard: float | None) -> str:
+    def _people_table(self, standard: float | None) -> str:
         """Return a table with one row per participant and one column per level."""
         shown = [answers for answers in _of_group(self.found) if answers.standard == standard]
         own = {

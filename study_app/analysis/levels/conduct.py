@@ -35,7 +35,7 @@ class _Range(NamedTuple):
     rows: pd.DataFrame
 
 
-def _by_levels(rows: pd.DataFrame) -> Iterator[_Range]:
+def _split_by_level(rows: pd.DataFrame) -> Iterator[_Range]:
     """Yield each level as a range or, if there are many levels, `_MOST_LEVELS` ranges of neighbours."""
     for standard, at_standard in rows[rows["level"].notna()].groupby("standard", dropna=False, sort=True):
         level = at_standard["level"].astype(float)
@@ -51,7 +51,7 @@ def _withheld(block: LevelBlock, intervals: pd.DataFrame) -> Iterator[_Row]:
     if block.stimulus is None or block.stimulus.vary not in OF_LINK:
         return
     rows = intervals[(intervals["block"] == block.id) & (intervals["presented"] == "comparison")]
-    for here in _by_levels(rows[rows["withheld_share"].notna()]):
+    for here in _split_by_level(rows[rows["withheld_share"].notna()]):
         percent = 100 * here.rows["withheld_share"].to_numpy(dtype=float)
         row = {"standard": here.standard, "low": here.low, "high": here.high, "n": len(percent)}
         yield {**row, "mean_percent": float(percent.mean()), "most_percent": float(percent.max())}

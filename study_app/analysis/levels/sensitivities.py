@@ -114,18 +114,20 @@ def sensitivities(block: LevelBlock, opened: pd.DataFrame) -> Iterator[Sensitivi
             for which, some in rows.groupby(by, dropna=False, sort=True):
                 where = {"standard": number_or_none(which)} if by == "standard" else {"comparison": str(which)}
                 people = some.groupby("participant", sort=True)
-                yield from _with_group([_of_choices(block, str(person), frame, where) for person, frame in people])
+                yield from _add_group_means(
+                    [_estimate_from_choices(block, str(person), frame, where) for person, frame in people]
+                )
         case "rating":
             lowest, *levels = sorted(rows["level"].dropna().unique()) or [None]
             for level in levels:
                 people = rows.groupby("participant", sort=True)
-                own = [_of_ratings(str(person), frame, lowest, level) for person, frame in people]
-                yield from _with_group([estimate for estimate in own if estimate is not None])
+                own = [_estimate_from_ratings(str(person), frame, lowest, level) for person, frame in people]
+                yield from _add_group_means([estimate for estimate in own if estimate is not None])
         case "number" | "setting":
             return
 
 
-def _with_group(own: Sequence[SensitivityEstimate]) -> Iterator[SensitivityEstimate]:
+def _add_group_means(own: Sequence[SensitivityEstimate]) -> Iterator[SensitivityEstimate]:
     """Yield the means over participants, followed by the values of each."""
     if own:
         shares = {answer: float(np.mean([estimate.shares[answer] for estimate in own])) for answer in own[0].shares}
@@ -133,14 +135,14 @@ def _with_group(own: Sequence[SensitivityEstimate]) -> Iterator[SensitivityEstim
     yield from own
 
 
-def _of_ratings(person: str, rows: pd.DataFrame, lowest: float, level: float) -> SensitivityEstimate | None:
+def _estimate_from_ratings(person: str, rows: pd.DataFrame, lowest: float, level: float) -> SensitivityEstimate | None:
     noise, signal = (rows.loc[rows["level"] == at, "value"].dropna().to_numpy(float) for at in (lowest, level))
     sensitivity = rating(noise, signal)
     estimate = SensitivityEstimate(participant=person, n=len(noise) + len(signal), shares={}, level=float(level))
     return None if sensitivity is None else _with_sensitivity(estimate, sensitivity)
 
 
-def _of_choices(
+def _estimate_from_choices(
     block: LevelBlock, person: str, rows: pd.DataFrame, where: Mapping[str, float | str | None]
 ) -> SensitivityEstimate:
     design = block.design
@@ -153,10 +155,12 @@ def _of_choices(
     if sensitivity is None:
         return estimate
     measured = _with_sensitivity(estimate, sensitivity)
-    return _with_ends(measured, design, counts, sensitivity.model) if design.kind in _FROM_SHARE_CORRECT else measured
+    return (
+        _add_interval(measured, design, counts, sensitivity.model) if design.kind in _FROM_SHARE_CORRECT else measured
+    )
 
 
-def _with_ends(
+def _add_interval(
     estimate: SensitivityEstimate, design: Design, counts: Mapping[tuple[int, str], int], model: Model | None
 ) -> SensitivityEstimate:
     """Return an estimate with the d′ interval from that of the share correct; unchanged if all or none are correct."""

@@ -161,7 +161,7 @@ def thresholds(block: LevelBlock, opened: pd.DataFrame) -> Iterator[ThresholdEst
     for standard, at_standard in _ordered_answers(block, opened).groupby("standard", dropna=False, sort=True):
         fits, priors = _fits(block, assumed, at_standard[at_standard["analysed"]])
         heard = dict(list(at_standard.groupby("participant")))
-        own = [_own(block, stimulus, standard, fit, heard[fit.person]) for fit in fits]
+        own = [_estimate_own(block, stimulus, standard, fit, heard[fit.person]) for fit in fits]
         if priors is not None:
             answers = [(fit.fit, fit.posterior) for fit in fits]
             group = _group(stimulus, standard, own, priors)
@@ -272,7 +272,7 @@ def _flat_fits(block: LevelBlock, rows: pd.DataFrame) -> dict[Any, PersonFit]:
     return fits
 
 
-def _own(
+def _estimate_own(
     block: LevelBlock, stimulus: Stimulus, standard: Any, fitted: _FittedPerson, heard: pd.DataFrame
 ) -> ThresholdEstimate:
     """Return a participant's threshold; ``heard`` are also the rows that are not analysed."""

@@ -149,9 +149,9 @@ def hypotheses(protocol: Protocol, language: str) -> Iterator[str]:
         yield inclusion_words(protocol.analysis.contrasts)
     for block in protocol.main_blocks:
         if block.design is not None:
-            yield from _of_intervals(protocol, block)
+            yield from _interval_lines(protocol, block)
         else:
-            yield from _of_statements(protocol, block, language)
+            yield from _statement_lines(protocol, block, language)
     for published in () if protocol.analysis is None else protocol.analysis.published:
         titled_value = published.model_copy(update={"block": _title(protocol, published.block)})
         stimulus = stimuli.get(published.block)
@@ -172,7 +172,7 @@ def _equality_of(protocol: Protocol, contrast: Contrast) -> str:
     )
 
 
-def _of_intervals(protocol: Protocol, block: Block) -> Iterator[str]:
+def _interval_lines(protocol: Protocol, block: Block) -> Iterator[str]:
     design, title = protocol.design_of(block), _title(protocol, block.id)
     if block.stimulus is None:
         others = [name for name in block.conditions if name != block.standard]
@@ -195,7 +195,7 @@ def _of_intervals(protocol: Protocol, block: Block) -> Iterator[str]:
         )
 
 
-def _of_statements(protocol: Protocol, block: Block, language: str) -> Iterator[str]:
+def _statement_lines(protocol: Protocol, block: Block, language: str) -> Iterator[str]:
     questionnaire, decided = protocol.questionnaire_of(block.id), protocol.analysis or Analysis()
     title = _title(protocol, block.id)
     if questionnaire is None or len(block.conditions) < 2:

@@ -143,7 +143,7 @@ def _presented_words(conditions: Sequence[Setting]) -> tuple[str, ...]:
     return listed(_liquids(conditions)), delay if delays else "", listed(_displays(conditions))
 
 
-def _told_apart(names: Sequence[str], presented: Sequence[tuple[str, ...]]) -> list[str]:
+def _distinguish_names(names: Sequence[str], presented: Sequence[tuple[str, ...]]) -> list[str]:
     """Return, for each name, its differing liquids, delays and displays in parentheses unless the name says them.
 
     Each result has a leading space; it is "" if there is nothing to add.
@@ -225,7 +225,7 @@ def _question_words(contrast: ContrastResult, presented: Mapping[str, Presented]
     blocks = of.blocks if len(of.blocks) == 2 else of.blocks * 2
     by_condition = [presented[block].of if block in presented else {} for block in blocks]
     sides = [held.get(name, ()) for held, name in zip(by_condition, of.conditions or ("", ""), strict=True)]
-    added = _told_apart(names, sides)
+    added = _distinguish_names(names, sides)
     first, second = (f"{quoted_title(name)}{words}" for name, words in zip(names, added, strict=True))
     if of.is_interaction:
         return question(replace(contrast, within_names=(first, second)))
@@ -412,7 +412,11 @@ def _number_words(numbers: Numbers, presented: Mapping[str, Presented] = _NOT_PR
     """
     what = f"The mean {numbers.title} score" if numbers.is_score else f"The mean of “{numbers.title}”"
     blocks = [presented[code].of[""] if code in presented else () for code in numbers.codes]
-    added = _told_apart([name for name, _ in numbers.by_setting], blocks) if blocks else [""] * len(numbers.by_setting)
+    added = (
+        _distinguish_names([name for name, _ in numbers.by_setting], blocks)
+        if blocks
+        else [""] * len(numbers.by_setting)
+    )
     means = [
         (f" {_setting_words(name)}{words}" if name else "", mean, len(held))
         for (name, held), words in zip(numbers.by_setting, added, strict=True)
@@ -497,7 +501,7 @@ def first_page(
                 "figure": "" if figure is None else picture(figure, beside=True),
                 "caption": "" if figure is None else figure.caption,
             }
-            for (card, figure), is_small in zip(shown, _in_pairs(given), strict=True)
+            for (card, figure), is_small in zip(shown, _find_paired_cards(given), strict=True)
         ],
         sentences=[*filter(None, [look]), *(() if given else (none_found(results),))],
         limits=_limits_by_subject(limits, results),
@@ -509,7 +513,7 @@ def _with_fixed_spaces(sentence: str) -> str:
     return _BREAKS.sub(lambda match: match[0].replace(" ", "\u00a0"), sentence)
 
 
-def _in_pairs(given: Sequence[Card]) -> list[bool]:
+def _find_paired_cards(given: Sequence[Card]) -> list[bool]:
     """Return which cards stand side by side: of successive small ones each pair with figures of one height."""
     paired: list[bool] = []
     for place, card in enumerate(given):

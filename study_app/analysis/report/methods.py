@@ -66,7 +66,7 @@ def _sentences(study: Study, results: Results) -> Iterator[str]:
     yield from _questionnaires(study)
     yield from contrast_methods(results)
     if blocks:
-        yield from _of_statements(study, results, blocks)
+        yield from _statement_sentences(study, results, blocks)
     if blocks or results.levels or study.others.questions:
         ran, analysed = (f"liquid-study {listed(them)}" for them in (study.programs or [__version__], [__version__]))
         same = f"The sessions were run and analysed with {ran}."
@@ -397,7 +397,7 @@ def _form_times(study: Study, steps: tuple[str, ...], form: str) -> str:
     return listed(list(dict.fromkeys(times)))
 
 
-def _of_statements(study: Study, results: Results, blocks: list[BlockResult]) -> Iterator[str]:
+def _statement_sentences(study: Study, results: Results, blocks: list[BlockResult]) -> Iterator[str]:
     quartiles = QUARTILES.replace(" (", ", ").rstrip(")")
     yield (
         "Statements were rated on seven-point scales. Answers were treated as ordinal and summarised by medians "

@@ -79,7 +79,7 @@ def none_found(results: Results) -> str:
 
 def limits(study: Study, results: Results) -> tuple[str, ...]:
     """Return the limitations of the study, one sentence each."""
-    lines = list(_in_general(study, results))
+    lines = list(_general_sentences(study, results))
     for result in results.blocks:
         if not result.n:
             lines.append(f"{lead_phrase(result)}: no answers are included yet.")
@@ -105,13 +105,13 @@ def limits(study: Study, results: Results) -> tuple[str, ...]:
         lines += [
             f"{lead_phrase(result)}: {listed(items)} could not be tested ({why})." for why, items in untested.items()
         ]
-        lines += _mixed_up(result, results)
+        lines += _repeated_position_sentences(result, results)
         lines += [sentence for finding in all_findings() for sentence in finding(result, results).limits()]
     lines += [sentence for level in results.levels for sentence in level_limits(level)]
     return tuple(lines)
 
 
-def _in_general(study: Study, results: Results) -> Iterator[str]:
+def _general_sentences(study: Study, results: Results) -> Iterator[str]:
     decided = results.decided
     if not study.revealed:
         yield (
@@ -263,7 +263,7 @@ def _fixed_orders(study: Study, results: Results) -> Iterator[str]:
             )
 
 
-def _mixed_up(result: BlockResult, results: Results) -> Iterator[str]:
+def _repeated_position_sentences(result: BlockResult, results: Results) -> Iterator[str]:
     """Yield the settings that had the same position for all participants, if several orders were expected."""
     counts = results.orders.get(result.id)
     if counts is None or counts.orders < 2 or len(counts.codes) < 2:
@@ -581,7 +581,7 @@ def conduct(study: Study, results: Results) -> Iterator[str]:
         yield bullets(
             _first([f"{doubt.path.relative_to(study.folder).as_posix()} {doubt.what}" for doubt in study.doubts])
         )
-    yield from _delivered(study, results)
+    yield from _delivered_delay_lines(study, results)
     yield from _orders(results)
 
 
@@ -685,7 +685,7 @@ def _first(lines: list[str]) -> list[str]:
     return [*lines[:_SHOWN], *([f"and {more} more, listed in report.json"] if more > 0 else [])]
 
 
-def _delivered(study: Study, results: Results) -> Iterator[str]:
+def _delivered_delay_lines(study: Study, results: Results) -> Iterator[str]:
     if not results.delivered:
         return
     yield heading(3, "Were the delays presented as specified?")

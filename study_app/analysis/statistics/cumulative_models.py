@@ -102,10 +102,10 @@ def cumulative_model(
         )
         note = few if n < _FEWEST else "all participants gave the same answer in all conditions"
         return replace(model, no_interval=note, note=note)
-    return _with_fit(model, _Likelihood(answered, design, slopes=columns is not None and several == 1), direction)
+    return _add_fit(model, _Likelihood(answered, design, slopes=columns is not None and several == 1), direction)
 
 
-def _with_fit(model: CumulativeModel, likelihood: "_Likelihood", direction: Direction | None) -> CumulativeModel:
+def _add_fit(model: CumulativeModel, likelihood: "_Likelihood", direction: Direction | None) -> CumulativeModel:
     several = likelihood.effects
     null = likelihood.maximum(null=True)
     whole = None if null is None else likelihood.maximum()

@@ -97,7 +97,7 @@ def cliffs_delta(first: Array, second: Array) -> EffectSize | None:
     of_cells = float(((signs - delta) ** 2).sum())
     variance = (m**2 * of_rows + n**2 * of_columns - of_cells) / (n * m * (n - 1) * (m - 1))
     least = (1 - delta**2) / (n * m - 1)
-    return _of_signs(delta, max(variance, least), n + m - 2, min(n, m))
+    return _sign_effect_size(delta, max(variance, least), n + m - 2, min(n, m))
 
 
 def paired_delta(differences: Array) -> EffectSize | None:
@@ -109,10 +109,10 @@ def paired_delta(differences: Array) -> EffectSize | None:
     signs = np.where(np.abs(differences) < _SAME, 0.0, np.sign(differences))
     if n < 2 or not signs.any():
         return None
-    return _of_signs(float(signs.mean()), float(signs.var(ddof=1)) / n, n - 1, n)
+    return _sign_effect_size(float(signs.mean()), float(signs.var(ddof=1)) / n, n - 1, n)
 
 
-def _of_signs(delta: float, variance: float, freedom: int, cases: int) -> EffectSize:
+def _sign_effect_size(delta: float, variance: float, freedom: int, cases: int) -> EffectSize:
     """Return delta with an interval that is limited to −1 to 1.
 
     At ±1, where the variance is zero, it ends at the bound of Clopper and Pearson (1934) for ``cases`` of ``cases``.

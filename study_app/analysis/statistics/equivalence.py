@@ -136,7 +136,7 @@ def _compare_sorted(
 ) -> Equivalence:
     """Return the comparison of sorted ``differences``, which often repeat since answers are whole points."""
     kept = np.array(differences)
-    equivalence = _described(kept, bound, alpha, largest)
+    equivalence = _describe_result(kept, bound, alpha, largest)
     if equivalence.n < 2:
         return equivalence
     means = means_of(kept[None], seed=seed, resamples=resamples_for(alpha))
@@ -195,7 +195,7 @@ def is_beyond(outcome: Outcome, bound: float, alpha: float) -> bool:
     return not few and (low > bound + SAME or high < -bound - SAME)
 
 
-def _described(kept: Array, bound: float, alpha: float, largest: float) -> Equivalence:
+def _describe_result(kept: Array, bound: float, alpha: float, largest: float) -> Equivalence:
     """Return the descriptive part of a result, before any test."""
     n = len(kept)
     people = f"{counted(n, 'participant')}: no variation"

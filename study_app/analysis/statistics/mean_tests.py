@@ -136,12 +136,12 @@ def means_of(
         error=error,
         third=(values - mean[:, None]) ** 3 @ weights * of_cubes,
         freedom=n - 1,
-        lowest=_resampled(values, weights, draws, 0),
-        highest=_resampled(values, weights, draws, -1),
+        lowest=_resample_means(values, weights, draws, 0),
+        highest=_resample_means(values, weights, draws, -1),
     )
 
 
-def _resampled(values: Array, weights: Array, draws: Array, further: int) -> Array:
+def _resample_means(values: Array, weights: Array, draws: Array, further: int) -> Array:
     """Return resampled means (resamples, studies), with an additional participant like the one at this index."""
     of_further = draws[:, -1:] * weights[further]
     sums = draws[:, :-1] @ (values * weights).T + of_further * values[:, further]

@@ -293,7 +293,7 @@ def holm(ps: Sequence[float | None]) -> tuple[float | None, ...]:
 
     None, for a test without p, stays None but counts as a member of the family.
     """
-    known = _known(ps)
+    known = _drop_missing_ps(ps)
     adjusted: list[float | None] = [None] * len(ps)
     highest = 0.0
     for place, member in enumerate(sorted(known, key=lambda member: known[member])):
@@ -307,7 +307,7 @@ def false_discovery(ps: Sequence[float | None]) -> tuple[float | None, ...]:
 
     None stays None and counts as a test with p = 1.
     """
-    known = _known(ps)
+    known = _drop_missing_ps(ps)
     if not known:
         return (None,) * len(ps)
     adjusted: list[float | None] = [None] * len(ps)
@@ -317,7 +317,7 @@ def false_discovery(ps: Sequence[float | None]) -> tuple[float | None, ...]:
     return tuple(adjusted)
 
 
-def _known(ps: Sequence[float | None]) -> dict[int, float]:
+def _drop_missing_ps(ps: Sequence[float | None]) -> dict[int, float]:
     known = {member: p for member, p in enumerate(ps) if p is not None}
     for p in known.values():
         if not 0.0 <= p <= 1.0:

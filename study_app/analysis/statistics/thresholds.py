@@ -93,7 +93,7 @@ def noticed(values: ArrayLike, levels: Sequence[float]) -> Threshold:
     found: dict[str, Any] = {}
     note = _impossible(order, of_yes, of_asked)
     if not note:
-        curve, dispersion, (lower, upper) = _pooled(order, yes, asked)
+        curve, dispersion, (lower, upper) = _pool_answers(order, yes, asked)
         note = _outside(order, curve.threshold, lower, upper)
     if not note:
         others = curve.others
@@ -147,7 +147,9 @@ def _impossible(levels: Array, yes: Array, asked: Array) -> str:
     return "all participants noticed a difference at every level" if (yes == asked).all() else ""
 
 
-def _pooled(levels: Array, yes: Array, asked: Array) -> tuple[Posterior, float, tuple[float | None, float | None]]:
+def _pool_answers(
+    levels: Array, yes: Array, asked: Array
+) -> tuple[Posterior, float, tuple[float | None, float | None]]:
     """Return the posterior of all answers, the dispersion, and the existing ends of the interval.
 
     The interval is scaled by the dispersion times the squared ratio of the t and normal quantiles (pooled clustered

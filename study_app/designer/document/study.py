@@ -138,22 +138,22 @@ class Study:
         for edit in edits:
             text, splices = apply_edit(text, edit)
             steps += splices
-        return self._of_text(text), tuple(steps)
+        return self._study_from_text(text), tuple(steps)
 
     def with_text(self, text: str) -> tuple[Study, tuple[Splices, ...]]:
         check_encodable(text)
         old = self.text
         first, last = common_ends(old, text)
         splice = Splice(first, old[first : len(old) - last], text[first : len(text) - last])
-        return (self, ()) if old == text else (self._of_text(text), ((splice,),))
+        return (self, ()) if old == text else (self._study_from_text(text), ((splice,),))
 
     def with_splices(self, steps: tuple[Splices, ...]) -> Study:
         text = self.text
         for step in steps:
             text = apply_splices(text, step)
-        return self._of_text(text)
+        return self._study_from_text(text)
 
-    def _of_text(self, text: str) -> Study:
+    def _study_from_text(self, text: str) -> Study:
         return Study(text, self.folder, self.document, self.unfinished)
 
 

@@ -481,7 +481,7 @@ def apply_edit(text: str, edit: Edit) -> tuple[str, tuple[Splices, ...]]:
     except tomllib.TOMLDecodeError as error:
         raise WriterError(f"{edit} produced invalid TOML: {error}") from error
     if not is_same_value(edited, meant) and not is_same_value(
-        _pruned(copy.deepcopy(edited), edit.path), _pruned(meant, edit.path)
+        _prune_empty_tables(copy.deepcopy(edited), edit.path), _prune_empty_tables(meant, edit.path)
     ):
         raise WriterError(f"{edit} did not produce the intended document")
     return text, tuple(steps)
@@ -691,7 +691,7 @@ def _is_written_apart(spans: Spans, path: Path) -> bool:
     return apart
 
 
-def _pruned(document: Document, path: Path) -> Document:
+def _prune_empty_tables(document: Document, path: Path) -> Document:
     """Return a document without the empty tables and arrays around ``path``, which TOML may not write."""
     for length in range(len(path), 0, -1):
         node: Any = document

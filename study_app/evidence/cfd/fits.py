@@ -333,7 +333,7 @@ def _steady_markdown(table: SolvedTable) -> str:
     for reynolds, solved, coarse, narrow in zip(*(it.tolist() for it in table.columns.values()), strict=True):
         others = [coarse, narrow, clift(reynolds), MITTAL.get(reynolds), _measured(reynolds)]
         others += [law(reynolds) * 24 / reynolds for law in LAWS.values()]
-        shares = ["" if it is None else _signed(it / solved - 1) for it in (*others, _CONSTANT)]
+        shares = ["" if it is None else _format_signed(it / solved - 1) for it in (*others, _CONSTANT)]
         rows.append((f"{reynolds:g}", f"{solved:.4g}", *shares))
     return Table(("Re", "C_d, solver", *names), rows).markdown()
 
@@ -379,7 +379,7 @@ def _row(it: Fitted) -> tuple[str, ...]:
     fitted = ", ".join(f"{name} {value:.3g}{'' if name in within else '*'}" for name, value in it.values.items())
     return (
         *(it.model.name, fitted or "nothing", f"{it.rms_n:.2g} N ({it.share:.1%})", f"{it.worst_n:.2g} N"),
-        *(f"{it.within:.0%}", _signed(it.push, 0), f"{it.carried:.1%}"),
+        *(f"{it.within:.0%}", _format_signed(it.push, 0), f"{it.carried:.1%}"),
     )
 
 
@@ -390,5 +390,5 @@ def _measured(reynolds: float) -> float:
     return float(measured_drag_n(liquid, 1.0, speed_mps)[0]) / (math.pi / 8)
 
 
-def _signed(share: float, digits: int = 1) -> str:
+def _format_signed(share: float, digits: int = 1) -> str:
     return f"{share:+.{digits}%}".replace("-", "−")

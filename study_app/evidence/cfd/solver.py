@@ -56,7 +56,7 @@ def solve(to: Path, executor: Executor, progress: Callable[[str], None]) -> tupl
     """
     library()
     solved = {
-        folder / f"{case.name}.csv": executor.submit(_solved, case, *grids)
+        folder / f"{case.name}.csv": executor.submit(_solve_case, case, *grids)
         for some, folder, grids in (
             (cases(), to, (GRID, COARSE)),
             (cases_of(TRAINING), to / TRAINING_FOLDER, (_BOTH_WAYS, _BOTH_WAYS_COARSE)),
@@ -72,7 +72,7 @@ def solve(to: Path, executor: Executor, progress: Callable[[str], None]) -> tupl
     return tuple(solved)
 
 
-def _solved(case: Case, grid: Grid, coarse: Grid) -> bytes:
+def _solve_case(case: Case, grid: Grid, coarse: Grid) -> bytes:
     step = _STEP if case.reynolds <= FAST_REYNOLDS else _STEP / 2
     return motion_table(case, flow_of(grid), flow_of(coarse), step)
 

@@ -110,7 +110,7 @@ def solve_materials(to: Path, executor: Executor, progress: Callable[[str], None
     library()
     make_folder(to, waits=False)
     rows: list[tuple[float, ...]] = []
-    for index, found in zip(INDICES, executor.map(_solved, INDICES), strict=True):
+    for index, found in zip(INDICES, executor.map(_solve_flow, INDICES), strict=True):
         rows += found
         progress(f"n {index:g}: drag {', '.join(f'{row[2]:.4f}' for row in found)}")
     notes = {
@@ -122,7 +122,7 @@ def solve_materials(to: Path, executor: Executor, progress: Callable[[str], None
     return to / FILE
 
 
-def _solved(flow_index: float) -> list[tuple[float, ...]]:
+def _solve_flow(flow_index: float) -> list[tuple[float, ...]]:
     fine, coarse = YieldFlow(GRID).drags(flow_index, BINGHAM), YieldFlow(COARSE).drags(flow_index, BINGHAM)
     return [
         (flow_index, bingham, drag, rough, smooth)

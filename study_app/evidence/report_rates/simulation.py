@@ -98,7 +98,7 @@ def _simulate_answers(block: Block, opinions: Opinions, extent: _Extent, rng: np
         return opinions.answers(0.0, PEOPLE)
     thought = opinions.thought.copy()
     if extent == "own trends":
-        own = _own(block, (len(thought), *thought.shape[2:]), rng)
+        own = _draw_individual_effects(block, (len(thought), *thought.shape[2:]), rng)
         return replace(opinions, thought=thought.mean(axis=2, keepdims=True) + own[:, None]).answers(1.0, PEOPLE)
     for place, other in _equal_settings(block, extent).items():
         thought[:, :, place] = thought[:, :, other]
@@ -110,7 +110,7 @@ def _probit(
 ) -> Array:
     effects = _effects(simulation, block)
     if extent == "own trends":
-        latent = leaning[:, None, None] + _own(block, (len(leaning), *effects.shape), rng)
+        latent = leaning[:, None, None] + _draw_individual_effects(block, (len(leaning), *effects.shape), rng)
         latent += rng.normal(size=latent.shape)
         return np.add(np.searchsorted(_LEVELS, latent), 1, dtype=np.float64)
     for place, other in _equal_settings(block, extent).items():
@@ -119,7 +119,7 @@ def _probit(
     return np.add(np.searchsorted(_LEVELS, latent), 1, dtype=np.float64)
 
 
-def _own(block: Block, shape: tuple[int, ...], rng: np.random.Generator) -> Array:
+def _draw_individual_effects(block: Block, shape: tuple[int, ...], rng: np.random.Generator) -> Array:
     """Return individual effects (participants, settings, items) with mean zero: trends or opinions."""
     n, k, items = shape
     if block.kind == "delays":
@@ -324,7 +324,7 @@ def _study(simulation: Plan, cell: Cell, truth: _Truth, seed: int, study: int) -
     asked, results = report(simulation, decided, given, study, failures)
     events: dict[Event, bool] = {}
     for place, (block, result) in enumerate(zip(simulation.blocks, results, strict=True)):
-        judged = _in_delays if block.kind == "delays" else _in_liquids
+        judged = _delay_events if block.kind == "delays" else _liquid_events
         for (what, at_most), hit in judged(asked[place], result, cell, truth[place]):
             events[f"{what} ({block.kind})", at_most] = hit
         if cell.extent == "empty":
@@ -378,7 +378,7 @@ def _mean_test_events(result: BlockResult) -> Iterator[tuple[Event, bool]]:
     )
 
 
-def _in_liquids(asked: BlockAnswers, result: BlockResult, cell: Cell, _truth: Array) -> Iterator[tuple[Event, bool]]:
+def _liquid_events(asked: BlockAnswers, result: BlockResult, cell: Cell, _truth: Array) -> Iterator[tuple[Event, bool]]:
     if cell.extent in _NO_EFFECT:
         yield (
             ("conditions differ in a statement", "at most 5 %"),
@@ -414,7 +414,7 @@ def _equal_pairs(block: Block, extent: _Extent) -> set[tuple[str, str]]:
     }
 
 
-def _in_delays(asked: BlockAnswers, result: BlockResult, cell: Cell, truth: Array) -> Iterator[tuple[Event, bool]]:
+def _delay_events(asked: BlockAnswers, result: BlockResult, cell: Cell, truth: Array) -> Iterator[tuple[Event, bool]]:
     block = asked.block
     null = [block.settings[at].delay_ms or 0.0 for at in _equal_settings(block, cell.extent)]
     if cell.extent in _NO_EFFECT:
@@ -500,7 +500,7 @@ def _single_tests() -> Mapping[_Case, tuple[_Limit, str, Trial]]:
         (12, 60.0, 0.0, "participants' thresholds, SD 60 ms"),
         (12, 15.0, 1 / 6, "one participant in six never agrees"),
     ):
-        tests[words, n] = ("at least 93 %", COVERS, _covered(n, spread_ms, never))
+        tests[words, n] = ("at least 93 %", COVERS, _new_coverage_trial(n, spread_ms, never))
     for claim in false_claims():
         tests[claim.name, claim.participants] = ("at most 5 %", claim.claim, claim.trial)
     for power in true_claims():
@@ -532,7 +532,7 @@ def _leaning(n: int, most: tuple[float, ...]) -> Trial:
     return trial
 
 
-def _covered(n: int, spread_ms: float, never: float) -> Trial:
+def _new_coverage_trial(n: int, spread_ms: float, never: float) -> Trial:
     def trial(rng: np.random.Generator) -> float | None:
         threshold = noticed(_people(rng, n, spread_ms, never), _LEVELS_MS.tolist())
         if threshold.interval is None or threshold.effect is None:

@@ -73,8 +73,8 @@ class Audit:
         if len(samples) == 0:
             return
         counts = self.counts
-        missing = samples.tick - _after(self._next_tick, samples.tick + 1)
-        follows = (missing == 0) & _after(self._was_ok, samples.is_ok)
+        missing = samples.tick - _previous_values(self._next_tick, samples.tick + 1)
+        follows = (missing == 0) & _previous_values(self._was_ok, samples.is_ok)
         counts.samples += len(samples)
         counts.missing += missing.sum()
         counts.limiters += [np.count_nonzero(samples.limited_by(name)) for name in LIMITER_NAMES]
@@ -109,7 +109,7 @@ class Audit:
         """Measure forces and their changes; return the samples (n,) whose force breaks a guarantee."""
         counts, force_n = self.counts, samples.device_force_n
         size_n = np.linalg.norm(force_n, axis=1)
-        change_n = np.linalg.norm(force_n - _after(self._last_n, force_n), axis=1)
+        change_n = np.linalg.norm(force_n - _previous_values(self._last_n, force_n), axis=1)
         is_force, stopped_limit_n = np.isfinite(size_n), samples.stopped_limit_n
         compared = follows & is_force
         released = compared & (np.isfinite(stopped_limit_n) | ~samples.is_ok)
@@ -140,7 +140,7 @@ class Audit:
         late_ns = samples.time_ns + samples.busy_ns - (deadline_ns + period_ns)
         skipped = np.maximum(late_ns, 0) // period_ns
         following_ns = deadline_ns + period_ns * (1 + skipped)
-        drift_ns = np.where(follows, np.abs(deadline_ns - _after(self._next_deadline_ns, following_ns)), 0)
+        drift_ns = np.where(follows, np.abs(deadline_ns - _previous_values(self._next_deadline_ns, following_ns)), 0)
         counts.latest_s = max(counts.latest_s, samples.lateness_ns.max() * 1e-9)
         counts.drift_ns = max(counts.drift_ns, drift_ns.max())
         counts.long_ticks += np.count_nonzero(samples.busy_ns >= period_ns)
@@ -149,6 +149,6 @@ class Audit:
         return drift_ns > 0
 
 
-def _after(last: Any, values: Any) -> Any:
+def _previous_values(last: Any, values: Any) -> Any:
     """Return ``last`` and all ``values`` (n, …) but the last one: of each sample, the value of the one before."""
     return np.concatenate([[last], values[:-1]])

@@ -211,7 +211,7 @@ class Soak:
     def step(self, ending: threading.Event | None = None) -> None:
         """Carry out the due actions, let some ticks pass, and check them; setting ``ending`` ends the wait early."""
         tick = self.done
-        stretch = self._at(tick)
+        stretch = self._stretch_at(tick)
         if self.stretch is None or (stretch.part, stretch.round) != (self.stretch.part, self.stretch.round):
             self._leave()
             self.stretch = stretch
@@ -265,7 +265,7 @@ class Soak:
             stops=self._stops,
         )
 
-    def _at(self, tick: int) -> _Stretch:
+    def _stretch_at(self, tick: int) -> _Stretch:
         length = round(self._rate_hz * min(max(900 * self.hours, _SHORTEST_ROUND_S), _LONGEST_ROUND_S))
         number = tick // length
         rest = round(_SETTLING_S * self._rate_hz) + self._longest_wake

@@ -118,7 +118,7 @@ class Group(NamedTuple):
 
 def sweep(seed: str = "stability") -> tuple[Case, ...]:
     """Return the cases of the sweep: each liquid at each scale, rate, delay and grip; the rest is drawn."""
-    return tuple(_drawn(seed, _grid(GRIPS)))
+    return tuple(_draw_remaining_values(seed, _grid(GRIPS)))
 
 
 def groups(seed: str = "stability", count: int | None = None) -> tuple[Group, ...]:
@@ -130,13 +130,16 @@ def groups(seed: str = "stability", count: int | None = None) -> tuple[Group, ..
 
     def changed(name: str, change: Callable[[Case], Case | None], cases: Iterable[Case]) -> Group:
         listed = tuple(case for case in map(change, cases) if case is not None)
-        return Group(name, tuple(_drawn(f"{seed} {name}", evenly_chosen(listed, min(_CASES, count or _CASES)), light)))
+        return Group(
+            name,
+            tuple(_draw_remaining_values(f"{seed} {name}", evenly_chosen(listed, min(_CASES, count or _CASES)), light)),
+        )
 
     listed = [
         Group(
             name,
             tuple(
-                _drawn(
+                _draw_remaining_values(
                     f"{seed} {name}",
                     [dataclasses.replace(case, plant=SECOND) for case in evenly_chosen(cases, count)],
                     light,
@@ -149,22 +152,28 @@ def groups(seed: str = "stability", count: int | None = None) -> tuple[Group, ..
         listed.append(changed(name, change, both))
     listed += [
         Group(
-            name, tuple(map(change, _drawn(f"{seed} {name}", evenly_chosen(both, min(_CASES, count or _CASES)), light)))
+            name,
+            tuple(
+                map(
+                    change,
+                    _draw_remaining_values(f"{seed} {name}", evenly_chosen(both, min(_CASES, count or _CASES)), light),
+                )
+            ),
         )
         for name, change in _MASSES.items()
     ]
     for name, own in _DISTURBED.items():
         cases = evenly_chosen(both, min(_CASES, count or _CASES))
-        listed.append(Group(name, tuple(_drawn(f"{seed} {name}", cases, {**light, **own}))))
+        listed.append(Group(name, tuple(_draw_remaining_values(f"{seed} {name}", cases, {**light, **own}))))
     listed.append(Group("let go in mid-stroke", evenly_chosen(releases, count)))
-    in_gap = tuple(_in_gap(f"{seed} let go in a gap", releases))
+    in_gap = tuple(_release_in_gap(f"{seed} let go in a gap", releases))
     listed.append(Group("let go in a gap of samples", evenly_chosen(in_gap, min(_CASES, count or _CASES))))
     for name in (*_MISJUDGED, *_MASSES):
         cases = tuple(case for case in map({**_CHANGES, **_MASSES}[name], releases) if case is not None)
         listed.append(Group(f"let go in mid-stroke, {name}", evenly_chosen(cases, min(_CASES, count or _CASES))))
     driven = "through the Falcon's driver"
     driven_held = evenly_chosen(tuple(_grid(("light", "middle", "firm"), (FALCON,), _FALCONS_HZ, (1,))), count)
-    driven_held = tuple(_drawn(f"{seed} {driven}", driven_held, _FALCONS))
+    driven_held = tuple(_draw_remaining_values(f"{seed} {driven}", driven_held, _FALCONS))
     listed.append(Group(f"{driven}, held", driven_held))
     driven_free = (dataclasses.replace(case, delay=1) for case in _releases(f"{seed} {driven}", (FALCON,), _FALCONS_KG))
     listed.append(Group(f"{driven}, let go in mid-stroke", evenly_chosen(tuple(driven_free), count)))
@@ -191,11 +200,11 @@ def _of_liquids(
 ) -> Iterator[Group]:
     """Yield groups for liquids outside the sweep: plain cases, misjudged delays, and releases."""
     whole = tuple(_grid(GRIPS, names=names))
-    yield Group(name, tuple(_drawn(f"{seed} {name}", evenly_chosen(whole, count), choices)))
+    yield Group(name, tuple(_draw_remaining_values(f"{seed} {name}", evenly_chosen(whole, count), choices)))
     for change in _MISJUDGED:
         cases = [case for case in map(_CHANGES[change], whole) if case is not None]
         few = evenly_chosen(cases, min(_CASES, count or _CASES))
-        yield Group(f"{name}, {change}", tuple(_drawn(f"{seed} {name} {change}", few, choices)))
+        yield Group(f"{name}, {change}", tuple(_draw_remaining_values(f"{seed} {name} {change}", few, choices)))
     free = tuple(_releases(f"{seed} {name}", PLANTS, _HANDLES_KG, names))
     yield Group(f"{name}, let go in mid-stroke", evenly_chosen(free, count))
 
@@ -205,7 +214,7 @@ def _half_damper(
 ) -> Group:
     """Return loops that are held, thrown and released; half of them present the strongest damper."""
     whole = tuple(_grid(GRIPS, PLANTS, rates_hz, names=lambda: (*liquids(), *[DAMPER] * len(liquids()))))
-    return Group(name, tuple(_drawn(f"{seed} {name}", evenly_chosen(whole, count), choices)))
+    return Group(name, tuple(_draw_remaining_values(f"{seed} {name}", evenly_chosen(whole, count), choices)))
 
 
 def evenly_chosen(cases: Sequence[Case], count: int | None) -> tuple[Case, ...]:
@@ -270,7 +279,9 @@ def _grid(
         yield Case(liquid=liquid, scale=scale, rate_hz=rate_hz, delay=delay, hand=hand, plant=plant)
 
 
-def _drawn(seed: str, cases: Iterable[Case], choices: Mapping[str, tuple[Any, ...]] = _DRAWN) -> Iterator[Case]:
+def _draw_remaining_values(
+    seed: str, cases: Iterable[Case], choices: Mapping[str, tuple[Any, ...]] = _DRAWN
+) -> Iterator[Case]:
     """Yield cases with the remaining values drawn from ``choices``."""
     draw = Random(seed)  # noqa: S311 - the same cases in every run
     for case in cases:
@@ -299,7 +310,7 @@ def _releases(
         )
 
 
-def _in_gap(seed: str, cases: Iterable[Case]) -> Iterator[Case]:
+def _release_in_gap(seed: str, cases: Iterable[Case]) -> Iterator[Case]:
     """Yield releases during missing samples, after which positions may be offset."""
     draw = Random(seed)  # noqa: S311 - the same cases in every run
     for case in cases:

@@ -113,7 +113,7 @@ def _entry(velocity: Velocity, period_s: float, delay: int) -> Entry:
     unaltered = velocity.kind in {"ewma", "kalman"} and period_s == NOMINAL_S and delay <= 1
     drag = _limit_nspm(velocity, period_s, delay, unaltered=unaltered)
     inertia = (_UNALTERED_INERTIA_SHARE if unaltered else _INERTIA_SHARE) * drag
-    limits = DampingLimits(_rounded_down(drag), _rounded_down(inertia))
+    limits = DampingLimits(_round_down(drag), _round_down(inertia))
     return Entry(velocity.kind, velocity.alpha if isinstance(velocity, Ewma) else None, period_s, delay, limits)
 
 
@@ -146,7 +146,7 @@ def _weight(alpha: float, period_s: float) -> float:
     return float(1.0 - (1.0 - alpha) ** (period_s / NOMINAL_S))
 
 
-def _rounded_down(value: float) -> float:
+def _round_down(value: float) -> float:
     return math.floor(value * 10) / 10
 
 

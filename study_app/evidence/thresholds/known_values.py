@@ -228,7 +228,7 @@ class _KnownValue(ABC):
         draw = stream(seed, f"validate/{self.name}/{number}/people").random
         return [math.log(BETWEEN_PEOPLE) * normal(draw) for _ in range(people)], draw
 
-    def _simulated(
+    def _simulate_answers(
         self, observers: Sequence[Observer], seed: int, number: int, sense: Callable[[Any], float] = as_requested
     ) -> pd.DataFrame:
         """Return the answers in the block; ``sense`` returns the quantity that observers perceive in an interval."""
@@ -276,7 +276,7 @@ class KnownThreshold(_KnownValue):
     def simulate(self, number: int, seed: int, kind: str = "", observers: Sequence[Observer] = ()) -> StudyFound:
         """Return the estimates of one study of ``observers``, by default from `people`."""
         people = [(observer, self._threshold(observer)) for observer in observers] or [*self.people(number, seed, kind)]
-        rows = self._simulated([observer for observer, _ in people], seed, number)
+        rows = self._simulate_answers([observer for observer, _ in people], seed, number)
         frame = rows.assign(session=1, level_delivered=rows["level"], analysed=True)
         frame = frame.astype({"level_delivered": "Float64", "success": "boolean"})
         protocol, block = self.protocol, self.block
@@ -391,7 +391,9 @@ class KnownExponent(_KnownValue):
         reached = dict(zip(_levels(self.protocol, self.block), self.resistances, strict=True))
         truths = [EXPONENT * (1 + one) for one in self._apart(people, seed, number)[0]]
         observers = [self._observer(truth) for truth in truths]
-        frame = self._simulated(observers, seed, number, lambda presented: reached.get(presented.value, math.nan))
+        frame = self._simulate_answers(
+            observers, seed, number, lambda presented: reached.get(presented.value, math.nan)
+        )
         own = np.array([estimate_slope(rows["level"], rows["answer"]) for _, rows in frame.groupby("participant")])
         low, high = student_interval(own)
         assert low is not None and high is not None  # noqa: S101, PT018 - several participants have an interval

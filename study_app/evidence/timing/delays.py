@@ -124,9 +124,9 @@ class Delayed:
 
     def limits(self) -> tuple[str, ...]:
         """Return the limits for each screen and load, and whether they are met."""
-        return tuple(self._of(screen, load) for screen in self.screens for load in self.loads)
+        return tuple(self._describe_errors(screen, load) for screen in self.screens for load in self.loads)
 
-    def _of(self, screen: str, load: LoadName) -> str:
+    def _describe_errors(self, screen: str, load: LoadName) -> str:
         trials = self.on(screen, load)
         mean = max(abs(trial.mean_ms) / trial.frame_ms for trial in trials)
         tail = max(trial.percentile_ms(_TAIL_PERCENT) / trial.frame_ms for trial in trials)

@@ -123,7 +123,7 @@ class _CurvePlot(Plot):
         peak = max((float(np.nanmax(it)) for it in values if len(it)), default=0.0)
         self._show_top(max(peak, limit or 0.0, self._least))
         for curve, it in zip(self.curves, values, strict=True):
-            curve.setData(*_thinned(t_s, it))
+            curve.setData(*_thin_samples(t_s, it))
         self.limit.setVisible(limit is not None)
         if limit is not None:
             self.limit.setPos(limit)
@@ -238,7 +238,7 @@ def _vector_sizes(vectors: Floats) -> Floats:
     return np.sqrt(np.einsum("ij,ij->i", vectors, vectors))
 
 
-def _thinned(t_s: Floats, values: Floats) -> tuple[Floats, Floats]:
+def _thin_samples(t_s: Floats, values: Floats) -> tuple[Floats, Floats]:
     """Return the newest time and the largest value of each group of samples, so that peaks are kept."""
     step = max(1, len(t_s) // _POINTS)
     first = len(t_s) % step

@@ -115,14 +115,14 @@ class Clamped(QLabel):
             self._show_clamped()
 
     def _show_clamped(self) -> None:
-        lines = _clamped(self.whole, self._most, self.font(), self.width())
+        lines = _clamp_lines(self.whole, self._most, self.font(), self.width())
         self.setText("\n".join(lines))
         if not self._steady:
             self.setFixedHeight(max(1, len(lines)) * self.fontMetrics().lineSpacing() + 2)
         self.setToolTip(plain_tip(self.whole if lines and lines[-1].endswith("…") else ""))
 
 
-def _clamped(text: str, most: int, font: QFont, width: int) -> list[str]:
+def _clamp_lines(text: str, most: int, font: QFont, width: int) -> list[str]:
     """Return a text in lines that fit into ``width``; the last line is elided if there would be too many."""
     layout = QTextLayout(text, font)
     layout.beginLayout()

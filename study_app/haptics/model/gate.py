@@ -126,13 +126,13 @@ class Extremes:
 
     def inertial_n(self, accelerated_n: Callable[[Extremes, float, float], float]) -> float:
         """Return the force at the body's greatest acceleration and in the shear of the flow together."""
-        return accelerated_n(self, self.acceleration_mps2, self.speed_mps) + self._sheared_n(accelerated_n)
+        return accelerated_n(self, self.acceleration_mps2, self.speed_mps) + self._shear_force_n(accelerated_n)
 
     def sheared_n(self) -> float:
         """Return the force of inertial effects in the shear of the flow."""
-        return sum(self._sheared_n(effect.accelerated_n) for effect in EFFECTS if effect.accelerated_n is not None)
+        return sum(self._shear_force_n(effect.accelerated_n) for effect in EFFECTS if effect.accelerated_n is not None)
 
-    def _sheared_n(self, accelerated_n: Callable[[Extremes, float, float], float]) -> float:
+    def _shear_force_n(self, accelerated_n: Callable[[Extremes, float, float], float]) -> float:
         return accelerated_n(self, self.flow.shear_per_s * self.speed_mps, self.flow.speed_mps)
 
     def total_n(self, extent: str) -> float:
@@ -211,7 +211,7 @@ def resolve(scene: Scene) -> Scene:
     """Return the scene with effects and a drag law selected wherever it says ``"auto"``."""
     if all(liquid.effects != "auto" for liquid in scene.liquids):
         return scene
-    liquids = tuple(_resolved(scene, liquid) if liquid.effects == "auto" else liquid for liquid in scene.liquids)
+    liquids = tuple(_resolve_liquid(scene, liquid) if liquid.effects == "auto" else liquid for liquid in scene.liquids)
     return scene.model_copy(update={"liquids": liquids})
 
 
@@ -324,7 +324,7 @@ def _tables(scene: Scene, liquid: Liquid) -> dict[Effect, tuple[Any, str]]:
     return {effect.name: effect.choose(extremes) for effect in EFFECTS if effect.choose is not None}
 
 
-def _resolved(scene: Scene, liquid: Liquid) -> Liquid:
+def _resolve_liquid(scene: Scene, liquid: Liquid) -> Liquid:
     taken = tuple(verdict.effect for verdict in _verdicts(scene, liquid) if verdict.included)
     tables = {name: table for name, (table, _) in _tables(scene, liquid).items()}
     return liquid.model_copy(update={"effects": taken, **tables})

@@ -567,15 +567,15 @@ def records(dtype: np.dtype[Any], count: int) -> Any:
 
 def new_reading() -> Any:
     """Return one ``READING``, shape (1,), with its version and size."""
-    return _versioned(READING)
+    return _new_record(READING)
 
 
 def new_command() -> Any:
     """Return one ``COMMAND``, shape (1,), with its version and size and zero force."""
-    return _versioned(COMMAND)
+    return _new_record(COMMAND)
 
 
-def _versioned(dtype: np.dtype[Any]) -> Any:
+def _new_record(dtype: np.dtype[Any]) -> Any:
     record = records(dtype, 1)
     record[0].version, record[0].size_bytes = CONTRACT_VERSION, dtype.itemsize
     return record

@@ -161,7 +161,7 @@ def circle(
     """Return three circles, then a stop (Rek 2024, Figs 3 and 4)."""
     moving_s = revolutions * 2 * math.pi * radius_m / speed_mps
     t_s = _times(moving_s + rest_s, rate_hz)
-    return _on_circle(t_s, np.minimum(t_s, moving_s) * speed_mps, (t_s < moving_s) * speed_mps, radius_m)
+    return _circular_motion(t_s, np.minimum(t_s, moving_s) * speed_mps, (t_s < moving_s) * speed_mps, radius_m)
 
 
 def reverse(
@@ -178,7 +178,7 @@ def reverse(
     t_s = _times(turn_s + against_s + rest_s, rate_hz)
     forth, back = np.minimum(t_s, turn_s), np.clip(t_s - turn_s, 0.0, against_s)
     sign = np.where(t_s < turn_s, 1.0, np.where(t_s < turn_s + against_s, -1.0, 0.0))
-    return _on_circle(t_s, (forth - back) * speed_mps, sign * speed_mps, radius_m)
+    return _circular_motion(t_s, (forth - back) * speed_mps, sign * speed_mps, radius_m)
 
 
 def line(rate_hz: float, *, speed_mps: float = _SPEED_MPS, moving_s: float = 6.0) -> Motion:
@@ -237,7 +237,7 @@ def _count(t_s: Floats, each_s: float, most: float) -> Floats:
     return np.minimum(over, most - 1)
 
 
-def _on_circle(t_s: Floats, arc_m: Floats, speed_mps: Floats, radius_m: float) -> Motion:
+def _circular_motion(t_s: Floats, arc_m: Floats, speed_mps: Floats, radius_m: float) -> Motion:
     """Return the motion around the vertical axis that has covered ``arc_m`` at each time."""
     cosine, sine = np.cos(arc_m / radius_m), np.sin(arc_m / radius_m)
     return _horizontal(t_s, x=radius_m * cosine, z=radius_m * sine, vx=-speed_mps * sine, vz=speed_mps * cosine)

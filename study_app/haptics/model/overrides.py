@@ -48,7 +48,7 @@ def override_all(scene: Scene, values: Mapping[str, object]) -> Scene:
     try:
         return Scene.model_validate(tree)
     except ValidationError as error:
-        named = ", ".join(f"{_shown(name)} = {_shown(value)}" for name, value in values.items())
+        named = ", ".join(f"{_shorten_value(name)} = {_shorten_value(value)}" for name, value in values.items())
         reasons = "; ".join(_reason(problem["loc"], problem["msg"]) for problem in error.errors())
         raise StudyError(f"cannot set {named}: {reasons}") from error
 
@@ -64,7 +64,7 @@ def value_of(scene: Scene, name: str) -> float:
     table, field = _places(_tables(_tree(scene)), name)[0]
     value = table[field]
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise StudyError(f"{_shown(name)} must be a number, not {_shown(value)}")
+        raise StudyError(f"{_shorten_value(name)} must be a number, not {_shorten_value(value)}")
     return float(value)
 
 
@@ -75,7 +75,7 @@ def number_names(scene: Scene) -> tuple[str, ...]:
     return tuple(sorted(numbers))
 
 
-def _shown(value: object) -> str:
+def _shorten_value(value: object) -> str:
     text = str(value)
     return text if len(text) <= _SHOWN else f"{text[:_SHOWN]}…"
 
@@ -124,7 +124,7 @@ def _places(tables: Tables, name: str) -> list[tuple[dict[str, Any], str]]:
     near = difflib.get_close_matches(field, known, n=1)
     meant = f"did you mean {near[0]!r}? " if near else ""
     raise StudyError(
-        f"this scene does not have the parameter {_shown(name)!r}: {meant}its parameters are {', '.join(known)}"
+        f"this scene does not have the parameter {_shorten_value(name)!r}: {meant}its parameters are {', '.join(known)}"
     )
 
 
@@ -144,6 +144,8 @@ def _parse_value(text: str, present: object, field: str) -> object:
             return tomllib.loads(f"table = {text}")["table"]
         except tomllib.TOMLDecodeError as error:
             example = f'{field}={{kind="uniform", velocity_mps=[1, 0, 0]}}'
-            raise StudyError(f"cannot read {field} = {_shown(text)}: write a table such as {example}") from error
+            raise StudyError(
+                f"cannot read {field} = {_shorten_value(text)}: write a table such as {example}"
+            ) from error
     several = isinstance(present, tuple) or field == "effects" or "," in text
     return tuple(text.split(",")) if several and text != "auto" else text

@@ -144,7 +144,7 @@ def pack(
     damping at the hand; by default those of the scene's rate and estimator at each delay. ``dynamics`` are
     those of the device, ``rules`` those of the version that computes the force.
     """
-    scene = _for_device(scene, dynamics)
+    scene = _adapt_to_device(scene, dynamics)
     rows = _rows_needed(scene)
     if capacity is not None:
         rows = _most_rows(MAX_LIQUIDS, max(_count_open_ended(rows), capacity), scene.rate_hz)
@@ -163,7 +163,7 @@ def pack(
             }
         ),
     )
-    by_delay = _by_delay(scene, dynamics, rules) if limits is None else (limits,) * (MOST_DELAY + 1)
+    by_delay = _limits_by_delay(scene, dynamics, rules) if limits is None else (limits,) * (MOST_DELAY + 1)
     _fill(model, scene, by_delay, dynamics, rules)
     return model
 
@@ -178,7 +178,7 @@ def pack_into(model: Model, scene: Scene, *, dynamics: Dynamics = UNKNOWN) -> No
     """
     if isinstance(scene.velocity, Given):
         raise StudyError('velocity "given" is only for motions from a file; a device needs an estimator such as "ewma"')
-    scene = _for_device(scene, dynamics)
+    scene = _adapt_to_device(scene, dynamics)
     if len(scene.liquids) > len(model.liquids):
         raise StudyError(
             f"the scene needs {len(scene.liquids)} liquids, but the model was packed for {len(model.liquids)}: pack it "
@@ -197,13 +197,13 @@ def pack_into(model: Model, scene: Scene, *, dynamics: Dynamics = UNKNOWN) -> No
                     f"the scene needs {rows[name]} {kind.noun}, but the model was packed for "
                     f"{len(getattr(model.rows, name))}: pack it with a larger capacity"
                 )
-    _fill(model, scene, _by_delay(scene, dynamics, CURRENT), dynamics, CURRENT)
+    _fill(model, scene, _limits_by_delay(scene, dynamics, CURRENT), dynamics, CURRENT)
 
 
 def adjust_into(model: Model, scene: Scene, *, dynamics: Dynamics = UNKNOWN, rules: ForceRules = CURRENT) -> None:
     """Write the parameters of a scene like the one in memory of `pack` (`is_built_alike`) into it; keep its state."""
-    scene = _for_device(scene, dynamics)
-    _fill_constants(model, scene, _by_delay(scene, dynamics, rules), dynamics, rules)
+    scene = _adapt_to_device(scene, dynamics)
+    _fill_constants(model, scene, _limits_by_delay(scene, dynamics, rules), dynamics, rules)
 
 
 def is_built_alike(scene: Scene, other: Scene) -> bool:
@@ -235,7 +235,7 @@ def _constants(scene: Scene) -> Model:
         forces_n=nothing,
         rows=nothing,
     )
-    _fill_constants(model, scene, _by_delay(scene, UNKNOWN, CURRENT), UNKNOWN, CURRENT)
+    _fill_constants(model, scene, _limits_by_delay(scene, UNKNOWN, CURRENT), UNKNOWN, CURRENT)
     return model
 
 
@@ -246,7 +246,7 @@ def _whole_numbers(rows: Any) -> list[int]:
     return [number for name in rows.dtype.names for number in _whole_numbers(rows[name])]
 
 
-def _for_device(scene: Scene, dynamics: Dynamics) -> Scene:
+def _adapt_to_device(scene: Scene, dynamics: Dynamics) -> Scene:
     """Return the scene with its effects chosen, and with a velocity estimator that the device permits.
 
     A device that measures its velocity replaces the scene's estimator; "kalman" is for devices that measure their
@@ -267,7 +267,7 @@ def takes_device_velocity(rate_hz: float, dynamics: Dynamics) -> bool:
     return dynamics.velocity_lag_s is not None and dynamics.velocity_lag_s * rate_hz <= MOST_LAG_TICKS
 
 
-def _by_delay(scene: Scene, dynamics: Dynamics, rules: ForceRules) -> Sequence[DampingLimits]:
+def _limits_by_delay(scene: Scene, dynamics: Dynamics, rules: ForceRules) -> Sequence[DampingLimits]:
     """Return the limits of the scene's rate, estimator and device at each delay, 0 to `MOST_DELAY` ticks."""
     period_s, kg = 1 / scene.rate_hz, dynamics.mass_kg
     return [handle_limits(period_s, delay, scene.velocity, kg, rules) for delay in range(MOST_DELAY + 1)]

@@ -71,10 +71,10 @@ class FlowCurve:
         turns = np.flatnonzero(np.diff(np.sign(np.diff(self.rate_per_s))))
         if len(turns) != 1:
             return None
-        ways = [self._sorted(slice(turns[0] + 2)), self._sorted(slice(turns[0] + 1, None))]
+        ways = [self._sort_by_rate(slice(turns[0] + 2)), self._sort_by_rate(slice(turns[0] + 1, None))]
         return Branches(description="the stresses at rising and falling shear rates", first=ways[0], second=ways[1])
 
-    def _sorted(self, rows: slice) -> tuple[Floats, Floats]:
+    def _sort_by_rate(self, rows: slice) -> tuple[Floats, Floats]:
         order = np.argsort(self.rate_per_s[rows])
         return self.rate_per_s[rows][order], self.stress_pa[rows][order]
 

@@ -217,16 +217,16 @@ class ForceProblem(Problem):
         """Return the force (n, 3) at the measured times, interpolated between integer lengths."""
         values = self.values(z)
         if self.length is None:
-            return self._simulated(values)
+            return self._simulate_force(values)
         below, above, share = self._neighbours(values, self.length)
-        force_n = self._simulated(below)
-        return force_n if share == 0 else (1 - share) * force_n + share * self._simulated(above)
+        force_n = self._simulate_force(below)
+        return force_n if share == 0 else (1 - share) * force_n + share * self._simulate_force(above)
 
     def misfit(self, z: Floats) -> Floats:
         misfit: Floats = (self.force_n(z) - self.measured.force_n)[:, self.axes].ravel()
         return misfit
 
-    def _simulated(self, values: Sequence[float]) -> Floats:
+    def _simulate_force(self, values: Sequence[float]) -> Floats:
         table = simulate(replace_values(self._scene, self._liquid_id, self.parameters, values), self._motion)
         columns = (table.fx_n, table.fy_n, table.fz_n)
         if self._motion is self.measured.motion:

@@ -295,8 +295,8 @@ def _check_parts(parts: Draft) -> Iterator[Fault]:
 def force_n(scene: Scene, stroke: Stroke) -> float:
     """Return an upper estimate of a scene's force in a stroke [N]: the sum of its strongest liquid's effects."""
     motion = MotionBox(
-        speed_mps=_clamped(scene.scale * stroke.speed_mps),
-        acceleration_mps2=_clamped(scene.scale * stroke.acceleration_mps2),
+        speed_mps=_clamp_value(scene.scale * stroke.speed_mps),
+        acceleration_mps2=_clamp_value(scene.scale * stroke.acceleration_mps2),
         depth_m=scene.motion.depth_m,
     )
     moved = scene.model_copy(update={"motion": motion})
@@ -307,7 +307,7 @@ def force_n(scene: Scene, stroke: Stroke) -> float:
     return min(strongest_n, scene.force_limit_n)
 
 
-def _clamped(value: float) -> float:
+def _clamp_value(value: float) -> float:
     return min(max(value, 1e-3), 1000.0)
 
 

@@ -78,7 +78,7 @@ def _check_estimator_lag(protocol: Protocol) -> Iterator[Fault]:
         if not isinstance(task, Follow) or "linear" not in laws:
             continue
         if (share := passed_share(velocity, rate_hz, task.frequency_hz)) < _LEAST_SHARE:
-            most_hz = _rounded_down(fastest_hz(velocity, rate_hz, _LEAST_SHARE), 1)
+            most_hz = _round_down(fastest_hz(velocity, rate_hz, _LEAST_SHARE), 1)
             yield Fault(
                 ("tasks", name, "frequency_hz"),
                 f"at {task.frequency_hz:g} Hz the velocity estimator passes only {100 * share:.1f} % of a damper's "
@@ -108,7 +108,7 @@ def slope_limit_fault(protocol: Protocol, blocks: Sequence[Block], delay_ticks: 
         return None
     if stimulus.vary in OF_LINK:
         subject = f'"{protocol.condition_of(stimulus)}" produces'
-        hint = f"damping_nspm = {_rounded_down(limit_nspm, 1):g}"
+        hint = f"damping_nspm = {_round_down(limit_nspm, 1):g}"
     else:
         every = list(_levels_at_strongest_force(protocol, blocks))
         subject = _levels_with_verb(every, [level for level in every if level.damping_nspm > limit_nspm])
@@ -208,12 +208,12 @@ def _check_clipping_at_pace(protocol: Protocol, block: Block, scene: Scene, what
         place,
         f"{what} {drag_n:.1f} N at {FASTER:g} times the paced speed of {pace_mps:.3g} m/s, but device.force_limit_n "
         f"is {scene.force_limit_n:g}",
-        f"amplitude_mm = {_rounded_down(least * task.amplitude_mm, 1):g} or "
-        f"frequency_hz = {_rounded_down(least * task.frequency_hz, 2):g}",
+        f"amplitude_mm = {_round_down(least * task.amplitude_mm, 1):g} or "
+        f"frequency_hz = {_round_down(least * task.frequency_hz, 2):g}",
     )
 
 
-def _rounded_down(value: float, digits: int) -> float:
+def _round_down(value: float, digits: int) -> float:
     """Return a value rounded down, with a margin for rounding errors of the value itself."""
     step = math.pow(10, digits)
     return math.floor(value * step + 1e-6) / step
@@ -229,15 +229,15 @@ def _slope_limit(scene: Scene, delay_ticks: int) -> tuple[float, str]:
 def _remedy(stimulus: Stimulus, standard: float | None, level: float, limit_nspm: float) -> str:
     """Return the remedy that keeps a damping within its limit."""
     if standard is None or stimulus.level_kind == "value":
-        return f"choose levels up to {_rounded_down(limit_nspm, 1):g}"
+        return f"choose levels up to {_round_down(limit_nspm, 1):g}"
     if standard >= limit_nspm:
         return f"choose a standard below {limit_nspm:g}"
     if stimulus.level_kind == "weber":
         most_level, most_standard = limit_nspm / standard - 1, limit_nspm / (1 + level)
     else:
         most_level, most_standard = limit_nspm - standard, limit_nspm - level
-    lower = f"a standard up to {_rounded_down(most_standard, 1):g}"
-    return f"choose levels up to {_rounded_down(most_level, 3):g}, or {lower}"
+    lower = f"a standard up to {_round_down(most_standard, 1):g}"
+    return f"choose levels up to {_round_down(most_level, 3):g}, or {lower}"
 
 
 def _highest_unclipped_level(protocol: Protocol, block: Block, standard: float | None) -> str:
@@ -246,7 +246,7 @@ def _highest_unclipped_level(protocol: Protocol, block: Block, standard: float |
     if limits is None or not limits.lowest:
         return ""
     highest = stimulus.level_between(standard, limits.lowest)
-    return f"choose levels up to {_rounded_down(highest, 3):g}" if highest >= stimulus.levels[0] else ""
+    return f"choose levels up to {_round_down(highest, 3):g}" if highest >= stimulus.levels[0] else ""
 
 
 def _levels_with_verb(every: Sequence[Level], some: Sequence[Level]) -> str:

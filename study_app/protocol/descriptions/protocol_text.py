@@ -66,13 +66,13 @@ def describe(protocol: Protocol, delay_ticks: int = ASSUMED_TICKS, without_force
             for variant in variants(protocol)
         ),
         *(_block_lines(protocol, block, language, delay_ticks) for block in protocol.blocks_in_order),
-        _titled("Liquids", _liquid_rows(protocol)),
+        _add_title("Liquids", _liquid_rows(protocol)),
         ("Effects in each liquid", *(f"  {line}".rstrip() for line in effects[:-1])),
-        _titled("Conditions", conditions),
+        _add_title("Conditions", conditions),
         *(_question_lines(protocol, name, language) for name in protocol.questionnaires),
-        _titled("Decisions about the analysis", decided),
-        *([] if people is None else [_titled("Simulated participants", [("Answers", people.described())])]),
-        _titled("Limits for a valid trial", limit_rows(protocol)),
+        _add_title("Decisions about the analysis", decided),
+        *([] if people is None else [_add_title("Simulated participants", [("Answers", people.described())])]),
+        _add_title("Limits for a valid trial", limit_rows(protocol)),
         *([("Warnings", *warned)] if warned else []),
     )
     return "\n\n".join("\n".join(section) for section in sections)
@@ -89,19 +89,19 @@ def describe_scenes(scenes: Mapping[str, Scene]) -> str:
         ("Ball", f"{ball_mm:g} mm in the scene ({ball_mm / scene.scale:.3g} mm in the hand frame)"),
     ]
     effects = ("\n".join(f"  {line}".rstrip() for line in describe_gate(it)) for it in scenes.values())
-    head = ("Liquids that are not part of a study", *_aligned(rows))
+    head = ("Liquids that are not part of a study", *_align_columns(rows))
     return "\n\n".join(("\n".join(head), "Effects in each liquid", *effects))
 
 
-def _aligned(rows: Sequence[Sequence[str]]) -> Iterator[str]:
+def _align_columns(rows: Sequence[Sequence[str]]) -> Iterator[str]:
     """Yield rows as lines with aligned columns."""
     widths = [max(len(cell) for cell in column) for column in zip(*rows, strict=True)]
     for row in rows:
         yield "  " + "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
 
 
-def _titled(title: str, rows: Sequence[Sequence[str]]) -> Iterable[str]:
-    return (title, *_aligned(rows))
+def _add_title(title: str, rows: Sequence[Sequence[str]]) -> Iterable[str]:
+    return (title, *_align_columns(rows))
 
 
 def _head_lines(protocol: Protocol, language: str) -> Iterable[str]:
@@ -124,7 +124,7 @@ def _head_lines(protocol: Protocol, language: str) -> Iterable[str]:
         ("Tank", f"{sizes} mm in the hand frame, {scene.scale:g} times as large in the scene"),
         ("Ball", f"{ball_mm:g} mm in the scene ({ball_mm / scene.scale:.3g} mm in the hand frame)"),
     ]
-    return (f"{protocol.text(study.title, language)} ({study.name}, version {study.version})", *_aligned(rows))
+    return (f"{protocol.text(study.title, language)} ({study.name}, version {study.version})", *_align_columns(rows))
 
 
 def number_range(numbers: Sequence[float], digits: str = "") -> str:
@@ -153,9 +153,9 @@ def _session_lines(variant: Variant, planned: int | None, language: str) -> Iter
             description = f"{protocol.text(block.title, language)}: {trials}"
         rows.append((f"{number:>2}", kind, description))
     if len(protocol.main_blocks) < 2:
-        return _titled(title, rows)
+        return _add_title(title, rows)
     order = block_order_words(protocol, planned, in_group=variant.group is not None)
-    return (*_titled(title, rows), f"  Block order: {order}")
+    return (*_add_title(title, rows), f"  Block order: {order}")
 
 
 def _block_lines(protocol: Protocol, block: Block, language: str, delay_ticks: int) -> Iterable[str]:
@@ -183,7 +183,7 @@ def _block_lines(protocol: Protocol, block: Block, language: str, delay_ticks: i
         noun = "statement" if len(questionnaire.statements) == len(questionnaire.items) else "question"
         asked = counted(len(questionnaire.items), noun)
         rows.append(("Questions", f"{asked} (questionnaire {block.questionnaire}), {order}"))
-    return _titled(f"{part}{protocol.text(block.title, language)} (block {block.id}, {block.phase})", rows)
+    return _add_title(f"{part}{protocol.text(block.title, language)} (block {block.id}, {block.phase})", rows)
 
 
 def _design_rows(protocol: Protocol, block: Block, delay_ticks: int) -> Iterator[tuple[str, str]]:
@@ -336,7 +336,7 @@ def _question_lines(protocol: Protocol, name: str, language: str) -> Iterable[st
     if questionnaire.instrument is not None:
         standard = Instrument(questionnaire.instrument).table
         more += [f"  Source: {standard['source']}", f"  Compared: {standard['compared']}"]
-    return (title, *_aligned(rows), *more)
+    return (title, *_align_columns(rows), *more)
 
 
 def _question_kind(item: Question, context: Context) -> str:

@@ -44,18 +44,18 @@ def with_omitted_keys(document: Mapping[str, Any]) -> dict[str, Any]:
         completed["study"] = {"version": "1", "languages": ("en",), **head}
         if isinstance(head.get("name"), str):
             completed["study"].setdefault("title", dict.fromkeys(_languages(completed), head["name"]))
-    completed["device"] = _with_defaults(completed.get("device", {}), workspace_mm=_WORKSPACE_MM)
+    completed["device"] = _add_defaults(completed.get("device", {}), workspace_mm=_WORKSPACE_MM)
     if any(
         "stimulus" in block or "design" in block
         for _, block in entries(completed, "blocks.*")
         if isinstance(block, Mapping)
     ):
-        completed["limits"] = _with_defaults(completed.get("limits", {}), **_LEVEL_LIMITS)
+        completed["limits"] = _add_defaults(completed.get("limits", {}), **_LEVEL_LIMITS)
     completed = with_scene_defaults(completed)
     if isinstance(liquids := completed.get("liquids", {}), dict):
         completed.setdefault("conditions", {name: {"liquid": name} for name in liquids})
     if isinstance(blocks := completed.get("blocks", {}), dict) and blocks:
-        completed["blocks"] = _with_block_defaults(blocks, names(completed, "tasks"), _languages(completed))
+        completed["blocks"] = _add_block_defaults(blocks, names(completed, "tasks"), _languages(completed))
         own = {"sequence", "sequences"}  # if each group has one, the study needs none
         groups = [isinstance(group, Mapping) and group.keys() & own for _, group in entries(completed, "groups.*")]
         if "sequences" not in completed and not (groups and all(groups)):
@@ -66,9 +66,9 @@ def with_omitted_keys(document: Mapping[str, Any]) -> dict[str, Any]:
 def with_scene_defaults(document: Mapping[str, Any]) -> dict[str, Any]:
     """Return a study's or scene's document with the omitted estimator and densities of dampers."""
     completed = dict(document)
-    completed["scene"] = _with_defaults(completed.get("scene", {}), velocity={"kind": ESTIMATOR})
+    completed["scene"] = _add_defaults(completed.get("scene", {}), velocity={"kind": ESTIMATOR})
     if isinstance(liquids := completed.get("liquids"), dict):
-        completed["liquids"] = {name: _with_density(table) for name, table in liquids.items()}
+        completed["liquids"] = {name: _add_density(table) for name, table in liquids.items()}
     return completed
 
 
@@ -92,7 +92,7 @@ def relax_schema(schema: dict[str, Any]) -> None:
     questions["then"] = {"required": questions.pop("required")}
 
 
-def _with_defaults(table: Any, **defaults: Any) -> Any:
+def _add_defaults(table: Any, **defaults: Any) -> Any:
     return {**defaults, **table} if isinstance(table, dict) else table
 
 
@@ -100,16 +100,16 @@ def _languages(document: Mapping[str, Any]) -> tuple[str, ...]:
     return tuple(name for _, name in entries(document, "study.languages.*") if isinstance(name, str)) or ("en",)
 
 
-def _with_density(liquid: Any) -> Any:
+def _add_density(liquid: Any) -> Any:
     """Add a density, which has no effect, to a liquid that is only a linear damper."""
     if not isinstance(liquid, dict):
         return liquid
     drag = liquid.get("drag")
     damper = isinstance(drag, Mapping) and drag.get("law") == "linear" and liquid.get("effects", ("drag",)) == ("drag",)
-    return _with_defaults(liquid, density_kg_m3=_DENSITY_KG_M3) if damper else liquid
+    return _add_defaults(liquid, density_kg_m3=_DENSITY_KG_M3) if damper else liquid
 
 
-def _with_block_defaults(
+def _add_block_defaults(
     blocks: Mapping[str, Any], tasks: tuple[str, ...], languages: tuple[str, ...]
 ) -> dict[str, Any]:
     """Return the blocks with default titles and trial labels, and with parts and code letters for main blocks."""

@@ -128,13 +128,13 @@ def build_schedule(protocol: Protocol | Orders, participant: str, seed: int, pla
         if isinstance(step, FormOrder):
             times[step.id] += 1
             again = "" if times[step.id] == 1 else f"/{times[step.id]}"
-            items = _shuffled(step, seed, f"{participant}/form/{step.id}{again}")
+            items = _shuffle_questions(step, seed, f"{participant}/form/{step.id}{again}")
             steps.append(FormStep(step.id, items, after, times[step.id]))
             continue
         after = step.id
         codes = codes_of(orders.study, step, participant, seed, place)
         for index, code in enumerate(codes, start=1):
-            items = _shuffled(step, seed, f"{participant}/{step.id}/{index}")
+            items = _shuffle_questions(step, seed, f"{participant}/{step.id}/{index}")
             steps.append(
                 Trial(
                     number=number,
@@ -204,7 +204,7 @@ def codes_of(study: str, block: BlockOrder, participant: str, seed: int, place: 
             return tuple(codes[number] for number in row(square, len(codes), taken, times))
 
 
-def _shuffled(step: BlockOrder | FormOrder, seed: int, name: str) -> tuple[str, ...]:
+def _shuffle_questions(step: BlockOrder | FormOrder, seed: int, name: str) -> tuple[str, ...]:
     """Return the ids of the questions in the order of presentation."""
     return step.items if step.item_order == "fixed" else shuffle(step.items, stream(seed, f"items/{name}").random)
 

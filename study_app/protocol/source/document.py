@@ -125,7 +125,7 @@ class _Scan:
             self._skip_mark("[")
         keys, parts = self._read_key()
         self._skip_mark("]]" if many else "]")
-        path = self._within_arrays(keys)
+        path = self._resolve_array_tables(keys)
         if many:
             index = self._array_tables.get(path, 0)
             self._array_tables[path] = index + 1
@@ -142,7 +142,7 @@ class _Scan:
         )
         return path
 
-    def _within_arrays(self, keys: Path) -> Path:
+    def _resolve_array_tables(self, keys: Path) -> Path:
         """Return the path that a header names; an array of tables on the way means its latest entry."""
         path: Path = ()
         for key in keys[:-1]:

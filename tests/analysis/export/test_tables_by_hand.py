@@ -252,7 +252,7 @@ def test_missing_answers_have_the_code_of_their_reason() -> None:
             "excluded": [False, True, False, True, False],
         }
     )
-    coded = spss._with_codes(pd.Series([4, None, None, None, None], dtype="Float64"), people, rows)
+    coded = spss._code_missing_answers(pd.Series([4, None, None, None, None], dtype="Float64"), people, rows)
     labels = spss._levels({4: "four"}, "unsure")
     assert [labels[int(value)] for value in coded] == ["four", "unsure", "Excluded", "No answer", "No answer"]
     assert spss._levels({}, "")[int(coded[1])] == "Cannot judge"

@@ -7,7 +7,7 @@ from click.testing import CliRunner
 
 from study_app.analysis.planning.preregistration import (
     FILE,
-    _of_intervals,
+    _interval_lines,
     commitment,
     preregistration,
     read_commitment,
@@ -78,7 +78,7 @@ def test_a_study_of_thresholds_states_levels_sample_size_and_catch_rule() -> Non
 )
 def test_the_exponent_is_asked_for_with_two_standards_or_more(standards: str, at: str) -> None:
     protocol = study(("standards = [1, 2]", f"standards = {standards}"))
-    asked = list(_of_intervals(protocol, protocol.blocks["viscosity"]))
+    asked = list(_interval_lines(protocol, protocol.blocks["viscosity"]))
     assert asked[0].startswith(f"Block “Viscosity”: what is the Weber fraction for viscosity at {at}? ")
     assert ["proportional to the standard" in question for question in asked[1:]] == [True] * (at != "1 Pa·s")
 

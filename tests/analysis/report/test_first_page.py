@@ -193,7 +193,7 @@ _OF_DELAYS = (("“oil”", "60 ms of visual delay", ""), ("“oil”", "no visu
 def test_a_comparison_says_what_sets_its_sides_apart_unless_their_names_do(
     names: tuple[str, str], presented: tuple[tuple[str, ...], ...], added: list[str]
 ) -> None:
-    assert pages._told_apart(names, presented) == added
+    assert pages._distinguish_names(names, presented) == added
 
 
 @pytest.mark.parametrize(

@@ -102,9 +102,11 @@ def delivered() -> Iterator[str]:
         ("b", None, None, 14, 13, 7, 5, -0.5, 2.26, None), ("b", "D2", 0.0, 5, 5, 5, 4, 0.5, 1.0, 2.0),
     ]  # fmt: skip
     found = results(shown, delivered=[Delivered(**dict(zip(fields, row, strict=True))) for row in rows])
-    yield text_of(sections._delivered(shown, found))
-    yield text_of(sections._delivered(replace(shown, settings={}), found)).rpartition("Trials that exceed")[2]
-    yield text_of(sections._delivered(replace(shown, settings={}), found)).partition("Delay error is")[0]
+    yield text_of(sections._delivered_delay_lines(shown, found))
+    yield text_of(sections._delivered_delay_lines(replace(shown, settings={}), found)).rpartition("Trials that exceed")[
+        2
+    ]
+    yield text_of(sections._delivered_delay_lines(replace(shown, settings={}), found)).partition("Delay error is")[0]
     yield "; ".join(sections._limit(what, 7.0) for what in ("frame_gap_ms", "hz", "withheld_percent"))
     yield "; ".join(sections._signed_ms(value) for value in (None, 0.0, 1.5, -1.5))
     yield from methods._delays(shown, found)
@@ -219,7 +221,7 @@ def limits() -> Iterator[str]:
         flags = {name: changes.pop(name, False) for name in ("simulated", "pilot")}
         shown = replace(shown, participants=shown.participants.assign(**flags, protocol_hash="h"), **changes)
         yield f"-- {case}"
-        yield from (line[:90] for line in sections._in_general(shown, replace_decided(shown, decided)))
+        yield from (line[:90] for line in sections._general_sentences(shown, replace_decided(shown, decided)))
 
 
 def replace_decided(shown: Study, decided: Any) -> Any:

@@ -186,9 +186,11 @@ def test_reaches_overshoot_and_paths_are_those_of_a_drawn_line() -> None:
     assert motion._overshoot_m(way, targets, 1) == pytest.approx(0.03)
     assert motion.path_length_m(way) == pytest.approx(0.19)
     row: dict[str, Any] = {"recording": "r", "duration_s": 2.0, "participant": "P1", "session": 1}
-    said = [motion._why_not(Path("nowhere"), {**row, name: None}) for name in ("recording", "duration_s")]
+    said = [
+        motion._explain_missing_recording(Path("nowhere"), {**row, name: None}) for name in ("recording", "duration_s")
+    ]
     assert said == ["no recording was stored", "the trial's duration was not recorded"]
-    assert motion._why_not(Path("nowhere"), row) == "the recording is missing from the folder"
+    assert motion._explain_missing_recording(Path("nowhere"), row) == "the recording is missing from the folder"
     rows = pd.DataFrame(
         [("D1", "P1", 1.0), ("D1", "P1", 3.0), ("D1", "P2", 8.0), ("D2", "P1", None)],
         columns=["code", "participant", "path_mm"],

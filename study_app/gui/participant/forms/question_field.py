@@ -115,9 +115,9 @@ class _QuestionWords(QWidget):
         ):
             painter.setFont(face)
             painter.setPen(QColor(colour))
-            painter.drawText(self._placed(place), self._flags, text)
+            painter.drawText(self._mirror_place(place), self._flags, text)
         if self.missing:
-            room = self._placed(
+            room = self._mirror_place(
                 QRect(left, note_top + (note_high - round(self._sign)) // 2, self._note_left, note_high)
             )
             mirrored = self.layoutDirection() == Qt.LayoutDirection.RightToLeft
@@ -134,7 +134,7 @@ class _QuestionWords(QWidget):
         """The left edge of the note, after the number's column [px]."""
         return round(self._sign + self._sign_gap) if self.missing else 0
 
-    def _placed(self, place: QRect) -> QRectF:
+    def _mirror_place(self, place: QRect) -> QRectF:
         return QRectF(QStyle.visualRect(self.layoutDirection(), self.rect(), place))
 
     def _bounds(self, face: QFont, text: str, width: int) -> QRect:

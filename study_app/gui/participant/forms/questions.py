@@ -411,7 +411,7 @@ class _Line(QSlider):
     def paintEvent(self, _event: QPaintEvent) -> None:
         painter = page_painter(self)
         theme, scale = PARTICIPANT, self._scale
-        left, right, middle = self._left(), self.width() - self._left(), self.height() / 2
+        left, right, middle = self._left_edge(), self.width() - self._left_edge(), self.height() / 2
         painter.setPen(QPen(QColor(theme.ctl), 1.5))
         for x in (left, right):
             painter.drawLine(QPointF(x, middle - _KNOB * scale), QPointF(x, middle + _KNOB * scale))
@@ -426,12 +426,12 @@ class _Line(QSlider):
             painter.drawEllipse(QPointF(x, middle), _KNOB * scale, _KNOB * scale)
         painter.end()
 
-    def _left(self) -> float:
+    def _left_edge(self) -> float:
         return (_KNOB + 3) * self._scale
 
     def _drag(self, x: float) -> None:
-        width = max(1.0, self.width() - 2 * self._left())
-        share = min(1.0, max(0.0, (x - self._left()) / width))
+        width = max(1.0, self.width() - 2 * self._left_edge())
+        share = min(1.0, max(0.0, (x - self._left_edge()) / width))
         self.touched = True
         self.setValue(round(share * self.maximum()))
         self.update()

@@ -97,7 +97,7 @@ class _Foot(QWidget):
         """Draw the count of answers up to ``end``; return its start [px]."""
         before, after = round(14 * self._scale), round(4 * self._scale)
         width = before + self._width(self._tabular, self._count) + after
-        place = self._placed(end - width, width).adjusted(before, 0, -after, 0)
+        place = self._place_in_line(end - width, width).adjusted(before, 0, -after, 0)
         self._write(painter, place, self._count, self._tabular, PARTICIPANT.text2)
         return end - width
 
@@ -113,9 +113,9 @@ class _Foot(QWidget):
         if not self._answer_keys or sum(caps) + sum(widths) + 6 * gap > room:
             return end + gap
         for (key, text), cap, width in zip(hints, caps, widths, strict=True):
-            self._write(painter, self._placed(end - width, width), text, self._small, PARTICIPANT.text2)
+            self._write(painter, self._place_in_line(end - width, width), text, self._small, PARTICIPANT.text2)
             end -= width + gap
-            draw_key(painter, self._placed(end - cap, cap).left() + 1, middle, key, self._scale)
+            draw_key(painter, self._place_in_line(end - cap, cap).left() + 1, middle, key, self._scale)
             end -= cap + gap
         return end + gap
 
@@ -123,12 +123,12 @@ class _Foot(QWidget):
         """Draw the message up to ``end``; ``kept`` adds a line that no answer is lost."""
         side = round(_MARK * self._scale)
         left = self._row.contentsRect().left() + side + round(_GAP * self._scale)
-        sign = self._placed(self._row.contentsRect().left(), side)
+        sign = self._place_in_line(self._row.contentsRect().left(), side)
         top = sign.top() + (sign.height() - side) // 2
         size = _MARK * self._scale
         x = sign.right() + 1 - size if self.layoutDirection() == Qt.LayoutDirection.RightToLeft else sign.left()
         draw_icon(painter, "warning", QRectF(x, top, size, size), PARTICIPANT.warn)
-        place = self._placed(left, end - left)
+        place = self._place_in_line(left, end - left)
         high = self._bounds(self._strong, self._message, end - left).height()
         low = self._bounds(self._small, self._words.answers_kept, end - left).height() if kept else 0
         place.setTop(place.top() + (place.height() - high - low + 1) // 2)
@@ -145,7 +145,7 @@ class _Foot(QWidget):
         flags = int(line_start(self) | Qt.AlignmentFlag.AlignVCenter) | _WRAPPED
         painter.drawText(QRectF(place), flags, text)
 
-    def _placed(self, left: int, width: int) -> QRect:
+    def _place_in_line(self, left: int, width: int) -> QRect:
         """Return a rectangle as high as the foot, at a distance from the start of the line [px]."""
         line = self._row.contentsRect()
         return QStyle.visualRect(self.layoutDirection(), line, QRect(left, line.top(), width, line.height()))

@@ -45,7 +45,7 @@ def brightness() -> NDArray[np.float32]:
         shift_x += along_x * slope
         shift_z += along_z * slope
     landed = _count_rays(x + shift_x, z + shift_z)
-    soft = _blurred(_blurred(_blurred(landed)))
+    soft = _blur_image(_blur_image(_blur_image(landed)))
     above = np.clip(soft - 0.85, 0, None)
     light: NDArray[np.float32] = np.clip(above / 2.6, 0, 1).astype(np.float32)
     return light
@@ -67,7 +67,7 @@ def _count_rays(x: NDArray[np.float32], z: NDArray[np.float32]) -> NDArray[np.fl
     return counts.reshape(ROWS, COLUMNS) / _RAYS**2
 
 
-def _blurred(image: NDArray[np.float64], radius: int = 1) -> NDArray[np.float64]:
+def _blur_image(image: NDArray[np.float64], radius: int = 1) -> NDArray[np.float64]:
     """Return the image after a box filter of 2 radius + 1 cells in both directions, edges repeated."""
     width = 2 * radius + 1
     for axis in (0, 1):

@@ -60,7 +60,7 @@ def _paint_backdrop(size: tuple[int, int], ratio: float, box: Box, camera: Camer
     glass.paint_surface(painter, box, camera)
     glass.paint_near_lines(painter, box, camera)
     painter.end()
-    return Backdrop(_dithered(back), front, front_at)
+    return Backdrop(_dither_image(back), front, front_at)
 
 
 def _blank_image(size: QSizeF, ratio: float, kind: QImage.Format) -> QImage:
@@ -102,7 +102,7 @@ def _paint_room(painter: QPainter, area: QRectF, box: Box, camera: Camera) -> No
     glass.fill_shape(painter, mirror, glass.shade(fade, (0, "#2F6079", 86), (0.35, "#254C61", 36), (1, "#1A3445", 0)))
 
 
-def _dithered(image: QImage) -> QImage:
+def _dither_image(image: QImage) -> QImage:
     """Return a 16-bit image with 8 bits per channel, dithered by one step, so that gradients stay smooth."""
     width, height, ratio = image.width(), image.height(), image.devicePixelRatio()
     deep = np.frombuffer(image.constBits(), np.uint16).reshape(height, width, 4)
