@@ -289,7 +289,7 @@ def merge(sites: dict[str, Path], to: Path) -> None:
         click.echo(f"{new}  site {site.name}: {counted(site.sessions, 'session')}, key {site.key_hash[:12]}")
     for name, folder in sites.items():
         for session in damaged_sessions(folder):
-            warning = f"warning: site {name}: the journal of {session} is damaged, so its results may be incomplete"
+            warning = f"warning: the journal of {session} (site {name}) is damaged, so its results may be incomplete"
             click.echo(f"{warning}; the verify command describes the damage", err=True)
     click.echo(f"study {made.study}, protocol {made.protocol_hash[:12]}: {to}")
 

@@ -67,7 +67,7 @@ def test_sites_are_merged_and_those_that_were_there_are_kept(labs: Path) -> None
         file.write(b"damage\n")
     warnings = run("merge", "A=A", "C=C", "--to", labs / "others")[1]
     assert warnings == [
-        f"warning: site C: the journal of {damaged.path} is damaged, so its results may be incomplete; the verify "
+        f"warning: the journal of {damaged.path} (site C) is damaged, so its results may be incomplete; the verify "
         "command describes the damage"
     ]
     sites = json.loads((pooled / "sites.json").read_bytes())["sites"]
