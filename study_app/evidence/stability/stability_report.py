@@ -40,6 +40,7 @@ from study_app.evidence.table import Evidence, Table, plot_files, run
 from study_app.haptics.model.layout import LIMITER_NAMES
 from study_app.haptics.model.scene import Ewma
 from study_app.haptics.model.slope_limits import slope_limit, slope_limit_table
+from study_app.number_text import counted
 from study_app.store.files import csv_text_of
 
 _HEIGHT_PT: Final = 256.0
@@ -353,7 +354,7 @@ def _grade_line(swept: Swept) -> str:
     """Return the numbers of unstable and noisy cases with safety on, and the greatest force of the noisy ones."""
     unstable, noisy = swept.of_grade(UNSTABLE), swept.of_grade(NOISY)
     judged = sum(len(group.verdicts) for group in swept.groups)
-    line = f"{judged} {'case' if judged == 1 else 'cases'} with safety on: {len(unstable)} unstable, {len(noisy)} noisy"
+    line = f"{counted(judged, 'case')} with safety on: {len(unstable)} unstable, {len(noisy)} noisy"
     if not noisy:
         return line
     force_n = max(verdict.fast_n for verdict in noisy)
