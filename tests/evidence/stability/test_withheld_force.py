@@ -31,7 +31,9 @@ def test_slow_strokes_lose_nothing_and_shares_lie_between_0_and_1():
 @compiled
 def test_a_second_after_the_hand_was_shaken_the_whole_force_arrives():
     """Under the rules before, up to 28 and 56 % are still withheld with `ewma`."""
-    found = [one for one in measure_withheld_force(["light_oil", "physical_honey"]) if one.mode == SHAKEN]
-    assert len(found) == 4
-    assert max(one.after[QUICK.index(SHOWN_SHAKE)][0] for one in found) > 0.1
-    assert all(one.lasting < MOST_AFTER for one in found)
+    liquids = measure_withheld_force(["light_oil", "physical_honey"])
+    shaken = [liquid for liquid in liquids if liquid.mode == SHAKEN]
+    assert len(shaken) == 4
+    assert max(liquid.after[QUICK.index(SHOWN_SHAKE)][0] for liquid in shaken) > 0.1
+    assert all(liquid.lasting < MOST_AFTER for liquid in shaken)
+    assert all(liquid.met for liquid in liquids)
