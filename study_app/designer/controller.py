@@ -257,7 +257,7 @@ class DesignerController(QObject):
         self.place.form.head.refuse(why)
 
     def _show_step(self, step: Step) -> None:
-        if step.fresh or step.said or step.removed:
+        if step.fresh or step.announcement or step.removed:
             self.show_outline()
         self.place.show_step(step)
 

@@ -1,4 +1,4 @@
-"""The open study as an object of Qt: its steps are made here, and say what changed."""
+"""The open study as a Qt object, which makes its steps and emits signals about changes."""
 
 import time
 from pathlib import Path
@@ -19,8 +19,8 @@ from study_app.designer.document.steps import (
     Recorded,
     RenameElement,
     Request,
-    Situation,
     Step,
+    StepContext,
     with_path,
 )
 from study_app.designer.document.study import Entry, Study, is_within
@@ -32,9 +32,9 @@ from study_app.protocol.source import Path as Place
 class Editing(QObject):
     """The open study; all changes to it and to the selection are made here.
 
-    ``opened_other`` is emitted when another study is opened or the study is closed, ``changed`` after each step of the
-    study or the selection, ``edited`` after each step of the study only; ``refused`` carries the path of a rejected
-    request, the reason, and the request; ``made`` carries the `Step` of a request, after ``edited``.
+    ``opened_other`` is emitted when another study is opened or the study is closed, ``changed`` when the study or the
+    selection changes, ``edited`` when the study changes; ``refused`` carries the path of a rejected request, the
+    reason, and the request; ``made`` carries the `Step` of a request, after ``edited``.
     """
 
     opened_other = Signal()
@@ -73,14 +73,14 @@ class Editing(QObject):
         opened = self.opened
         if opened is None or (opened.selected == path and path != STUDY_LANGUAGES):
             return
-        before = opened.selected
+        previous = opened.selected
         self.suggest_id()
         if path == STUDY_LANGUAGES:
             opened.to_write = texts_to_write(opened.study)
-        if not back and before != path:
+        if not back and previous != path:
             self._back.append(opened.selected)
         opened.end_step()
-        opened.selected = with_path(path, before, opened.selected)
+        opened.selected = with_path(path, previous, opened.selected)
         self._keep_selection()
         if not self.leave_entries(opened.selected):
             self.changed.emit()
@@ -93,40 +93,43 @@ class Editing(QObject):
         if (opened := self.opened) is not None:
             opened.selected = existing_path(opened.study.document, opened.selected)
 
-    def handle_request(self, asked: Request) -> None:
-        """Carry out a step that a view requests; emit ``refused`` with the reason if it is not possible."""
+    def handle_request(self, request: Request) -> None:
+        """Apply the step of a request; emit ``refused`` with the reason if it is not possible."""
         opened = self.writable
         if opened is None:
             return
-        if isinstance(asked, LeaveText):
+        if isinstance(request, LeaveText):
             self.suggest_id()
             return
         study, selected = opened.study, opened.selected
         try:
-            step = asked.step(Situation(study, selected, self.recorded))
-            opened.edit(step.words, *step.edits, text=step.text, select=step.select, key=step.continues)
+            step = request.step(StepContext(study, selected, self.recorded))
+            opened.edit(step.title, *step.edits, text=step.text, select=step.select, key=step.continues)
         except Refused as refusal:
-            path = getattr(asked, "path", opened.selected)
-            self.refused.emit(path, f"{str(refusal)[:1].upper()}{str(refusal)[1:]}.", asked)
+            path = getattr(request, "path", opened.selected)
+            self.refused.emit(path, f"{str(refusal)[:1].upper()}{str(refusal)[1:]}.", request)
             return
-        self._note_entries(opened, asked, step, study)
+        self._note_entries(opened, request, step, study)
         if step.entry and opened.selected != selected:
             self._back.append(selected)
-        if isinstance(asked, AddElement | AddNamed | DuplicateElement) and opened.selected == step.entry:
-            document, added = opened.study.document, opened.selected
-            self._added = added, id_at(document, added), suggested_id(document, added)
+        if isinstance(request, AddElement | AddNamed | DuplicateElement) and opened.selected == step.entry:
+            document, added_path = opened.study.document, opened.selected
+            self._added = added_path, id_at(document, added_path), suggested_id(document, added_path)
         self._note_edit()
         self.made.emit(step)
 
-    def _note_entries(self, opened: Document, asked: Request, step: Step, before: Study) -> None:
-        """Note the entry that a step begins, and leave those that it is not part of."""
+    def _note_entries(self, opened: Document, request: Request, step: Step, before: Study) -> None:
+        """Add the entry that a step begins to the unfinished ones, and finish those that do not contain it."""
         entries = opened.study.unfinished
-        if isinstance(asked, RenameElement | MoveElement):
-            entries = with_path(entries, asked.path, opened.selected)
+        if isinstance(request, RenameElement | MoveElement):
+            entries = with_path(entries, request.path, opened.selected)
         elif step.entry:
             paths: tuple[Place, ...] = (step.entry,)
-            if isinstance(asked, AddNamed | AddLiquid) and asked.path:
-                paths = asked.path[:2], step.entry  # the element that will name the new one waits for it
+            if isinstance(request, AddNamed | AddLiquid) and request.path:
+                paths = (
+                    request.path[:2],
+                    step.entry,
+                )  # the element that refers to the new one stays unfinished until that is complete
             entries = tuple(entry for entry in entries if any(is_within(path, entry.path) for path in paths))
             known = frozenset((fault.path, fault.message) for fault in before.shown_faults)
             entries += tuple(Entry(path, known) for path in paths if path not in [entry.path for entry in entries])
@@ -135,9 +138,9 @@ class Editing(QObject):
         opened.study = opened.study.with_unfinished(entries)
 
     def leave_entries(self, selected: Place = (), row: Place = ()) -> bool:
-        """Show the problems of unfinished entries, except those that contain the selected element or a focused row.
+        """Finish entries, showing their problems, except those that contain the selected element or a focused row.
 
-        Return whether there were others.
+        Return whether an entry was finished.
         """
         if (opened := self.opened) is None:
             return False
@@ -146,31 +149,34 @@ class Editing(QObject):
             is_within(selected, entry.path) or bool(row and (is_within(row, entry.path) or is_within(entry.path, row)))
             for entry in entries
         )
-        kept = entries[: max((at for at, stays in enumerate(inside, start=1) if stays), default=0)]
-        if kept != entries:
-            opened.study = opened.study.with_unfinished(kept)
+        remaining = entries[: max((at for at, stays in enumerate(inside, start=1) if stays), default=0)]
+        if remaining != entries:
+            opened.study = opened.study.with_unfinished(remaining)
             self.announce_edit()
-        return kept != entries
+        return remaining != entries
 
     def suggest_id(self) -> None:
-        """Give the last added element an id made from its text, once, when the text field is left."""
+        """Derive the ID of the last added element from its text when the text field is left for the first time."""
         path, name, initial = self._added
         if (opened := self.writable) is None or not path or id_at(opened.study.document, path) != name:
             return
         recorded = self.recorded(path)
-        wanted = "" if name in recorded else suggested_id(opened.study.document, path, recorded)
-        if wanted in {"", initial}:
+        new_id = "" if name in recorded else suggested_id(opened.study.document, path, recorded)
+        if new_id in {"", initial}:
             return
         self._added = ((), "", "")
-        after = path if isinstance(path[-1], int) else (*path[:-1], wanted)
-        edits = edits_to_rename(opened.study.document, path, wanted, recorded)
+        after = path if isinstance(path[-1], int) else (*path[:-1], new_id)
+        edits = edits_to_rename(opened.study.document, path, new_id, recorded)
         select = with_path(opened.selected, path, after)
-        opened.edit(f"Rename to {wanted}", *edits, select=select, key=opened.last[0])
+        opened.edit(f"Rename to {new_id}", *edits, select=select, key=opened.last[0])
         opened.study = opened.study.with_unfinished(with_path(opened.study.unfinished, path, after))
         self._note_edit()
 
     def make_step(self, name: str, *edits: Edit, text: str | None = None, select: Place | None = None) -> None:
-        """Make a step of edits or of a new text; a rejected step changes nothing."""
+        """Apply edits, or replace the text, as one step.
+
+        Raises Refused, leaving the study unchanged, if that is not possible.
+        """
         if (opened := self.writable) is not None:
             opened.edit(name, *edits, text=text, select=select)
             self._note_edit()

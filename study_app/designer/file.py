@@ -1,4 +1,4 @@
-"""The text of the file: which lines are marked, and the editor that shows it."""
+"""The text of the study's file, its marked lines, and the editor that shows it."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from PySide6.QtWidgets import QFrame, QPlainTextEdit, QWidget
 
 from study_app.designer.document.study import Study
 from study_app.designer.document.toml_text import common_ends, spans_of, with_line_feeds
-from study_app.designer.form.fields import HAND_ON_MS, KEYS_OF_PLACE
+from study_app.designer.form.fields import PAGE_KEYS, SUBMIT_DELAY_MS
 from study_app.designer.parts import cut_text
 from study_app.gui.theme import Coloured, Theme, draw_icon
 from study_app.gui.widgets import Card, Icon, hbox, label
@@ -43,14 +43,13 @@ class _VisibleLine(NamedTuple):
 
 
 def _visible_lines(text: QPlainTextEdit) -> list[_VisibleLine]:
-    """Return the visible lines."""
     lines = []
     block, offset = text.firstVisibleBlock(), text.contentOffset()
     while block.isValid():
-        place = text.blockBoundingGeometry(block).translated(offset)
-        if place.top() > text.viewport().height():
+        rect = text.blockBoundingGeometry(block).translated(offset)
+        if rect.top() > text.viewport().height():
             break
-        lines.append(_VisibleLine(number=block.blockNumber(), top=place.top(), height=place.height()))
+        lines.append(_VisibleLine(number=block.blockNumber(), top=rect.top(), height=rect.height()))
         block = block.next()
     return lines
 
@@ -80,11 +79,11 @@ def file_text(study: Study, name: str, path: Path) -> FileText:
     return FileText(name, with_line_feeds(study.text), selected, faulty)
 
 
-def _line_number(text: str, place: int) -> int:
-    return text.count("\n", 0, place)
+def _line_number(text: str, position: int) -> int:
+    return text.count("\n", 0, position)
 
 
-_LETTERS_PX = 13
+_FONT_PX = 13
 _PIECES = r"(#.*$)|(^\s*\[.*?\]\]?)|(\"\"\"|\"(?:[^\"\\]|\\.)*\"|'[^']*')"
 
 
@@ -98,13 +97,13 @@ class Colours(QSyntaxHighlighter):
 
     def apply_theme(self, theme: Theme) -> None:
         self._formats = []
-        for ink, ground, weight in self._roles:
-            made = QTextCharFormat()
-            made.setForeground(QColor(getattr(theme, ink)))
-            if ground:
-                made.setBackground(QColor(getattr(theme, ground)))
-            made.setFontWeight(weight)
-            self._formats.append(made)
+        for colour, background, weight in self._roles:
+            text_format = QTextCharFormat()
+            text_format.setForeground(QColor(getattr(theme, colour)))
+            if background:
+                text_format.setBackground(QColor(getattr(theme, background)))
+            text_format.setFontWeight(weight)
+            self._formats.append(text_format)
         self.rehighlight()
 
     def highlightBlock(self, text: str) -> None:
@@ -136,9 +135,9 @@ class _FileEditor(Coloured, QPlainTextEdit):
         self.shown = FileText()
         self.pending = False
         self._showing = False
-        self._late: bool | None = None
+        self._pending_scroll: bool | None = None
         fixed = QFontDatabase.systemFont(QFontDatabase.SystemFont.FixedFont)
-        fixed.setPixelSize(_LETTERS_PX)
+        fixed.setPixelSize(_FONT_PX)
         fixed.setStyleHint(QFont.StyleHint.Monospace)
         self.setFont(fixed)
         self.setAccessibleName("File text")
@@ -153,36 +152,36 @@ class _FileEditor(Coloured, QPlainTextEdit):
         inks = ("text3", "", 400), ("accent", "", 600), ("warn", "", 400)  # comments, headers and strings
         self._colours = Colours(self.document(), _PIECES, *inks)
         self._gutter = _Gutter(self)
-        self._rest = QTimer(self)
-        self._rest.setSingleShot(True)
-        self._rest.timeout.connect(self.flush)
+        self._typing_timer = QTimer(self)
+        self._typing_timer.setSingleShot(True)
+        self._typing_timer.timeout.connect(self.flush)
         self.textChanged.connect(self._note_typing)
         self.updateRequest.connect(self._scroll_gutter)
         self.blockCountChanged.connect(lambda _count: self._place_gutter())
         self._place_gutter()
 
-    def words(self) -> str:
+    def raw_text(self) -> str:
         """Return the text; Qt's plain text would lose non-breaking spaces."""
-        self._show_late_file()
+        self._show_pending_file()
         return self.document().toRawText().replace("\u2029", "\n")
 
     def show_file(self, file: FileText, *, scroll: bool) -> None:
         """Show a file once the editor is visible; only differences are replaced, cursor and scroll bar stay."""
         self.shown = file
         if not self.pending:
-            self._late = scroll or bool(self._late)
+            self._pending_scroll = scroll or bool(self._pending_scroll)
             if self.isVisible():
-                self._show_late_file()
+                self._show_pending_file()
 
     def showEvent(self, event: QShowEvent) -> None:
         super().showEvent(event)
-        self._show_late_file()
+        self._show_pending_file()
 
-    def _show_late_file(self) -> None:
-        if self._late is None:
+    def _show_pending_file(self) -> None:
+        if self._pending_scroll is None:
             return
-        scroll, self._late = self._late, None
-        old, new = self.words(), self.shown.text
+        scroll, self._pending_scroll = self._pending_scroll, None
+        old, new = self.raw_text(), self.shown.text
         if old != new:
             self._replace_text(old, new)
         self._repaint_marks()
@@ -190,7 +189,7 @@ class _FileEditor(Coloured, QPlainTextEdit):
             self.go_to(self.shown.selected[0][0])
 
     def go_to(self, line: int) -> None:
-        self._show_late_file()
+        self._show_pending_file()
         block = self.document().findBlockByNumber(line)
         if block.isValid():
             cursor = QTextCursor(block)
@@ -198,23 +197,23 @@ class _FileEditor(Coloured, QPlainTextEdit):
             self.verticalScrollBar().setValue(max(0, line - 3))
 
     def flush(self) -> None:
-        self._rest.stop()
+        self._typing_timer.stop()
         if self.pending:
             self.pending = False
-            self.typed.emit(self.words())
+            self.typed.emit(self.raw_text())
 
     def _note_typing(self) -> None:
         if not self._showing:
             self.pending = True
-            if not self._rest.isActive():
-                self._rest.start(HAND_ON_MS)
+            if not self._typing_timer.isActive():
+                self._typing_timer.start(SUBMIT_DELAY_MS)
 
     def _replace_text(self, old: str, new: str) -> None:
         first, last = common_ends(old, new)
         self._showing = True
         cursor = QTextCursor(self.document())
-        cursor.setPosition(_units(old[:first]))
-        cursor.setPosition(_units(old[: len(old) - last]), QTextCursor.MoveMode.KeepAnchor)
+        cursor.setPosition(_utf16_length(old[:first]))
+        cursor.setPosition(_utf16_length(old[: len(old) - last]), QTextCursor.MoveMode.KeepAnchor)
         cursor.insertText(new[first : len(new) - last])
         self._showing = False
 
@@ -278,7 +277,7 @@ class _FileEditor(Coloured, QPlainTextEdit):
 
     def event(self, event: QEvent) -> bool:
         overrides = event.type() == QEvent.Type.ShortcutOverride and isinstance(event, QKeyEvent)
-        if overrides and any(event.matches(key) for key in KEYS_OF_PLACE):  # type: ignore[attr-defined]  # a key event
+        if overrides and any(event.matches(key) for key in PAGE_KEYS):  # type: ignore[attr-defined]  # a key event
             self.flush()
             event.ignore()
             return True
@@ -295,8 +294,8 @@ class FileCard(Card):
         self.editor = _FileEditor()
         self.setFocusProxy(self.editor)
         self.aside = QWidget()
-        kept = Icon("check", "ok", 16), label("comments and order are kept", "small", "text2")
-        hbox(*kept, 10, self.name, spacing=6, margins=0, parent=self.aside)
+        note = Icon("check", "ok", 16), label("comments and order are kept", "small", "text2")
+        hbox(*note, 10, self.name, spacing=6, margins=0, parent=self.aside)
         self.column.addWidget(self.editor, 1)
 
     def show_file(self, file: FileText, *, scroll: bool, read_only: bool) -> None:
@@ -305,6 +304,6 @@ class FileCard(Card):
         self.editor.show_file(file, scroll=scroll)
 
 
-def _units(text: str) -> int:
-    """Return the number of UTF-16 units of a text."""
+def _utf16_length(text: str) -> int:
+    """Return the length of a text in UTF-16 code units, as Qt counts it."""
     return len(text.encode("utf-16-le")) // 2

@@ -73,12 +73,12 @@ class NoticeCard(Card):
         self.notice: Notice | None = None
         self.buttons: dict[str, ActionButton] = {}
         self._lines: list[QWidget] = []
-        self.icon, self.words = Icon("info", "accent", 20), label("", "body" if of_playing else "label", wraps=True)
+        self.icon, self.sentence = Icon("info", "accent", 20), label("", "body" if of_playing else "label", wraps=True)
         self.close_button = IconButton("cross", "Close this message", "Close (Esc)", size=36, role="plain")
         self.close_button.clicked.connect(lambda: self.asked.emit("close"))
         self._buttons = hbox(spacing=10)
         self._listed = vbox(spacing=2, margins=(30 + SHADOW, 0, 0, 0))
-        across = hbox(self.icon, (self.words, 1), self._buttons, self.close_button, spacing=10)
+        across = hbox(self.icon, (self.sentence, 1), self._buttons, self.close_button, spacing=10)
         add_parts(self.column, across, self._listed)
         self.hide()
 
@@ -93,7 +93,7 @@ class NoticeCard(Card):
             remove_widget(part)
         self.buttons, self._lines = {}, []
         self.close_button.setVisible(notice is not None and notice.closes)
-        self.words.setText("" if notice is None else notice.words)
+        self.sentence.setText("" if notice is None else notice.words)
         if notice is None:
             return
         self.setAccessibleDescription(notice.words)

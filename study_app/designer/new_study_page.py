@@ -335,8 +335,8 @@ def header_state(
         chosen=source_of(opened.file),
         problems=problems_chip(len(problem_rows(opened.study)), warnings),
         draft="" if opened.read_only else draft,
-        undo=opened.done[-1].words if opened.done else "",
-        redo=opened.undone[-1].words if opened.undone else "",
+        undo=opened.done[-1].title if opened.done else "",
+        redo=opened.undone[-1].title if opened.undone else "",
         can_save=not opened.read_only and (opened.edited or not opened.base),
         read_only=bool(opened.read_only),
         version=version,
@@ -435,10 +435,10 @@ class Picture(QWidget):
 class _TemplateButton(Themed, QAbstractButton):
     """A starting point for a study: its picture or icon, title, description and figures.
 
-    ``came`` is emitted when it gets the focus, with whether this was by a click.
+    ``focused`` is emitted when it gets the focus, with whether this was by a click.
     """
 
-    came = Signal(bool)
+    focused = Signal(bool)
 
     def __init__(self, choice: TemplateChoice) -> None:
         super().__init__()
@@ -484,7 +484,7 @@ class _TemplateButton(Themed, QAbstractButton):
 
     def focusInEvent(self, event: QFocusEvent) -> None:
         super().focusInEvent(event)
-        self.came.emit(event.reason() == Qt.FocusReason.MouseFocusReason)
+        self.focused.emit(event.reason() == Qt.FocusReason.MouseFocusReason)
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         t, painter = self.theme, smooth_painter(self)
@@ -801,7 +801,7 @@ class NewStudyPage(Themed, QWidget):
             columns = across if self.width() >= NARROW_BELOW else 2
             for at, choice in enumerate(choice for choice in choices if choice.copy == copies):
                 made = _TemplateButton(choice)
-                made.came.connect(partial(self._show_focused_card, made))
+                made.focused.connect(partial(self._show_focused_card, made))
                 self._group.addButton(made)
                 grid.addWidget(made, at // columns, at % columns)
                 self.buttons.append(made)

@@ -38,7 +38,7 @@ from study_app.designer.document.elements import (
     SEQUENCE,
     Element,
     FoundField,
-    found_in_elements,
+    first_match_by_element,
     has_text,
     outline,
     search_words,
@@ -117,7 +117,7 @@ def outline_rows(
         only = Element(FIRST, title_of({}, FIRST), FIRST[0], faults=len(study.faults))
         return (_outline_row(study, only, {}, in_session=False),)
     shown, document, text = outline(study), study.document, find.strip()
-    fields = found_in_elements(study, text)
+    fields = first_match_by_element(study, text)
     rows: list[OutlineRow] = []
     titles = _titles((*shown.parts, *shown.session, *shown.study))
     settings = [element for element in shown.study if element.path != FIRST]
@@ -127,7 +127,9 @@ def outline_rows(
         inner = [_outline_row(study, element, times_s, in_session=heading == SESSION) for element in named]
         if text:
             whole = {row.path for row in inner if heading == PARTS and len(row.path) == 1}
-            inner = [row for row in inner if row.path not in whole or has_text(document, row.path, text, named=True)]
+            inner = [
+                row for row in inner if row.path not in whole or has_text(document, row.path, text, titles_only=True)
+            ]
             inner = [
                 kept for row in inner if (kept := _matching_row(study, row, text, fields.get(row.path))) is not None
             ]
@@ -150,7 +152,7 @@ def _titles(elements: Sequence[Element]) -> dict[Path, str]:
 
 def _matching_row(study: Study, row: OutlineRow, text: str, field: FoundField | None) -> OutlineRow | None:
     """Return a matching row with the label of its matching field; None if the element does not match."""
-    named = has_text(study.document, row.path, text, named=True)
+    named = has_text(study.document, row.path, text, titles_only=True)
     if field is not None and (field.rank == LABEL or not named):
         title, name = f"{row.title} · {field.label}", f"{row.name}, field {field.label}"
         return replace(row, title=title, name=name, field=field.field, named=named)

@@ -11,8 +11,8 @@ from PySide6.QtCore import QEvent, QObject, Qt, QTimer, Signal
 from PySide6.QtGui import QKeyEvent, QMouseEvent, QPaintEvent
 from PySide6.QtWidgets import QScrollArea, QVBoxLayout, QWidget
 
-from study_app.designer.document.additions import Repair, additions_for, repairs
-from study_app.designer.document.elements import FIRST, STUDY_LANGUAGES, element_of, kind_and_title, place_words
+from study_app.designer.document.additions import Repair, addition_repairs, repairs
+from study_app.designer.document.elements import FIRST, STUDY_LANGUAGES, element_of, kind_and_title, place_text
 from study_app.designer.document.fields import key_order, label_of
 from study_app.designer.document.study import Study
 from study_app.designer.outline import icon_of
@@ -67,7 +67,7 @@ class ProblemRow:
     @property
     def place(self) -> str:
         """Its place in the file, such as ``blocks.liquids.order · line 385``."""
-        return place_words(self.fault.path, self.line)
+        return place_text(self.fault.path, self.line)
 
 
 def problem_rows(study: Study) -> tuple[ProblemRow, ...]:
@@ -192,17 +192,17 @@ class RepairSearch(QObject):
     def find_repair(self, row: ProblemRow, sentence: str) -> Repair | None:
         """Return a repair by its sentence; after an edit it is searched for at once."""
         self._find_repairs(row)
-        return next((repair for repair in self._known.get(row, ()) if repair.words == sentence), None)
+        return next((repair for repair in self._known.get(row, ()) if repair.label == sentence), None)
 
     def show_repairs(self, row: ProblemRow) -> None:
         self._find_repairs(row)
         if row in self._known:
-            self.found.emit(row, tuple(repair.words for repair in self._known[row]))
+            self.found.emit(row, tuple(repair.label for repair in self._known[row]))
 
     def _find_repairs(self, row: ProblemRow) -> None:
         study = self._study
         if row in self._problems and row not in self._known and study is not None and study.is_toml:
-            self._known[row] = (*repairs(study, row.fault), *additions_for(study, row.fault))
+            self._known[row] = (*repairs(study, row.fault), *addition_repairs(study, row.fault))
 
     def _search_next(self) -> None:
         if self._waiting:

@@ -7,8 +7,8 @@ from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QLineEdit, QScrollArea, QWidget
 
 from study_app.designer.document.elements import element_of, kind_and_title, title_of
-from study_app.designer.document.fields import Row, label_of, orphaned_keys, references_to, with_references
-from study_app.designer.document.steps import DeleteElement, DuplicateElement, MakeSeries, Situation, index_of
+from study_app.designer.document.fields import Row, label_of, orphaned_keys, paths_to_delete, references_to
+from study_app.designer.document.steps import DeleteElement, DuplicateElement, MakeSeries, StepContext, index_of
 from study_app.designer.document.study import Study
 from study_app.designer.document.toml_text import Refused
 from study_app.designer.parts import make_dense
@@ -75,7 +75,9 @@ class DeleteCard(Prompt):
         area.setFixedHeight(min(_PLACES_PX, inside.sizeHint().height()))
         self.column.addWidget(area)
         gone = (
-            element for element in with_references(document, path, study.needs) if element != path and len(element) == 2
+            element
+            for element in paths_to_delete(document, path, study.is_required)
+            if element != path and len(element) == 2
         )
         if too := ", ".join(kind_and_title(document, path) for path in gone if isinstance(path[1], str)):
             self.column.addWidget(label(f"“Delete them too” also deletes {too}.", "label", wraps=True))
@@ -158,7 +160,7 @@ class SeriesCard(Prompt):
         said, why = "", ""
         try:
             if self.values.text().strip():
-                said = self._request().step(Situation(self.study)).said
+                said = self._request().step(StepContext(self.study)).announcement
         except (ValueError, Refused) as refusal:
             why = f"{capitalised(str(refusal))}."
         set_ink(self.copies, "bad" if why else "text2")

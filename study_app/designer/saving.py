@@ -107,7 +107,7 @@ class Saving(QObject):
         if opened is None:
             return
         before = opened.read_only, self.banner
-        opened.read_only = opened.why_read_only(self.editing.results)
+        opened.read_only = opened.read_only_reason(self.editing.results)
         if not opened.edited and opened.file.exists() and _is_changed_outside(opened):
             self._try_action(opened, opened.take_file_content)
         self.banner = _banner_notice(opened) or self._notice
@@ -174,13 +174,13 @@ class Saving(QObject):
         opened = self.editing.writable
         if opened is None or (opened.base and not opened.edited):
             return
-        opened.read_only = opened.why_read_only(self.editing.results)
+        opened.read_only = opened.read_only_reason(self.editing.results)
         if opened.read_only:
             self._show_banner(opened)
             return
         known = self.runs.read()
         standing = opened.standing(known)
-        if standing.asks and not _is_changed_outside(opened):
+        if standing.needs_confirmation and not _is_changed_outside(opened):
             self._show_save_card(opened, standing)
         else:
             self._save_file(opened)

@@ -47,8 +47,8 @@ def version_chip(standing: Standing, known: Iterable[Run]) -> VersionChip:
     """Return the chip of a study with this standing."""
     known = tuple(known)
     tip = "\n".join(f"Version {run.version}: {run_counts(run)}" for run in known)
-    save = f"Save {standing.version} …" if standing.asks else "Save"
-    if not standing.was:
+    save = f"Save {standing.version} …" if standing.needs_confirmation else "Save"
+    if not standing.last_version:
         text = "Piloted" if any(run.pilots for run in known) else "Rehearsed" if known else "Not yet run"
         return VersionChip(
             tone="neutral", icon="ring", words=text, tip=tip or "No session has been run with this study", save=save
@@ -56,7 +56,9 @@ def version_chip(standing: Standing, known: Iterable[Run]) -> VersionChip:
     if standing.sessions:
         text = f"{standing.version}, run by {standing.sessions}"
         return VersionChip(tone="ok", icon="check", words=text, tip=tip, save=save)
-    return VersionChip(tone="accent", icon="pen", words=f"{standing.version}, was {standing.was}", tip=tip, save=save)
+    return VersionChip(
+        tone="accent", icon="pen", words=f"{standing.version}, was {standing.last_version}", tip=tip, save=save
+    )
 
 
 def run_counts(run: Run) -> str:

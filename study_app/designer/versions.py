@@ -119,7 +119,7 @@ def _read_runs(results: Path, study: str, file: Path) -> tuple[str, tuple[Run, .
 
 
 _NOTHING = "There is no version to compare with, because the study has not yet been run or saved."
-_LETTERS_PX = 12
+_FONT_PX = 12
 
 
 class _DifferenceText(Coloured, QPlainTextEdit):
@@ -128,7 +128,7 @@ class _DifferenceText(Coloured, QPlainTextEdit):
     def __init__(self) -> None:
         super().__init__()
         fixed = QFontDatabase.systemFont(QFontDatabase.SystemFont.FixedFont)
-        fixed.setPixelSize(_LETTERS_PX)
+        fixed.setPixelSize(_FONT_PX)
         self.setFont(fixed)
         self.setAccessibleName("Differences")
         self.setReadOnly(True)

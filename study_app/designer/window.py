@@ -718,7 +718,7 @@ class DesignerPlace(Place):
 
     def show_step(self, step: Step) -> None:
         """Announce a step, say how to undo a deletion, and focus the first text of a new element."""
-        said = f"Deleted {step.removed}. {keys_of('undo')[0]} restores it." if step.removed else step.said
+        said = f"Deleted {step.removed}. {keys_of('undo')[0]} restores it." if step.removed else step.announcement
         if said:
             announce(self, said)
         beside = not self.parts.drawer and self.outline.isAncestorOf(self.focusWidget())

@@ -149,7 +149,7 @@ def test_each_button_of_a_form_changes_what_its_name_says(designer: Any, path: P
         QApplication.processEvents()
         changed, after = designer.text, _plain(designer.study.document)
         if changed == text:
-            assert designer.messages or designer.form_row(*of_row).wrong.isVisible(), (of_row, name)
+            assert designer.messages or designer.form_row(*of_row).fault_line.isVisible(), (of_row, name)
             continue
         assert after == _expected(before, after, path, row, at, name), (of_row, at, name)
         editing.undo()

@@ -79,9 +79,9 @@ def shown(field: Any) -> Any:
     """Return what a field shows."""
     match type(field).__name__:
         case "LineField":
-            return field.line.words()
+            return field.line.typed_text()
         case "LanguagesField":
-            return [line.words() for line in field.lines.values()]
+            return [line.typed_text() for line in field.lines.values()]
         case "SwitchField":
             return field.toggle.isChecked()
         case "ChecksField":

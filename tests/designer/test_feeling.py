@@ -68,7 +68,7 @@ def test_a_liquid_is_felt_with_unsaved_values_and_put_back_as_one_step(qtbot: An
     qtbot.mouseClick(lab.place.form.back, Qt.MouseButton.LeftButton)
     assert visit.window.here == "designer"
     assert editing.selected == ("liquids", "thick")
-    assert [step.words for step in editing.opened.done[steps:]] == ["Put Thick back from the lab"]
+    assert [step.title for step in editing.opened.done[steps:]] == ["Put Thick back from the lab"]
     liquid = editing.opened.study.document["liquids"]["thick"]
     assert liquid["density_kg_m3"] == 1234.5
     assert set(liquid["effects"]) == {"drag", "added_mass"}

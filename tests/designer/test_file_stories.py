@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from study_app.designer.document.additions import texts_of
+from study_app.designer.document.additions import localised_texts
 from study_app.designer.document.steps import ChangeLanguage, RetypeFile, SetText, SetValue
 from study_app.errors import StoreError
 from study_app.protocol.source.files import protocol_hash
@@ -312,7 +312,7 @@ def incomplete(story: Story) -> None:
     """A study that cannot be run yet is saved, and says so until it can be."""
     story.ask(ChangeLanguage("add", "nl"))
     count = len(story.designer.study.faults)
-    assert count == sum(1 for _ in texts_of(story.designer.study)), "each text is missing in Dutch"
+    assert count == sum(1 for _ in localised_texts(story.designer.study)), "each text is missing in Dutch"
     story.expect("1 problem", undo="Add Dutch")
     story.play("ctrl+s")
     story.expect("Saved, but the study cannot be run yet because of 1 problem", kept="saved")

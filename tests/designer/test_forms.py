@@ -114,7 +114,7 @@ def test_the_help_is_that_of_the_row_with_the_keyboard(designer: Any) -> None:
 def test_the_file_is_handed_on_while_typing_goes_on_and_when_it_is_left(
     designer: Any, qtbot: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("study_app.designer.file.HAND_ON_MS", 60_000)
+    monkeypatch.setattr("study_app.designer.file.SUBMIT_DELAY_MS", 60_000)
     designer.open()
     editor = designer.place.file.editor
     designer.place.show_tab("file")
@@ -377,7 +377,7 @@ def test_the_faults_of_a_row_are_below_its_field_and_above_its_repairs(qtbot: An
     row = designer.form_row("liquids", "thin", "density_kg_m3")
     qtbot.waitUntil(lambda: bool(row.repairs))
     QApplication.processEvents()
-    tops = [part.mapTo(row, QPoint()).y() for part in (row.field, row.wrong, row.repairs[0])]
+    tops = [part.mapTo(row, QPoint()).y() for part in (row.field, row.fault_line, row.repairs[0])]
     assert tops == sorted(set(tops)), tops
 
 

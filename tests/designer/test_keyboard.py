@@ -193,7 +193,7 @@ def test_groups_are_added_in_twos_which_the_entry_and_the_foot_say(designer: Any
     designer.add("Two groups")
     assert tuple(designer.value("groups")) == ("group", "group_2")
     form = designer.place.form
-    assert form.foot.words.text() == "Also added, because the study needs it: Group 2. Groups lists it."
+    assert form.foot.help_label.text() == "Also added, because the study needs it: Group 2. Groups lists it."
     assert (designer.keyboard, form.head.id.selectedText()) == (form.head.id, "group")
     QTest.keyClicks(designer.keyboard, "thick_first")
     designer.hit("Return")
@@ -231,4 +231,4 @@ def test_a_key_leads_from_a_questionnaire_to_the_text_of_each_question_and_back(
         designer.hit(f"alt+Page{key}")
         assert designer.editing.selected == ("questionnaires", "after", "items", number)
         (line,) = designer.field("questionnaires", "after", "items", number, "text").lines.values()
-        assert (designer.keyboard, line.textCursor().selectedText()) == (line, line.words())
+        assert (designer.keyboard, line.textCursor().selectedText()) == (line, line.typed_text())

@@ -123,7 +123,7 @@ def test_the_next_problem_is_the_next_one_in_the_form_whatever_the_order_in_the_
 def test_missing_texts_are_one_problem_that_lists_them_and_enter_leads_to_the_next(designer: Any) -> None:
     designer.controller.begin_study("template:two-liquids-abx", "mine", Answers(languages=("en", "fr")))
     designer.editing.handle_request(AddInstrument("nasa-tlx"))
-    assert "does not include the French texts" in designer.place.form.foot.words.text()
+    assert "does not include the French texts" in designer.place.form.foot.help_label.text()
     missing = [fault.path for fault in designer.study.faults]
     designer.hit("F8")
     (problem,) = designer.place.problems.problems
@@ -131,7 +131,7 @@ def test_missing_texts_are_one_problem_that_lists_them_and_enter_leads_to_the_ne
     listed = [row.row.path for row in designer.place.form.rows]
     assert set(missing) <= set(listed)
     texts = designer.form_row("questionnaires", "nasa_tlx", "items", 0, "text").field.lines
-    assert texts["en"].words().startswith("How much mental")
+    assert texts["en"].typed_text().startswith("How much mental")
     texts["fr"].setFocus()
     for number in range(3):
         QTest.keyClicks(designer.keyboard, f"Texte {number}")

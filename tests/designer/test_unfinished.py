@@ -108,13 +108,13 @@ LEAVING: dict[str, Callable[[Any], object]] = {
 def test_each_way_to_leave_a_copy_shows_that_it_reads_the_same(designer: Any, way: str) -> None:
     duplicate_question(designer)
     row = designer.form_row(*COPY, "text")
-    said, role = row.wrong.sentence.text(), row.wrong.sentence.property("role")
+    said, role = row.fault_line.sentence.text(), row.fault_line.sentence.property("role")
     assert (said.startswith("Reads the same as an earlier item"), role) == (True, "text2")
     LEAVING[way](designer)
     assert shown(designer) == 2, "the text and its short label"
     designer.go_to(*COPY)
     row = designer.form_row(*COPY, "text")
-    assert (row.wrong.sentence.text(), row.wrong.sentence.property("role")) == (said, "bad")
+    assert (row.fault_line.sentence.text(), row.fault_line.sentence.property("role")) == (said, "bad")
     (line,) = row.field.lines.values()
     assert line.property("state") == "refused"
 
@@ -142,7 +142,7 @@ def test_a_block_without_conditions_is_unfinished_until_it_is_left(designer: Any
     for expected in ("The block has one condition", "Specify either conditions or stimulus"):
         designer.editing.handle_request(RemoveKey((*BLOCK, "conditions", 0)))
         assert shown(designer) == 0
-        assert designer.form_row(*BLOCK, "conditions").wrong.sentence.text().startswith(expected)
+        assert designer.form_row(*BLOCK, "conditions").fault_line.sentence.text().startswith(expected)
     designer.editing.handle_request(AddEntry((*BLOCK, "conditions"), "thin"))
     designer.editing.handle_request(AddNamed((*BLOCK, "conditions"), "conditions"))
     assert designer.editing.selected == ("conditions", "condition")
@@ -231,7 +231,7 @@ def test_a_deletion_by_keys_says_how_to_undo_it_and_tab_skips_its_button(designe
     assert designer.text != before
     form = designer.place.form
     assert form.foot.isVisible()
-    assert form.foot.words.text() == f"Deleted {name}. Ctrl+Z restores it."
+    assert form.foot.help_label.text() == f"Deleted {name}. Ctrl+Z restores it."
     assert path in (form.row_path_of(designer.keyboard), *(at for at, part in form.adds.items() if part.hasFocus()))
     designer.hit("ctrl+z")
     assert designer.text == before
@@ -288,7 +288,7 @@ def test_labels_of_another_language_are_no_problem_while_they_are_typed(designer
         field.flush()
         QApplication.processEvents()
         assert not [row for row in designer.place.problems.problems if row.fault.path[:3] == labels]
-        hint = designer.form_row(*labels).wrong.sentence
+        hint = designer.form_row(*labels).fault_line.sentence
         assert (hint.text().partition(" (")[0], hint.property("role")) == (
             f"Lacks {6 - at} of 7 labels in Dutch",
             "text2",

@@ -11,7 +11,7 @@ import pytest
 
 from study_app.designer import header, version_rows
 from study_app.designer.document import document
-from study_app.designer.document.elements import kind_and_title, place_words
+from study_app.designer.document.elements import kind_and_title, place_text
 from study_app.designer.document.study import Study
 from study_app.designer.file import file_text
 from study_app.designer.new_study_page import KnownAnswer, header_state, template_choice
@@ -57,7 +57,7 @@ NAMES = {
         "version_chip", "version_choices", "edited_elements_text", "draft_title",
     )},
     **{name: getattr(document, name) for name in ("Standing", "version_standing", "check_version", "next_version")},
-    "words": lambda choice: choice.words, "template_choice": template_choice, "place_words": place_words, "demo": demo,
+    "words": lambda choice: choice.words, "template_choice": template_choice, "place_text": place_text, "demo": demo,
     "recovery": recovery, "warned": lambda *said: [row.message for row in warning_rows(Study(DEMO, NOWHERE), said)],
     "STUDY": Study(DEMO, NOWHERE), "NOWHERE": NOWHERE, "DEMO": DEMO,
     "NOW": datetime(2026, 3, 9, 18, 30, tzinfo=timezone(timedelta(hours=2))),

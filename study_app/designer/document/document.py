@@ -1,4 +1,4 @@
-"""A study that is open: its text with the steps of undo and redo, its file, draft and version; new studies."""
+"""An open study: its text with the undo history, its file, draft and version; new studies."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any, Final
 
-from study_app.designer.document.additions import edits_to_fill_in, with_language, without_language
+from study_app.designer.document.additions import edits_to_add_language, edits_to_fill_in, edits_to_remove_language
 from study_app.designer.document.elements import FIRST, first_element, study_title
 from study_app.designer.document.study import Study, read_study
 from study_app.designer.document.toml_edits import Edit, Set
@@ -44,8 +44,8 @@ from study_app.workspace import workspace
 class Answers:
     """The initial settings of a new study; omitted ones are taken from the template.
 
-    Texts in languages that the template lacks are missing. If it lacks all of them, the first language gets the texts
-    of the template's first language.
+    Texts are missing in languages that the template does not have. If it has none of the chosen languages, the texts of
+    its first language are copied to the first chosen one.
     """
 
     title: str = ""
@@ -56,13 +56,13 @@ class Answers:
 NO_ANSWERS: Final = Answers()
 _FIRST_VERSION: Final = "0.1"
 _NAME: Final = re.compile(rf"[a-z][a-z0-9]{{0,{MAX_SHORT_NAME - 1}}}")
-_SELF: Final = "liquid-study check NAME"
+_CHECK_COMMAND: Final = "liquid-study check NAME"
 
 
 def template(name: str) -> Study:
-    """Return a template.
+    """Return the study of a template.
 
-    Raises Refused if there is none of this name.
+    Raises Refused if there is no template of this name.
     """
     if name not in templates():
         raise Refused(f'there is no template "{name}": {did_you_mean(name, templates())}')
@@ -75,7 +75,7 @@ def copy_of(study: Study, name: str) -> Study:
     Raises Refused if the name is not permitted, or the study cannot be read.
     """
     _check_name(name)
-    named = Study(study.text.replace(_SELF, f"liquid-study check {name}"), study.folder)
+    named = Study(study.text.replace(_CHECK_COMMAND, f"liquid-study check {name}"), study.folder)
     return named.with_edits(Set(("study", "name"), name), Set(("study", "version"), _FIRST_VERSION))[0]
 
 
@@ -97,16 +97,16 @@ def with_answers(study: Study, answers: Answers) -> Study:
     codes = languages_of(study.document)
     for code in answers.languages:
         if code not in codes:
-            study, _ = study.with_edits(*with_language(study, code))
-    if answers.languages and set(codes).isdisjoint(answers.languages):  # no text would be left
+            study, _ = study.with_edits(*edits_to_add_language(study, code))
+    if answers.languages and set(codes).isdisjoint(answers.languages):  # otherwise no text would remain
         study, _ = study.with_edits(*edits_to_fill_in(study, answers.languages[0]))
     for code in codes:
         if answers.languages and code not in answers.languages:
-            study, _ = study.with_edits(*without_language(study, code))
+            study, _ = study.with_edits(*edits_to_remove_language(study, code))
     return study
 
 
-def check_free_name(name: str) -> Path:
+def new_study_file(name: str) -> Path:
     """Return the file of a new study in the workspace's protocols.
 
     Raises Refused if the name is not permitted, or taken.
@@ -123,7 +123,7 @@ def write_new(study: Study, name: str) -> Path:
 
     Raises Refused if the name is not permitted, or taken; StoreError if it cannot be written.
     """
-    file = check_free_name(name)
+    file = new_study_file(name)
     save_study(file, copy_of(study, name).text, "")
     return file
 
@@ -144,22 +144,22 @@ def taken_names() -> set[str]:
     return {*shipped(), *(file.stem for file in (*folder.glob("*.toml"), *unsaved_files(folder)))}
 
 
-def _refusal(why: str, name: str) -> Refused:
+def _refusal(reason: str, name: str) -> Refused:
     free = free_short_name(taken_names(), short_name_of(name) or "study")
-    return Refused(f'{why}; "{free}" is free')
+    return Refused(f'{reason}; "{free}" is free')
 
 
-_MOST_STEPS: Final = 500
-_JOIN_S: Final = 1.0  # typing in one field is one step until the keyboard rests for so long
+_MAX_STEPS: Final = 500
+_PAUSE_S: Final = 1.0  # typing in one field is one step until a pause of this length
 _DEFAULT_VERSION: Final = "1"
 _VERSION: Final = re.compile(r"[0-9A-Za-z.+-]+")
 
 
 @dataclass(frozen=True, slots=True)
 class _DoneStep:
-    """A completed step: its description ("Move Honey up"), its splices, and the selection before and after it."""
+    """A completed step: its title ("Move Honey up"), its splices, and the selection before and after it."""
 
-    words: str
+    title: str
     splices: tuple[Splices, ...]
     before: Place = ()
     after: Place = ()
@@ -168,9 +168,10 @@ class _DoneStep:
 class Document:
     """A study that is open in the designer, with its undo history.
 
-    ``base`` is the hash of the file content that is edited and ``saved`` its text, "" for a new file; ``read_only`` is
-    the reason why it cannot be changed, or ""; ``draft`` was found when it was opened, ``kept`` is the time of the last
-    draft. ``to_write`` are the texts that were missing when their list was opened.
+    ``base`` is the hash of the file content that is edited, and ``saved`` the text of that content; both are "" for a
+    new file. ``read_only`` is the reason why the study cannot be changed, or "". ``draft`` is the draft that existed
+    when the study was opened, and ``kept`` the time of the last draft. ``to_write`` lists the texts that were missing
+    when their list was opened.
     """
 
     def __init__(
@@ -192,25 +193,25 @@ class Document:
     def edit(
         self, name: str, *edits: Edit, text: str | None = None, select: Place | None = None, key: object = None
     ) -> None:
-        """Replace the text, apply edits in order, or both, as one step; without a change there is no step.
+        """Replace the text, apply edits in order, or both, as one undo step; without a change, no step is added.
 
-        A step with the same ``key`` as the last one, made within `_JOIN_S`, is joined to it. Rejected edits change
-        nothing.
+        A step is merged into the last one if both have the same ``key`` and less than `_PAUSE_S` lies between them.
+        Raises Refused, leaving the document unchanged, if an edit is not possible.
         """
         study, splices = (self.study, ()) if text is None else self.study.with_text(text)
         if edits or text is None:
-            study, more = study.with_edits(*edits)
-            splices = (*splices, *more)
+            study, edit_splices = study.with_edits(*edits)
+            splices = (*splices, *edit_splices)
         before, selected = self.selected, self.selected if select is None else select
         self.selected = selected
         if not splices:
             return
-        last, then = self.last
-        if key is not None and key == last and time.perf_counter() - then < _JOIN_S and self.done:
+        last_key, last_s = self.last
+        if key is not None and key == last_key and time.perf_counter() - last_s < _PAUSE_S and self.done:
             joined = self.done.pop()
             splices, before = (*joined.splices, *splices), joined.before
         self.study, self.undone, self.last = study, [], (key, time.perf_counter())
-        self.done = [*self.done, _DoneStep(name, splices, before, selected)][-_MOST_STEPS:]
+        self.done = [*self.done, _DoneStep(name, splices, before, selected)][-_MAX_STEPS:]
 
     def end_step(self) -> None:
         """Close the current undo step; the next edit begins a new one."""
@@ -231,7 +232,7 @@ class Document:
             self.done.append(step)
             self.end_step()
 
-    # what it is called
+    # title, name and version
 
     @property
     def title(self) -> str:
@@ -255,14 +256,14 @@ class Document:
         return self.study.text != self.saved
 
     def note_edit(self, now_s: float) -> None:
-        """Schedule the draft after an edit; none is needed if the text equals the file."""
+        """Schedule a draft after an edit; none is written if the text equals the file."""
         if self.edited or not self.base:
             self.keeper.note_edit(self.study.text, self.selected, now_s)
         else:
             self._forget_draft()
 
     def _forget_draft(self) -> None:
-        """Discard the draft: the text equals the file."""
+        """Discard the draft, which is not needed while the text equals the file."""
         self.keeper.note_saved(self.base)
         self.kept = None
 
@@ -314,8 +315,8 @@ class Document:
                 self.selected = draft.selected
             self._rebase(draft.base)
 
-    def why_read_only(self, results: Path) -> str:
-        """Return why the study cannot be changed now, "" if it can."""
+    def read_only_reason(self, results: Path) -> str:
+        """Return the reason why the study cannot be changed now, or ""."""
         if any(self.file.resolve() == file.resolve() for file in shipped().values()):
             return "This study ships with the program. Make a copy to change it."
         if self.file.exists() and not os.access(self.file, os.W_OK):
@@ -340,32 +341,33 @@ class Document:
     def save(self, known: tuple[Run, ...]) -> None:
         """Write the file, and store the content for sessions.
 
-        It is rejected if sessions were run with this version and other content, or if the file was changed outside.
+        Raises Refused if sessions were run with this version and other content, and ChangedOutsideError if another
+        program changed the file.
         """
         source = self.study.source
-        if others := self.standing(known).others:
+        if conflicts := self.standing(known).conflicts:
             raise Refused(
                 f"version {self.version} has already been run with different content "
-                f"({counted(others, 'session')}): save the study as version {next_version(self.version)}"
+                f"({counted(conflicts, 'session')}): save the study as version {next_version(self.version)}"
             )
-        self._write_named_files(source)
+        self._copy_referenced_files(source)
         keep_content(source)
         self.base = save_study(self.file, self.study.text, self.base)
         self.saved, self.draft = self.study.text, None
         self._forget_draft()
 
-    def _write_named_files(self, source: bytes) -> None:
-        """Copy the files that the study names into its folder if it comes from another one."""
+    def _copy_referenced_files(self, source: bytes) -> None:
+        """Copy the liquid files and videos of the study into its folder if it was read from another folder."""
         folder = self.file.resolve().parent
         if self.study.folder.resolve() == folder:
             return
-        named = StudySource.split(source)
-        for name, text in named.liquids.items():
+        study_source = StudySource.split(source)
+        for name, text in study_source.liquids.items():
             path = folder / name
             if path.exists() and _file_content(path) != text.encode():
                 raise Refused(f"{path} already exists and contains a different liquid: rename one of the two files")
             write_whole(path, text.encode())
-        for name, digest in named.footage.items():
+        for name, digest in study_source.footage.items():
             if (digest_here := file_hash(folder / name)) is None:
                 try:
                     (folder / name).parent.mkdir(parents=True, exist_ok=True)
@@ -379,35 +381,35 @@ class Document:
         self.study = replace(self.study, folder=folder)
 
     def copy_as(self, name: str) -> Document:
-        """Return the edited study under another name as one step; this document returns to its file's content."""
-        made = Document(self.study, self.selected, check_free_name(name))
-        made.done = [*self.done]
-        made.edit(f"Save as {name}", text=copy_of(self.study, name).text)
-        made.note_edit(0.0)
-        made.write_draft()
+        """Return a document with the edited study under another name; this document reverts to its file's content."""
+        document = Document(self.study, self.selected, new_study_file(name))
+        document.done = [*self.done]
+        document.edit(f"Save as {name}", text=copy_of(self.study, name).text)
+        document.note_edit(0.0)
+        document.write_draft()
         self.discard_draft()
-        return made
+        return document
 
 
 def open_file(file: Path, results: Path) -> Document:
-    """Open a study's file with its unsaved draft."""
+    """Open a study's file and restore its unsaved draft, if any."""
     content = _file_content(file)
     study = read_study(content, file.parent)
     opened = Document(study, first_element(study.document), file, content_hash(content))
-    opened.read_only = opened.why_read_only(results)
+    opened.read_only = opened.read_only_reason(results)
     if not opened.read_only:
         opened.continue_draft()
     return opened
 
 
 def open_new(study: Study, name: str) -> Document:
-    """Open a copy of a study under another name; nothing is written before it is saved."""
-    file, made = check_free_name(name), copy_of(study, name)
-    return Document(made, first_element(made.document), file)
+    """Open a copy of a study under another name; its file is written only when it is saved."""
+    file, named_copy = new_study_file(name), copy_of(study, name)
+    return Document(named_copy, first_element(named_copy.document), file)
 
 
 def open_unsaved(file: Path, draft: Draft) -> Document:
-    """Open a study that was never saved, from its draft."""
+    """Open the draft of a study that was never saved."""
     opened = Document(Study(draft.text, file.parent), draft.selected or FIRST, file, draft=draft)
     opened.keeper.resume_from(draft)
     return opened
@@ -422,35 +424,35 @@ def _file_content(file: Path) -> bytes:
 
 @dataclass(frozen=True, slots=True)
 class Standing:
-    """The relation of a study's content to the contents with which participants were run."""
+    """The relation of a study's content to the versions that were run with participants."""
 
-    version: str  # to save it as: its own, or the next free one
-    was: str = ""  # the version that was run last, "" if none was
-    sessions: int = 0  # sessions that were run with this content
-    asks: bool = False  # whether saving asks first: the content differs from the one that was run
-    others: int = 0  # sessions that were run with the study's own version and another content
+    version: str  # the version to save the study as: its own, or the next free one
+    last_version: str = ""  # the version that was run last, "" if none was
+    sessions: int = 0  # number of sessions that were run with this content
+    needs_confirmation: bool = False  # whether saving must be confirmed: the content differs from the one that was run
+    conflicts: int = 0  # number of sessions that were run with the study's own version and another content
 
 
 def version_standing(hash_: str, base: str, version: str, known: Iterable[Run]) -> Standing:
-    """Return how a study's content relates to the versions that were run; pilots and rehearsals are ignored.
+    """Return the relation of a study's content to the versions that were run; pilots and rehearsals are ignored.
 
     ``hash_`` and ``base`` are the ``protocol_hash`` of the edited study and of the file from which it is edited, "" for
     a new study; ``version`` is the version stated in the study.
     """
-    ran = [run for run in known if run.sessions]
-    if not ran:
+    used_runs = [run for run in known if run.sessions]
+    if not used_runs:
         return Standing(version)
-    same = sum(run.sessions for run in ran if run.hash == hash_)
-    others = sum(run.sessions for run in ran if run.version == version and run.hash != hash_)
-    asks = not same and bool(others or any(run.hash == base for run in ran))
-    free = version
-    while not same and any(run.version == free for run in ran):
-        free = next_version(free)
-    return Standing(free, ran[-1].version, same, asks, others)
+    same_content = sum(run.sessions for run in used_runs if run.hash == hash_)
+    conflicts = sum(run.sessions for run in used_runs if run.version == version and run.hash != hash_)
+    needs_confirmation = not same_content and bool(conflicts or any(run.hash == base for run in used_runs))
+    free_version = version
+    while not same_content and any(run.version == free_version for run in used_runs):
+        free_version = next_version(free_version)
+    return Standing(free_version, used_runs[-1].version, same_content, needs_confirmation, conflicts)
 
 
 def check_version(version: str, known: Iterable[Run]) -> None:
-    """Reject a text that cannot be the version of a content that was not run."""
+    """Raise Refused if a text cannot be the version of content that was not run yet."""
     if not _VERSION.fullmatch(version):
         raise Refused(f'"{version}" is not a valid version: use letters, digits, dots, plus and minus signs, as in 1.2')
     if any(run.sessions and run.version == version for run in known):

@@ -1,4 +1,4 @@
-"""Elements of a study: the outline, titles, uses, order, and fields found by words."""
+"""Elements of a study: the outline, titles, uses, order, and the search for fields."""
 
 from collections import Counter
 from collections.abc import Iterator, Mapping
@@ -16,7 +16,7 @@ from study_app.designer.document.fields import (
     element_noun,
     label_of,
     name_label,
-    named_at,
+    referenced_element,
     refused_at,
     row_at,
     rows,
@@ -28,12 +28,12 @@ from study_app.protocol.questionnaires import Instrument
 from study_app.protocol.source import Path, entries, has, names, value_at
 from study_app.protocol.wording import languages_of
 
-_TITLES: Final = ("title", "short", "text")
-"""Keys of texts that an element is called by, the first that it has."""
-_NAMED: Final = 3
-"""By so many of its texts an entry without a title is called."""
+_TITLE_KEYS: Final = ("title", "short", "text")
+"""Keys of the texts that can be the title of an element; the first one that it has is used."""
+_MAX_TITLE_TEXTS: Final = 3
+"""Greatest number of its texts that form the title of an entry without one."""
 FIRST: Final = ("study",)
-"""What is selected where nothing else is."""
+"""The element that is selected if no other one can be."""
 SEQUENCE: Final = ("sequence",)
 STUDY_LANGUAGES: Final = ("study", "languages")
 """The languages; the element of this path is the list of texts to write or translate."""
@@ -43,12 +43,11 @@ STUDY_LANGUAGES: Final = ("study", "languages")
 class Element:
     """One line of the outline."""
 
-    path: Path  # where it is
-    # what it is called, and its name in the file
+    path: Path
     title: str
-    id: str
-    depth: int = 0  # how far it is indented
-    faults: int = 0  # how many faults are within it
+    id: str  # its name in the file
+    depth: int = 0  # level of indentation
+    faults: int = 0  # number of faults in it
     step: Path = ()  # its entry in the list that orders it: the session's or a questionnaire's; () without an order
 
 
@@ -63,21 +62,21 @@ class Outline:
 
 def outline(study: Study) -> Outline:
     """Return the outline of a study, valid or not."""
-    of_root = rows(study.document, ())
-    named = [row.path for row in of_root if row.kind == "tables"]
-    tables = [row.path for row in of_root if row.kind == "table"]
+    root_rows = rows(study.document, ())
+    sections = [row.path for row in root_rows if row.kind == "tables"]
+    tables = [row.path for row in root_rows if row.kind == "table"]
     parts = (
-        element(study, path, depth)
-        for section in named
+        make_element(study, path, depth)
+        for section in sections
         for path, depth in ((section, 0), *((path, 1) for path, _ in entries(study.document, f"{section[0]}.*")))
     )
-    order = [path for path in (SEQUENCE, ("sequences",)) if value_at(study.document, path)]
-    session = (*(element(study, path) for path in order), *_session_elements(study))
-    return Outline(session=session, parts=tuple(parts), study=tuple(element(study, path) for path in tables))
+    orders = [path for path in (SEQUENCE, ("sequences",)) if value_at(study.document, path)]
+    session = (*(make_element(study, path) for path in orders), *_session_elements(study))
+    return Outline(session=session, parts=tuple(parts), study=tuple(make_element(study, path) for path in tables))
 
 
-def element(study: Study, path: Path, depth: int = 0) -> Element:
-    """Return one line of the outline."""
+def make_element(study: Study, path: Path, depth: int = 0) -> Element:
+    """Return the outline's line for the element at ``path``."""
     faults = sum(fault.path[: len(path)] == path for fault in study.shown_faults)
     value = value_at(study.document, path)
     name = value.get("id", path[-1]) if isinstance(value, Mapping) else path[-1]
@@ -85,22 +84,22 @@ def element(study: Study, path: Path, depth: int = 0) -> Element:
 
 
 def title_of(document: Mapping[str, Any], path: Path) -> str:
-    """Return an element's title in the first language, else its capitalised id with spaces.
+    """Return an element's title in the first language, or its capitalised ID with spaces.
 
-    A list entry without either is named by its first texts.
+    A list entry without a title and an ID is named by its first texts.
     """
     value = value_at(document, path)
     if not isinstance(value, Mapping) or len(path) == 1:
         return label_of(path[-1])
-    if called := _title_text(document, value):
-        return called
-    if path[0] == "questionnaires" and isinstance(of := value.get("instrument"), str):
-        return Instrument(of).published_name
+    if title := _title_text(document, value):
+        return title
+    if path[0] == "questionnaires" and isinstance(instrument := value.get("instrument"), str):
+        return Instrument(instrument).published_name
     if path[:2] == EXCLUSIONS and isinstance(rule := value.get("rule"), str):
         return label_of(rule)
     if isinstance(path[-1], int) and "id" not in value:
         texts = [text for held in value.values() for text in (held if isinstance(held, tuple | list) else (held,))]
-        return ", ".join([text for text in texts if isinstance(text, str)][:_NAMED]) or str(path[-1] + 1)
+        return ", ".join([text for text in texts if isinstance(text, str)][:_MAX_TITLE_TEXTS]) or str(path[-1] + 1)
     return name_label(str(value.get("id", path[-1])))
 
 
@@ -113,47 +112,51 @@ def distinct_title(document: Mapping[str, Any], path: Path) -> str:
 
 def study_title(document: Mapping[str, Any]) -> str:
     """Return the title of a study in its first language; "" if it has none."""
-    head = document.get("study")
-    return _title_text(document, head) if isinstance(head, Mapping) else ""
+    study_table = document.get("study")
+    return _title_text(document, study_table) if isinstance(study_table, Mapping) else ""
 
 
-def _title_text(document: Mapping[str, Any], value: Mapping[str, Any]) -> str:
-    text = next((value[key] for key in _TITLES if key in value), None)
+def _title_text(document: Mapping[str, Any], table: Mapping[str, Any]) -> str:
+    text = next((table[key] for key in _TITLE_KEYS if key in table), None)
     if isinstance(text, Mapping):
         text = text.get(languages_of(document)[0]) or next(iter(text.values()), None)
     return text if isinstance(text, str) and text.strip() else ""
 
 
-def has_text(document: Mapping[str, Any], path: Path, sought: str, *, named: bool = False) -> bool:
-    """Return whether title, id or any text of an element, in any language, contains the text.
+def has_text(document: Mapping[str, Any], path: Path, sought: str, *, titles_only: bool = False) -> bool:
+    """Return whether the title, the ID or any text of an element, in any language, contains ``sought``.
 
-    With ``named`` only title and id are searched.
+    With ``titles_only`` only the title and the ID are searched.
     """
-    texts = () if named else _all_texts(value_at(document, path))
+    texts = () if titles_only else _all_texts(value_at(document, path))
     return any(sought.casefold() in text.casefold() for text in (str(path[-1]), title_of(document, path), *texts))
 
 
 def _session_elements(study: Study) -> Iterator[Element]:
-    """Yield the steps of every sequence, blocks with the tables they use, questionnaires with their items."""
+    """Yield the steps of every sequence: blocks with the tables that they use, questionnaires with their items."""
     document = study.document
     steps: list[Path] = [(*place, index) for place, listed in sequences_in(document) for index in range(len(listed))]
-    things = [(named_at(document, step), step) for step in steps]
-    for thing, step in things or [(path, ()) for path, _ in entries(document, "blocks.*")]:
-        if thing is not None:
-            inner = [named_at(document, (*thing, row.path[-1])) for row in rows(document, thing)]
-            below: list[Element] = []
-            for part in dict.fromkeys((thing, *(path for path in inner if path is not None))):
+    step_elements = [(referenced_element(document, step), step) for step in steps]
+    for element_path, step in step_elements or [(path, ()) for path, _ in entries(document, "blocks.*")]:
+        if element_path is not None:
+            used_tables = [
+                referenced_element(document, (*element_path, row.path[-1])) for row in rows(document, element_path)
+            ]
+            inner_elements: list[Element] = []
+            for part in dict.fromkeys((element_path, *(path for path in used_tables if path is not None))):
                 items = [path for path, _ in entries(document, f"{part[0]}.{part[1]}.items.*")]
-                if items or (part != thing and part[0] == "tasks"):
-                    below.append(element(study, part, 1))
-                below += [replace(element(study, item, 2), step=item) for item in items]
-            own = element(study, thing)
-            contained = sum(element.faults for element in below if element.depth == 1 and element.path != thing)
-            yield replace(own, step=step, faults=own.faults + contained)
-            yield from below
+                if items or (part != element_path and part[0] == "tasks"):
+                    inner_elements.append(make_element(study, part, 1))
+                inner_elements += [replace(make_element(study, item, 2), step=item) for item in items]
+            step_element = make_element(study, element_path)
+            inner_faults = sum(
+                element.faults for element in inner_elements if element.depth == 1 and element.path != element_path
+            )
+            yield replace(step_element, step=step, faults=step_element.faults + inner_faults)
+            yield from inner_elements
 
 
-def rows_of_blocks(document: Mapping[str, Any]) -> tuple[Row, ...]:
+def main_block_rows(document: Mapping[str, Any]) -> tuple[Row, ...]:
     """Return the form rows that concern all main blocks: their order, if there are several, and the hypotheses."""
     blocks = [block for _, block in entries(document, "blocks.*") if isinstance(block, Mapping)]
     several = sum(block.get("phase", "main") == "main" for block in blocks) > 1
@@ -173,7 +176,7 @@ def _all_texts(value: Any) -> Iterator[str]:
 
 
 def element_of(study: Study, path: Path) -> Path:
-    """Return the path of the outline's element that contains a place of the file."""
+    """Return the path of the outline's element that contains a path of the document."""
     if not path or not has(study.document, path[0]):
         return path[:1] or FIRST
     section = row_at(study.document, path[:1])
@@ -189,7 +192,7 @@ def step_of(document: Mapping[str, Any], path: Path) -> Path | None:
         return path
     for place, steps in sequences_in(document):
         for index in range(len(steps)):
-            if named_at(document, (*place, index)) == path:
+            if referenced_element(document, (*place, index)) == path:
                 return (*place, index)
     return None
 
@@ -205,13 +208,13 @@ def position_of(document: Mapping[str, Any], path: Path) -> tuple[int, int] | No
 def first_element(document: Mapping[str, Any]) -> Path:
     """Return the path of the initially selected element: the first session step, else the study's table."""
     steps = ((*place, 0) for place, listed in sequences_in(document) if listed)
-    return next((named for step in steps if (named := named_at(document, step)) is not None), FIRST)
+    return next((named for step in steps if (named := referenced_element(document, step)) is not None), FIRST)
 
 
 _USED: Final = frozenset(
     {"liquids", "conditions", "tasks", "questionnaires", "scales", "stimuli", "designs", "methods"}
 )
-"""Sections whose elements other elements use; pages and blocks are steps of the session."""
+"""Sections whose elements are used by others; pages and blocks are steps of the session."""
 
 
 def kind_of(path: Path) -> str:
@@ -235,8 +238,8 @@ def unique_name(document: Mapping[str, Any], path: Path) -> str:
     return f"{kind_of(path)} {path[1]}" if alike else name
 
 
-def place_words(path: Path, line: int | None) -> str:
-    """Return a place in the file with its line, if known: "blocks.liquids.order · line 385"."""
+def place_text(path: Path, line: int | None) -> str:
+    """Return a path as text, with its line if known: "blocks.liquids.order · line 385"."""
     place = ".".join(str(step + 1) if isinstance(step, int) else step for step in path)
     return " · ".join(filter(None, (place, "" if line is None else f"line {line}")))
 
@@ -275,8 +278,8 @@ def usage_text(document: Mapping[str, Any], path: Path) -> str:
     return f"used by {', '.join(using)}" if counts else "not used"
 
 
-_SHORTEST: Final = 3
-"""So many letters are typed before fields are looked for."""
+_MIN_SEARCH_LENGTH: Final = 3
+"""Number of letters from which on fields are searched."""
 LABEL, CHOSEN, OTHER, SENTENCE = range(4)
 _DEEPEST: Final = 3
 
@@ -286,48 +289,49 @@ class FoundField:
     """A field that matches a search."""
 
     element: Path
-    field: Path  # in the element
+    field: Path
     label: str
-    # the match: 0 its label, 1 its chosen value, 2 another choice, 3 only the sentence of a choice
-    rank: int = LABEL
+    rank: int = LABEL  # what matches: LABEL, the CHOSEN value, an OTHER choice, or only the SENTENCE of a choice
 
 
 def search_words(text: str) -> list[str]:
     """Return the search words, each without a plural "s"."""
-    return [part.removesuffix("s") if len(part) > _SHORTEST else part for part in text.casefold().split()]
+    return [part.removesuffix("s") if len(part) > _MIN_SEARCH_LENGTH else part for part in text.casefold().split()]
 
 
-def found_fields(study: Study, text: str) -> tuple[FoundField, ...]:
+def find_fields(study: Study, text: str) -> tuple[FoundField, ...]:
     """Return the fields whose labels or choices have words that begin with the search words, labels first.
 
     Choices that are not selected are considered only if no label and no selected choice matches; sentences come last.
     """
     parts = search_words(text)
-    if not parts or len(text.strip()) < _SHORTEST:
+    if not parts or len(text.strip()) < _MIN_SEARCH_LENGTH:
         return ()
     fields = [match for field in _searchable_fields(study) for match in _matches_in_field(field, parts)]
-    best = min((match.rank for match in fields), default=0)
-    return tuple(sorted((match for match in fields if match.rank <= max(best, CHOSEN)), key=lambda match: match.rank))
+    best_rank = min((match.rank for match in fields), default=0)
+    return tuple(
+        sorted((match for match in fields if match.rank <= max(best_rank, CHOSEN)), key=lambda match: match.rank)
+    )
 
 
-def found_in_elements(study: Study, text: str) -> Mapping[Path, FoundField]:
+def first_match_by_element(study: Study, text: str) -> Mapping[Path, FoundField]:
     """Return the first matching field of each element."""
     first: dict[Path, FoundField] = {}
-    for field in found_fields(study, text):
+    for field in find_fields(study, text):
         first.setdefault(field.element, field)
     return first
 
 
 @lru_cache(maxsize=2)
 def _searchable_fields(study: Study) -> tuple[tuple[Path, Row, str], ...]:
-    shown = outline(study)
-    parts = [element.path for element in (*shown.session, *shown.parts) if len(element.path) > 1]
-    elements = dict.fromkeys((*parts, *(element.path for element in shown.study)))
+    study_outline = outline(study)
+    parts = [element.path for element in (*study_outline.session, *study_outline.parts) if len(element.path) > 1]
+    elements = dict.fromkeys((*parts, *(element.path for element in study_outline.study)))
     blocks = entries(study.document, "blocks.*")
     main = (path for path, block in blocks if isinstance(block, Mapping) and block.get("phase", "main") == "main")
-    whose = SEQUENCE if value_at(study.document, SEQUENCE) else next(main, None)  # groups have their own sequences
-    of_blocks = () if whose is None else rows_of_blocks(study.document)  # not again elsewhere
-    fields: dict[Path, tuple[Path, Row, str]] = {row.path: (whose or FIRST, row, row.label) for row in of_blocks}
+    owner = SEQUENCE if value_at(study.document, SEQUENCE) else next(main, None)  # groups have their own sequences
+    block_rows = () if owner is None else main_block_rows(study.document)  # not again elsewhere
+    fields: dict[Path, tuple[Path, Row, str]] = {row.path: (owner or FIRST, row, row.label) for row in block_rows}
     for element in elements:
         for row, label in _fields_of_table(study, element, ""):
             fields.setdefault(row.path, (element, row, label))
@@ -352,12 +356,12 @@ def _matches_in_field(field: tuple[Path, Row, str], parts: list[str]) -> Iterato
         yield FoundField(element, row.path, label)
         return
     for choice in row.choices if row.kind in {"choice", "choices", "kind"} else ():
-        named = label_of(choice.value or "")
-        whole = f"{label} {named} {choice.sentence}"
-        if choice.value and _has_words(whole, parts):
+        name = label_of(choice.value or "")
+        searched_text = f"{label} {name} {choice.sentence}"
+        if choice.value and _has_words(searched_text, parts):
             current = row.default if row.value is None else row.value
-            of_name = CHOSEN if choice.value == current else OTHER
-            rank = of_name if any(_has_words(named, [part]) for part in parts) else SENTENCE
+            name_rank = CHOSEN if choice.value == current else OTHER
+            rank = name_rank if any(_has_words(name, [part]) for part in parts) else SENTENCE
             yield FoundField(element, row.path, label, rank)
 
 

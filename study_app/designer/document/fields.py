@@ -1,4 +1,4 @@
-"""Rows of the tables of a study, from the JSON Schema of the file format, initial values, and what names what."""
+"""The form rows of a study's tables, made from the JSON Schema of the file format; initial values; references."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ Document = Mapping[str, Any]
 ITEMS = "items"
 CONTRASTS: Final[Path] = ("analysis", "contrasts")
 EXCLUSIONS: Final[Path] = ("analysis", "exclusions")
-_MAY_LEAVE_OUT = (("blocks", "task"), ("stimuli", "condition"))
-"""Sections whose tables may leave a key out, which then stands for the only table that it may name."""
+_OMISSIBLE_REFERENCES = (("blocks", "task"), ("stimuli", "condition"))
+"""Section and key of references that may be omitted if there is only one table to refer to."""
 
 
-def named_at(document: Document, place: Path) -> Path | None:
+def referenced_element(document: Document, place: Path) -> Path | None:
     """Return the path of the element to which the text at ``place`` refers, or None."""
     name = value_at(document, place)
     if not isinstance(name, str):
@@ -51,9 +51,9 @@ def named_at(document: Document, place: Path) -> Path | None:
     return None
 
 
-def references_to(document: Document, thing: Path) -> tuple[Path, ...]:
+def references_to(document: Document, element: Path) -> tuple[Path, ...]:
     """Return the places of the texts that refer to a table, such as ``("liquids", "water")``, or an item."""
-    return tuple(place for place, named in named_places(document) if named == thing)
+    return tuple(place for place, named in written_references(document) if named == element)
 
 
 def choices_at(document: Document, place: Path) -> tuple[str, ...] | None:
@@ -84,14 +84,14 @@ def default_designs() -> dict[str, Design]:
 
 
 def _designs_for(block: Mapping[str, Any]) -> Iterator[str]:
-    """Yield the kinds of designs that a block can have; conditions are compared with a standard."""
+    """Yield the kinds of designs that a block can have; without a stimulus, only those with a standard."""
     for kind, design in default_designs().items():
         if "stimulus" in block or (design.has_standard and not design.adjusts):
             yield kind
 
 
 def kind_note(place: Path, kind: str) -> str:
-    """Return the published name of a kind of design and its question; for a method, its rule for levels."""
+    """Return the published name and the question of a kind of design, or the rule of a kind of method."""
     if place[-1] == "design" and kind in default_designs():
         design = default_designs()[kind]
         return f"{design.paper_name}: {LANGUAGES['en'].design_questions[design.wording]}"
@@ -105,92 +105,98 @@ def sections_at(place: Path) -> tuple[str, ...]:
 
 
 def edits_to_rename(
-    document: Document, thing: Path, name: str, recorded: frozenset[str] = frozenset()
+    document: Document, element: Path, name: str, recorded: frozenset[str] = frozenset()
 ) -> tuple[Edit, ...]:
     """Return the edits that rename a table or item and all references to it.
 
-    If the name is rejected, a free one without ``recorded`` answers is proposed.
+    Raises Refused if the name is invalid or taken, and proposes a free one without ``recorded`` answers.
     """
-    item = _item_id(document, thing)
-    taken = _sibling_names(document, thing)
-    title = value_at(document, (*thing, "text" if item is not None else "title"))
+    item = _item_id(document, element)
+    taken = _sibling_names(document, element)
+    title = value_at(document, (*element, "text" if item is not None else "title"))
     text = next(iter(title.values()), "") if isinstance(title, Mapping) else title
-    own = str(item or thing[-1])
-    wanted = id_of(name) or id_of(str(text or ""), MAX_FROM_TEXT) or id_of(own) or "question"
-    free = free_id(taken | (recorded - {own}), wanted)
+    own = str(item or element[-1])
+    base_id = id_of(name) or id_of(str(text or ""), MAX_FROM_TEXT) or id_of(own) or "question"
+    free = free_id(taken | (recorded - {own}), base_id)
     check_id(name, free)
     if name in taken:
-        where = "" if item is None else " by another item in this questionnaire"
-        raise Refused(f'the name "{name}" is already used{where}; "{free}" is available')
+        scope = "" if item is None else " by another item in this questionnaire"
+        raise Refused(f'the name "{name}" is already used{scope}; "{free}" is available')
     if item is None:
-        return (Rename(thing, name, references_to(document, thing)),)
-    return (Set((*thing, "id"), name), *(Set(place, name) for place in references_to(document, thing)))
+        return (Rename(element, name, references_to(document, element)),)
+    return (Set((*element, "id"), name), *(Set(place, name) for place in references_to(document, element)))
 
 
-def id_at(document: Document, thing: Path) -> str:
+def id_at(document: Document, element: Path) -> str:
     """Return the id of a table or item; "" if it has none."""
-    return str(_item_id(document, thing) or thing[-1]) if value_at(document, thing) is not None else ""
+    return str(_item_id(document, element) or element[-1]) if value_at(document, element) is not None else ""
 
 
-def suggested_id(document: Document, thing: Path, recorded: frozenset[str] = frozenset()) -> str:
-    """Return a free id made from the text of a table or item; "" if it equals the id or there is no text."""
-    text = value_at(document, (*thing, "text" if _item_id(document, thing) is not None else "title"))
+def suggested_id(document: Document, element: Path, recorded: frozenset[str] = frozenset()) -> str:
+    """Return a free ID made from the text of a table or item; "" without a text, or if it has this ID already."""
+    text = value_at(document, (*element, "text" if _item_id(document, element) is not None else "title"))
     if isinstance(text, Mapping):
         text = text.get(languages_of(document)[0])
-    wanted = id_of(text, MAX_FROM_TEXT) if isinstance(text, str) else ""
-    own = id_at(document, thing)
-    free = free_id(_sibling_names(document, thing) | (recorded - {own}), wanted) if wanted else ""
+    base_id = id_of(text, MAX_FROM_TEXT) if isinstance(text, str) else ""
+    own = id_at(document, element)
+    free = free_id(_sibling_names(document, element) | (recorded - {own}), base_id) if base_id else ""
     return "" if free == own else free
 
 
-def _sibling_names(document: Document, thing: Path) -> set[str]:
+def _sibling_names(document: Document, element: Path) -> set[str]:
     """Return the names that other tables or items already have."""
-    if _item_id(document, thing) is None:
-        node = value_at(document, thing[:-1])
-        return {*(tuple(node) if isinstance(node, Mapping) else ())} - {str(thing[-1])}
-    return {str(other["id"]) for path, other in _items(document) if (thing[:2] == path[:2]) and path != thing}
+    if _item_id(document, element) is None:
+        node = value_at(document, element[:-1])
+        return {*(tuple(node) if isinstance(node, Mapping) else ())} - {str(element[-1])}
+    return {str(other["id"]) for path, other in _items(document) if (element[:2] == path[:2]) and path != element}
 
 
-def edits_to_replace(document: Document, thing: Path, other: str) -> tuple[Edit, ...]:
+def edits_to_replace(document: Document, element: Path, other: str) -> tuple[Edit, ...]:
     """Return the edits that delete an element and redirect its references to another one."""
-    return (*(Set(place, other) for place in references_to(document, thing)), Unset(thing))
+    return (*(Set(place, other) for place in references_to(document, element)), Unset(element))
 
 
-def with_references(document: Document, thing: Path, needs: Callable[[Path], bool]) -> tuple[Path, ...]:
-    """Return the paths that must be deleted with an element (last): list entries, keys and whole tables.
+def paths_to_delete(document: Document, element: Path, is_required: Callable[[Path], bool]) -> tuple[Path, ...]:
+    """Return the paths to delete with an element: list entries, keys and whole tables; the element comes last.
 
-    A table for which a key is required according to ``needs`` is deleted too, and so is one whose list would become
-    empty.
+    A table is deleted, too, if it loses a key that is required according to ``is_required``, or the last entry of a
+    required list.
     """
-    named: dict[Path, list[Path]] = {}
-    for place, target in _uses_without_conditions(document):
-        named.setdefault(place, []).append(target)
-    gone = [thing]
-    for inner in gone:  # grows while it is read
-        for place, targets in named.items():
-            touched = any(_is_within(target, inner) for target in targets)
-            if not touched or _is_covered(place, gone) or not all(_is_covered(target, gone) for target in targets):
+    targets_by_place: dict[Path, list[Path]] = {}
+    for place, target in _references_without_conditions(document):
+        targets_by_place.setdefault(place, []).append(target)
+    deleted = [element]
+    for inner in deleted:  # grows while it is read
+        for place, targets in targets_by_place.items():
+            refers_to_deleted = any(_is_within(target, inner) for target in targets)
+            if (
+                not refers_to_deleted
+                or _is_covered(place, deleted)
+                or not all(_is_covered(target, deleted) for target in targets)
+            ):
                 continue
             array = place[:-1]
             if not isinstance(place[-1], int):
-                gone.append(place if value_at(document, place) is not None and not needs(place) else place[:2])
+                deleted.append(place if value_at(document, place) is not None and not is_required(place) else place[:2])
                 continue
-            gone.append(place)
-            empty = all(_is_covered((*array, at), gone) for at in range(len(value_at(document, array))))
-            if empty and len(array) > 2:
-                gone.append(array[:2] if needs(array) else array)
-    outermost = [path for path in gone[1:] if not _is_covered(path, (other for other in gone if other != path))]
-    return (*outermost[::-1], thing)
+            deleted.append(place)
+            becomes_empty = all(
+                _is_covered((*array, index), deleted) for index in range(len(value_at(document, array)))
+            )
+            if becomes_empty and len(array) > 2:
+                deleted.append(array[:2] if is_required(array) else array)
+    outermost = [path for path in deleted[1:] if not _is_covered(path, (other for other in deleted if other != path))]
+    return (*outermost[::-1], element)
 
 
 def edits_to_delete(paths: Iterable[Path]) -> tuple[Edit, ...]:
     """Return the edits that remove these paths: later entries of an array first, without duplicates."""
-    every = set(paths)
-    outer = [path for path in every if not any(path[:length] in every for length in range(1, len(path)))]
+    all_paths = set(paths)
+    outermost = [path for path in all_paths if not any(path[:length] in all_paths for length in range(1, len(path)))]
     return tuple(
         Unset(path)
         for path in sorted(
-            outer,
+            outermost,
             key=lambda path: tuple((step, 0) if isinstance(step, str) else ("", step) for step in path),
             reverse=True,
         )
@@ -198,7 +204,7 @@ def edits_to_delete(paths: Iterable[Path]) -> tuple[Edit, ...]:
 
 
 def check_id(name: str, free: str = "") -> None:
-    """Reject an invalid id and propose a valid one."""
+    """Raise Refused if an ID is invalid; the message proposes ``free``, if given."""
     plain = name.isascii() and name.replace("_", "a").isalnum() and name == name.lower()
     if not plain or not name[:1].isalpha() or len(name) > MAX_ID:
         rule = f"at most {MAX_ID} lowercase letters, digits and underscores, starting with a letter"
@@ -214,8 +220,8 @@ def _is_covered(path: Path, outer: Iterable[Path]) -> bool:
     return any(_is_within(path, outer_path) for outer_path in outer)
 
 
-def named_places(document: Document) -> Iterator[tuple[Path, Path]]:
-    """Yield every place that contains a reference, with its target."""
+def written_references(document: Document) -> Iterator[tuple[Path, Path]]:
+    """Yield the path of every reference in the file, with its target."""
     for pattern in CHOICES:
         for place, name in entries(document, pattern):
             for section in _sections(document, pattern):
@@ -230,34 +236,34 @@ def named_places(document: Document) -> Iterator[tuple[Path, Path]]:
 
 
 def all_references(document: Document) -> Iterator[tuple[Path, Path]]:
-    """Yield every reference, and each omitted key with the only table to which it can refer."""
-    yield from named_places(document)
-    for section, key in _MAY_LEAVE_OUT:
-        (of,) = _sections(document, f"{section}.*.{key}")
-        yield from _implied_uses(document, section, key, of)
+    """Yield every reference with its target; an omitted key refers to the only table that it can name."""
+    yield from written_references(document)
+    for section, key in _OMISSIBLE_REFERENCES:
+        (target_section,) = _sections(document, f"{section}.*.{key}")
+        yield from _implied_references(document, section, key, target_section)
 
 
-def orphaned_keys(document: Document, things: Iterable[Path]) -> tuple[Path, ...]:
-    """Return the omitted keys that refer to nothing once all of these tables are deleted."""
-    gone = set(things)
-    meant: dict[Path, set[Path]] = {}
-    for place, named in _uses_without_conditions(document):
+def orphaned_keys(document: Document, tables: Iterable[Path]) -> tuple[Path, ...]:
+    """Return the omitted keys that refer to nothing after these tables are deleted."""
+    deleted = set(tables)
+    targets_by_key: dict[Path, set[Path]] = {}
+    for place, target in _references_without_conditions(document):
         if value_at(document, place) is None:
-            meant.setdefault(place, set()).add(named)
-    return tuple(place for place, named in meant.items() if named <= gone)
+            targets_by_key.setdefault(place, set()).add(target)
+    return tuple(place for place, target in targets_by_key.items() if target <= deleted)
 
 
-def _uses_without_conditions(document: Document) -> Iterator[tuple[Path, Path]]:
-    """Yield the same as `all_references`, with the meaning of omitted keys in a study without conditions."""
+def _references_without_conditions(document: Document) -> Iterator[tuple[Path, Path]]:
+    """Yield `all_references`, and those that omitted keys would have in the study without its conditions."""
     yield from all_references(document)
     if "conditions" in document:
-        yield from _implied_uses(document, "stimuli", "condition", "liquids")
+        yield from _implied_references(document, "stimuli", "condition", "liquids")
 
 
-def _implied_uses(document: Document, section: str, key: str, of: str) -> Iterator[tuple[Path, Path]]:
-    if len(only := names(document, of)) == 1:
+def _implied_references(document: Document, section: str, key: str, target_section: str) -> Iterator[tuple[Path, Path]]:
+    if len(target_names := names(document, target_section)) == 1:
         tables = entries(document, f"{section}.*")
-        yield from (((*path, key), (of, only[0])) for path, table in tables if not has(table, key))
+        yield from (((*path, key), (target_section, target_names[0])) for path, table in tables if not has(table, key))
 
 
 def _sections(document: Document, pattern: str) -> tuple[str, ...]:
@@ -272,8 +278,8 @@ def _items(document: Document) -> Iterator[tuple[Path, Mapping[str, Any]]]:
             yield path, item
 
 
-def _item_id(document: Document, thing: Path) -> str | None:
-    return next((item["id"] for path, item in _items(document) if path == thing), None)
+def _item_id(document: Document, element: Path) -> str | None:
+    return next((item["id"] for path, item in _items(document) if path == element), None)
 
 
 def _can_name_item(place: Path, item: Path) -> bool:
@@ -288,7 +294,7 @@ def _matches_pattern(place: Path, pattern: str) -> bool:
 
 _Node: TypeAlias = Mapping[str, Any]
 OWN = "own description"
-"""Where a node keeps what its own model says of it, if the place it is at has a description, too."""
+"""Key of a node's own description, which a description of the union around it would replace."""
 
 
 def node_at(document: Any, path: Path) -> tuple[_Node, ...]:
@@ -305,7 +311,7 @@ def table_of(nodes: tuple[_Node, ...], value: Any) -> _Node | None:
     """Return the alternative of a table or array whose fixed key, such as ``kind``, matches the value."""
     if isinstance(value, Mapping):
         tables = [node for node in nodes if node.get("type") == "object"]
-        return next((node for node in tables if _is_of(node, tables, value)), tables[0] if tables else None)
+        return next((node for node in tables if _matches_kind(node, tables, value)), tables[0] if tables else None)
     several = [node for node in nodes if node.get("type") in {"object", "array"}]
     arrays = [node for node in several if node["type"] == "array"]
     return next(iter(arrays if isinstance(value, tuple) and arrays else several), None)
@@ -317,12 +323,12 @@ def distinguishing_key(nodes: tuple[_Node, ...]) -> tuple[str, dict[str | None, 
     if len(tables) < 2:
         return "", {}
     keys = {**tables[0]["properties"], **tables[1]["properties"]}
-    key = next((key for key in keys if _distinguishes(key, tables)), "")
+    key = next((key for key in keys if _is_distinguishing(key, tables)), "")
     return key, {value: node for node in tables for value in _fixed_values(node, key) or (None,)} if key else {}
 
 
 def alternatives(node: _Node) -> Iterator[_Node]:
-    """Yield the alternatives of a node except null, with references resolved and the node's common keys added."""
+    """Yield the alternatives of a node except null, with references resolved and the keys of the union added."""
     around = {key: value for key, value in node.items() if key not in {"$ref", "anyOf", "oneOf", "discriminator"}}
     if "$ref" in node:
         definition = schema()["$defs"][node["$ref"].rsplit("/", 1)[-1]]
@@ -340,7 +346,7 @@ def _with_union_keys(around: _Node, node: _Node) -> _Node:
     return {**node, **own, **around}
 
 
-def _is_of(node: _Node, tables: list[_Node], value: Mapping[str, Any]) -> bool:
+def _matches_kind(node: _Node, tables: list[_Node], value: Mapping[str, Any]) -> bool:
     key, named = distinguishing_key(tuple(tables))
     if not key:
         return True
@@ -351,7 +357,7 @@ def _is_of(node: _Node, tables: list[_Node], value: Mapping[str, Any]) -> bool:
     return (chosen is None or isinstance(chosen, str)) and named.get(chosen) is node
 
 
-def _distinguishes(key: str, tables: list[_Node]) -> bool:
+def _is_distinguishing(key: str, tables: list[_Node]) -> bool:
     """Return whether the key has a different fixed value in each table; one table may lack it."""
     values = [_fixed_values(node, key) for node in tables]
     every = [value for some in values for value in some]
@@ -382,24 +388,24 @@ Kind: TypeAlias = Literal[
     "number", "whole number", "text", "paragraphs", "localised", "switch", "choice", "kind", "reference",
     "numbers", "vector", "points", "texts", "choices", "references", "list", "table", "tables", "either", "unknown",
 ]  # fmt: skip
-"""How a value is edited: "localised" has a text per language, "switch" is true or false, "choice" one of some words,
-"kind" a choice that decides the other rows, "vector" numbers of one point, "list" tables in an array, "tables" tables
-by name, "either" one of several other kinds; an "unknown" key does not belong to the table."""
+"""How a value is edited: "localised" has a text per language, "switch" is true or false, "choice" is one of several
+words, "kind" is a choice that determines the other rows, "vector" has the coordinates of one point, "list" has tables
+in an array, "tables" has tables by name, "either" is one of several other kinds; an "unknown" key is not permitted."""
 
 _UNITS: Final = {
     "mm": "mm", "m": "m", "s": "s", "ms": "ms", "n": "N", "hz": "Hz", "deg": "°", "percent": "%", "mps": "m/s",
     "mps2": "m/s²", "m2ps": "m²/s", "nspm": "N·s/m", "pa": "Pa", "pa_s": "Pa·s", "pa_sn": "Pa·sⁿ", "kg_m3": "kg/m³",
     "per_s": "1/s",
 }  # fmt: skip
-"""The unit of each ending of a key."""
+"""Unit of each key suffix."""
 
-_OF_NUMBERS: Final = {
+_BOUND_PHRASES: Final = {
     "minimum": "at least {}",
     "exclusiveMinimum": "more than {}",
     "maximum": "at most {}",
     "exclusiveMaximum": "less than {}",
 }
-_HOLDS: Final = {
+_BOUND_CHECKS: Final = {
     "minimum": operator.ge, "exclusiveMinimum": operator.gt, "maximum": operator.le, "exclusiveMaximum": operator.lt,
 }  # fmt: skip
 _SENTENCES: Final = re.compile(r"((?:[a-z_0-9-]+, )*[a-z_0-9-]+): ([^;]+?)(?:; |\.?\Z)")
@@ -491,7 +497,7 @@ _LABELS: Final = {
     "withheld_percent": "Withheld force",
     "wrong_most": "Maximum incorrect catch trials",
 }
-"""Labels of keys and values whose names are unclear, without their unit; sources in `docs/glossary.md`."""
+"""Labels, without their unit, of keys and values whose names are unclear; sources in `docs/glossary.md`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -506,7 +512,7 @@ class Choice:
 class Row:
     """One row of a form."""
 
-    path: Path  # the place in the document that it edits
+    path: Path  # path of the value that it edits
     kind: Kind  # how it is edited, see `Kind`
     # its texts, "" if there are none
     label: str
@@ -517,11 +523,11 @@ class Row:
     required: bool = False  # whether the key cannot be omitted
     bounds: tuple[str, ...] = ()  # the permitted values as in messages: "at least 0", "at most 8"
     reason: str = ""  # the reason of the bounds, "" if the model has none
-    choices: tuple[Choice, ...] = ()  # the values that can be chosen, or named
-    either: tuple[Row, ...] = ()  # its alternatives, only of kind "either"
-    instead: str = ""  # the alternative key, exactly one of the two being given; "" if there is none
+    choices: tuple[Choice, ...] = ()  # the values or elements that can be chosen
+    either: tuple[Row, ...] = ()  # the alternatives of kind "either"
+    instead: str = ""  # the alternative key, if exactly one of the two must be given; "" otherwise
     model: str = ""  # the title of the model whose key it is, such as "Block"
-    sections: tuple[str, ...] = ()  # the sections whose tables are named, only of references
+    sections: tuple[str, ...] = ()  # for references, the sections that they can refer to
 
 
 def rows(document: Mapping[str, Any], path: Path) -> tuple[Row, ...]:
@@ -534,10 +540,10 @@ def rows(document: Mapping[str, Any], path: Path) -> tuple[Row, ...]:
         length = len(node["prefixItems"]) if "prefixItems" in node else len(value) if isinstance(value, tuple) else 0
         return tuple(row for index in range(length) for row in (row_at(document, (*path, index)),) if row)
     properties = node.get("properties", {})
-    written = tuple(value) if isinstance(value, Mapping) else ()
-    keys = list(dict.fromkeys((*filter(None, [distinguishing_key(nodes)[0]]), *properties, *written)))
-    found_rows = (row_at(document, (*path, key)) for key in keys)
-    return tuple(row for row in found_rows if row is not None)
+    present_keys = tuple(value) if isinstance(value, Mapping) else ()
+    keys = list(dict.fromkeys((*filter(None, [distinguishing_key(nodes)[0]]), *properties, *present_keys)))
+    all_rows = (row_at(document, (*path, key)) for key in keys)
+    return tuple(row for row in all_rows if row is not None)
 
 
 def sections_of(document: Mapping[str, Any], path: Path) -> tuple[tuple[str, tuple[str, ...]], ...]:
@@ -551,14 +557,17 @@ def key_order(document: Mapping[str, Any], path: Path) -> dict[str, int]:
     nodes, value = node_at(document, path), value_at(document, path)
     node, table = table_of(nodes, value) or {}, value if isinstance(value, Mapping) else {}
     in_sections = (key for _, keys in node.get(FormKey.SECTIONS, ()) for key in keys)
-    written = (distinguishing_key(nodes)[0], *in_sections, *node.get("properties", ()), *table)
-    inner = {key for key, part in table.items() if isinstance(part, Mapping)
+    ordered_keys = (distinguishing_key(nodes)[0], *in_sections, *node.get("properties", ()), *table)
+    inner_tables = {key for key, part in table.items() if isinstance(part, Mapping)
              and any("properties" in node for node in node_at(document, (*path, key)))}  # fmt: skip
-    return {key: at for at, key in enumerate(sorted(dict.fromkeys(written), key=lambda key: key in inner))}
+    return {
+        key: position
+        for position, key in enumerate(sorted(dict.fromkeys(ordered_keys), key=lambda key: key in inner_tables))
+    }
 
 
 def refused_at(document: Mapping[str, Any], path: Path) -> frozenset[str]:
-    """Return the keys that a table with its current values does not permit."""
+    """Return the keys that a table does not permit with its current values."""
     table = value_at(document, path)
     node = table_of(node_at(document, path), table) or {}
     if not isinstance(table, Mapping):
@@ -570,34 +579,34 @@ def refused_at(document: Mapping[str, Any], path: Path) -> frozenset[str]:
 
 
 def row_at(document: Mapping[str, Any], path: Path) -> Row | None:
-    """Return the row of one place; None if it is not within a model."""
+    """Return the row of a path; None if no model has this path."""
     siblings, value = node_at(document, path[:-1]), value_at(document, path)
-    around = table_of(siblings, value_at(document, path[:-1]))
-    if around is None:
+    table = table_of(siblings, value_at(document, path[:-1]))
+    if table is None:
         return None
-    key, named = distinguishing_key(siblings)
+    key, nodes_by_kind = distinguishing_key(siblings)
     if key and key == path[-1]:
         options = tuple(
-            Choice(tag, _help_of(str(node.get(OWN, node.get("description", ""))).split("\n\n")[0]))
-            for tag, node in named.items()
+            Choice(tag, _plain_text(str(node.get(OWN, node.get("description", ""))).split("\n\n")[0]))
+            for tag, node in nodes_by_kind.items()
         )
         return Row(
             path=path,
             kind="kind",
             label=label_of(key),
             value=value,
-            default=around.get("properties", {}).get(key, {}).get("default") if None in named else None,
-            required=None not in named,  # the schema has a default for each kind, but validation needs the key
+            default=table.get("properties", {}).get(key, {}).get("default") if None in nodes_by_kind else None,
+            required=None not in nodes_by_kind,  # the schema has a default for each kind, but validation needs the key
             choices=options,
-            model=around.get("title", ""),
+            model=table.get("title", ""),
         )
     nodes = node_at(document, path)
     if not nodes:
         return None if value is None else Row(path=path, kind="unknown", label=label_of(path[-1]), value=value)
-    row = _make_row(document, path, nodes, value, required=path[-1] in around.get("required", ()))
-    pairs = [pair for pair in around.get(FormKey.ONE_OF, ()) if path[-1] in pair]
+    row = _make_row(document, path, nodes, value, required=path[-1] in table.get("required", ()))
+    pairs = [pair for pair in table.get(FormKey.ONE_OF, ()) if path[-1] in pair]
     instead = next((key for pair in pairs for key in pair if key != path[-1]), "")
-    return replace(row, instead=instead, model=around.get("title", ""))
+    return replace(row, instead=instead, model=table.get("title", ""))
 
 
 def _make_row(document: Mapping[str, Any], path: Path, nodes: tuple[_Node, ...], value: Any, *, required: bool) -> Row:
@@ -605,7 +614,7 @@ def _make_row(document: Mapping[str, Any], path: Path, nodes: tuple[_Node, ...],
     common: dict[str, Any] = {
         "label": label_at(path),
         "unit": unit_of(next((step for step in reversed(path) if isinstance(step, str)), "")),
-        "help": _help_of(first.get("description", "")),
+        "help": _plain_text(first.get("description", "")),
         "value": value,
         "default": first.get("default", first.get("const")),
         "required": required,
@@ -615,15 +624,15 @@ def _make_row(document: Mapping[str, Any], path: Path, nodes: tuple[_Node, ...],
     if len(nodes) > 1 and not distinguishing_key(nodes)[0]:
         either = tuple(_make_row(document, path, (node,), value, required=required) for node in nodes)
         return Row(path=path, kind="either", **common, either=either)
-    named = (*path, 0) if first.get("type") == "array" else path
-    references = choices_at(document, named)
+    reference_path = (*path, 0) if first.get("type") == "array" else path
+    references = choices_at(document, reference_path)
     kind = _kind(first, isinstance(references, tuple))
     choices = first.get("items", first) if kind == "choices" else first
     names = references if kind in {"reference", "references"} and references is not None else _permitted_values(choices)
     sentences = _value_sentences(common["help"])
     options = tuple(Choice(name, sentences.get(name, "")) for name in names)
-    limits = _numbers_in(first) if kind in {"vector", "numbers", "points"} else first
-    common["sections"] = sections_at(named) if kind in {"reference", "references"} else ()
+    limits = _number_node(first) if kind in {"vector", "numbers", "points"} else first
+    common["sections"] = sections_at(reference_path) if kind in {"reference", "references"} else ()
     return Row(
         path=path,
         kind=kind,
@@ -639,14 +648,14 @@ def _kind(node: _Node, references: bool) -> Kind:
     if kind == "array":
         if references:
             return "references"
-        inner = next(alternatives(node["items"])) if "items" in node else node["prefixItems"][0]
+        entry = next(alternatives(node["items"])) if "items" in node else node["prefixItems"][0]
         if "prefixItems" in node:
             return "vector"
-        if inner.get("type") == "object":
+        if entry.get("type") == "object":
             return "list"
-        if inner.get("type") == "array":
-            return "points" if "prefixItems" in inner else "list"
-        return "choices" if "enum" in inner else "texts" if inner.get("type") == "string" else "numbers"
+        if entry.get("type") == "array":
+            return "points" if "prefixItems" in entry else "list"
+        return "choices" if "enum" in entry else "texts" if entry.get("type") == "string" else "numbers"
     if kind == "object":
         return "table" if "properties" in node else "tables"
     if kind == "string":
@@ -667,19 +676,19 @@ def is_localised(nodes: tuple[_Node, ...]) -> bool:
     return nodes[1].get("additionalProperties") == {"type": "string"}
 
 
-def _numbers_in(node: _Node) -> _Node:
+def _number_node(node: _Node) -> _Node:
     while node.get("type") == "array":
         node = node["prefixItems"][0] if "prefixItems" in node else next(alternatives(node["items"]))
     return node
 
 
-_NO_BOUND: Final = 1e6
-"""The form says nothing of bounds that no author reaches."""
+_SHOWN_BOUND_LIMIT: Final = 1e6
+"""Bounds of at least this size are not shown, because no author reaches them."""
 
 
 def _bound_texts(node: _Node, numbers: _Node) -> tuple[str, ...]:
-    stated = {key: numbers[key] for key in _OF_NUMBERS if key in numbers and abs(numbers[key]) < _NO_BOUND}
-    phrases = [_OF_NUMBERS[key].format(exact_text(number)) for key, number in stated.items()]
+    bounds = {key: numbers[key] for key in _BOUND_PHRASES if key in numbers and abs(numbers[key]) < _SHOWN_BOUND_LIMIT}
+    phrases = [_BOUND_PHRASES[key].format(exact_text(number)) for key, number in bounds.items()]
     if "prefixItems" not in node:
         phrases += length_texts(node)
     return (*phrases, rule_of(node["pattern"])) if "pattern" in node else tuple(phrases)
@@ -690,8 +699,8 @@ def violated_bound(document: Mapping[str, Any], row: Row, number: float) -> str:
     node = node_at(document, row.path)[0]
     if row.kind == "whole number" and not isinstance(number, int):
         return "a whole number"
-    broken = (key for key, holds in _HOLDS.items() if key in node and not holds(number, node[key]))
-    return next((_OF_NUMBERS[key].format(exact_text(node[key])) for key in broken), "")
+    violated = (key for key, is_met in _BOUND_CHECKS.items() if key in node and not is_met(number, node[key]))
+    return next((_BOUND_PHRASES[key].format(exact_text(node[key])) for key in violated), "")
 
 
 def label_of(step: str | int) -> str:
@@ -724,13 +733,13 @@ def _unit_suffix(key: str) -> str:
     return max((suffix for suffix in _UNITS if key.endswith(f"_{suffix}")), key=len, default="")
 
 
-def _help_of(description: str) -> str:
-    """Return a description as one line of plain text: that of a table is a docstring with line breaks and markup."""
+def _plain_text(description: str) -> str:
+    """Return a description without line breaks and markup; a table's description is a docstring."""
     return re.sub("`(.+?)`", "“\\1”", " ".join(description.replace("``", "").split()))
 
 
 def _value_sentences(description: str) -> dict[str, str]:
-    """Return the sentence about each value in a description such as "fixed: as written; shuffled: anew each trial"."""
+    """Return the sentence on each value in a description such as "fixed: as written; shuffled: anew each trial"."""
     return {value: match[2].strip() for match in _SENTENCES.finditer(description) for value in match[1].split(", ")}
 
 
@@ -775,8 +784,8 @@ def _initial_of_kind(document: Mapping[str, Any], row: Row, node: _Node) -> Any:
     if kind in {"choice", "kind", "reference"}:
         return next((choice.value for choice in row.choices if choice.value is not None), "")
     if kind in {"references", "choices"}:
-        used = [choice.value for choice in row.choices]
-        return used[: max(1, node.get("minItems", 1))]
+        values = [choice.value for choice in row.choices]
+        return values[: max(1, node.get("minItems", 1))]
     if kind == "switch":
         return False
     if kind in {"number", "whole number"}:
@@ -800,28 +809,28 @@ def _initial_tables(document: Mapping[str, Any], path: Path, node: _Node) -> lis
     """Return the minimum number of tables for a list, each with its required keys, or of lists for sequences."""
     tables: list[Any] = []
     for number in range(max(1, node.get("minItems", 1))):
-        place = (*path, number)
+        table_path = (*path, number)
         if node["items"].get("type") == "array":
-            tables.append(initial_value(document, place))
+            tables.append(initial_value(document, table_path))
             continue
-        table = table_of(node_at(document, place), {})
+        table = table_of(node_at(document, table_path), {})
         required = () if table is None else table.get("required", ())
         name = f"{element_noun(path[-1])}_{number + 1}"
         text = _in_languages(document, label_of(name))
-        tables.append({key: name if key == "id" else text if key == "text" else initial_value(document, (*place, key))
-                      for key in required})  # fmt: skip
+        known = {"id": name, "text": text}
+        tables.append({key: known.get(key) or initial_value(document, (*table_path, key)) for key in required})
     return tables
 
 
 def _initial_text(document: Mapping[str, Any], path: Path, node: _Node, *, localised: bool) -> Any:
-    around = value_at(document, path[:-1])
+    table = value_at(document, path[:-1])
     if path[-1] == "id":
         taken = (str(name) for _, name in entries(document, ".".join((*map(str, path[:2]), "*", "*", "id"))))
         return free_id(taken, element_noun(path[-3]))
     if node.get("pattern") == LETTER:
         used = {letter for _, letter in entries(document, f"{path[0]}.*.{path[-1]}")}
         return next((letter for letter in string.ascii_uppercase if letter not in used), "Z")
-    name = around.get("id", path[-2]) if isinstance(around, Mapping) else path[-2]
+    name = table.get("id", path[-2]) if isinstance(table, Mapping) else path[-2]
     text = _new_text(path[-3]) if isinstance(name, int) else f"New {name_label(str(name)).lower()}"
     return _in_languages(document, text) if localised else text
 
@@ -831,10 +840,10 @@ def _in_languages(document: Mapping[str, Any], text: str) -> Any:
     return dict.fromkeys(languages, text) if len(languages) > 1 else text
 
 
-def _initial_number(node: _Node, otherwise: float) -> float:
-    wanted = next(iter(node.get("examples", ())), otherwise)
-    least, most = node.get("minimum", node.get("exclusiveMinimum", wanted)), node.get("maximum", wanted)
-    number = min(max(wanted, least), most)
+def _initial_number(node: _Node, default: float) -> float:
+    preferred = next(iter(node.get("examples", ())), default)
+    lowest, highest = node.get("minimum", node.get("exclusiveMinimum", preferred)), node.get("maximum", preferred)
+    number = min(max(preferred, lowest), highest)
     if number <= node.get("exclusiveMinimum", -math.inf):
         number += 1
     return int(number) if float(number).is_integer() else number

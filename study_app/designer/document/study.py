@@ -1,4 +1,4 @@
-"""A study that is edited: its text, from which all else is computed, and its steps of undo and redo."""
+"""A study that is being edited: its text, and everything that is computed from it."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ _NOT_TOML: Final = "the file cannot be read: correct its text first"
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """A part of a study that is being added or changed in kind, and the faults that it had before."""
+    """A part of a study that is being added or changed in kind, and the path and message of each earlier fault."""
 
     path: Path
     known: frozenset[tuple[Path, str]]
 
 
 def is_within(path: Path, entry: Path) -> bool:
-    """Return whether a place is that of an entry or in it."""
+    """Return whether a path is that of an entry or inside it."""
     return path[: len(entry)] == entry
 
 
@@ -37,7 +37,7 @@ class Study:
     """A study's text and everything that is computed from it."""
 
     text: str  # the file's text, with its own line breaks
-    folder: File = File()  # where the liquid files are that it names
+    folder: File = File()  # the folder of the liquid files that it names
     # the document of the last text that was valid TOML, used while this one is not
     before: Mapping[str, Any] = field(default_factory=dict, compare=False)
     # the entries that are being added or changed in kind: their new problems are not shown yet
@@ -92,7 +92,7 @@ class Study:
         return tuple(fault for fault in self.faults if not self.is_unfinished(fault))
 
     def is_in_entry(self, path: Path) -> bool:
-        """Return whether a place is in an unfinished entry."""
+        """Return whether a path is in an unfinished entry."""
         return any(is_within(path, entry.path) for entry in self.unfinished)
 
     def is_unfinished(self, fault: Fault) -> bool:
@@ -103,7 +103,7 @@ class Study:
         )
 
     def with_unfinished(self, entries: tuple[Entry, ...]) -> Study:
-        """Return the same study with other unfinished entries; nothing is computed again."""
+        """Return the study with other unfinished entries, keeping all computed properties."""
         same = copy(self)
         object.__setattr__(same, "unfinished", entries)
         return same
@@ -121,11 +121,11 @@ class Study:
 
     @property
     def is_unreadable(self) -> bool:
-        """Whether the text cannot be read as TOML and no earlier text could."""
+        """Whether neither the text nor an earlier one is valid TOML."""
         return not self.is_toml and not self.before
 
-    def needs(self, place: Path) -> bool:
-        """Return whether a table of a section would be incomplete without one of its keys."""
+    def is_required(self, place: Path) -> bool:
+        """Return whether the element that contains a key would have new faults without it."""
         after, _ = self.with_edits(Unset(place))
         table = place[:2]
         without = {fault for fault in after.faults if fault.path[: len(table)] == table}

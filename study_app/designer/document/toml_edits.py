@@ -1,4 +1,4 @@
-"""Edits of a TOML text, as splices: of keys and tables, of entries of arrays, and of values."""
+"""Edits of keys, tables, array entries and values in a TOML text, as splices."""
 
 import copy
 import re
@@ -37,23 +37,25 @@ def _replace_value(spans: Spans, edit: Editor, path: Path, value: Any) -> None:
     node = spans.node(path)
     if node is None or node.kind in {"table", "array table"}:
         raise Refused("a table with headers cannot be replaced with a single value")
-    text, like = spans.text, spans.text[node.value : node.end]
+    text, old_text = spans.text, spans.text[node.value : node.end]
     line = text.rfind("\n", 0, node.start) + 1
     indent = re.match(r"[ \t]*", text[line:]).group()  # type: ignore[union-attr]
     column = node.value - line
-    lines = node.kind == "key"
-    if lines and isinstance(value, Mapping) and value and column + len(inline_value(value)) > WIDTH:
+    on_own_line = node.kind == "key"
+    if on_own_line and isinstance(value, Mapping) and value and column + len(inline_value(value)) > WIDTH:
         key = text[node.parts[0][0] : node.parts[-1][1]]
         rows = (f"{key}.{key_text(name)} = {toml_value(part, newline=spans.newline)}" for name, part in value.items())
         edit.replace(node.start, node.end, f"{spans.newline}{indent}".join(rows))
         return
-    after = inline_value(value) if node.kind == "pair" else toml_value(value, like, spans.newline, indent, column)
-    edit.replace(node.value, node.end, after)
+    new_text = (
+        inline_value(value) if node.kind == "pair" else toml_value(value, old_text, spans.newline, indent, column)
+    )
+    edit.replace(node.value, node.end, new_text)
     padding = _PADDING.match(text, node.end)
-    if padding and "\n" not in like + after:
-        wide = len(padding.group(1))
-        kept = max(wide + len(like) - len(after), min(wide, 2))
-        edit.replace(*padding.span(1), padding.group(1) if kept == wide else " " * kept)
+    if padding and "\n" not in old_text + new_text:
+        padding_width = len(padding.group(1))
+        new_width = max(padding_width + len(old_text) - len(new_text), min(padding_width, 2))
+        edit.replace(*padding.span(1), padding.group(1) if new_width == padding_width else " " * new_width)
 
 
 def _add_key(spans: Spans, edit: Editor, path: Path, value: Any, after: str | None = None) -> None:
@@ -66,7 +68,7 @@ def _add_key(spans: Spans, edit: Editor, path: Path, value: Any, after: str | No
         _add_pair(spans, edit, owner, path, value)
     elif parent and owner is None and (dotted := [piece for piece in pieces if piece.node.kind in {"key", "pair"}]):
         _add_dotted(spans, edit, dotted[-1], path, value)
-    elif _with_header(spans, path, value):
+    elif _needs_header(spans, path, value):
         _add_table(spans, edit, path, value, after)
     elif parent and owner is None:
         body = table_text(parent, {path[-1]: value}, spans.newline)  # type: ignore[dict-item]
@@ -75,23 +77,25 @@ def _add_key(spans: Spans, edit: Editor, path: Path, value: Any, after: str | No
         _add_line(spans, edit, owner, path, value, after)
 
 
-def _with_header(spans: Spans, path: Path, value: Any) -> bool:
-    """Return whether a new table gets a header: like its neighbours, at the root, or if it needs several lines."""
+def _needs_header(spans: Spans, path: Path, value: Any) -> bool:
+    """Return whether a new table gets a header: next to tables with headers, at the root, or if it is too long."""
     if isinstance(value, list | tuple):
         if not value or not all(isinstance(entry, Mapping) and entry for entry in value):
             return False
     elif not isinstance(value, Mapping):
         return False
     fits = len(key_text(str(path[-1]))) + 3 + len(inline_value(value)) <= WIDTH
-    within = len(path) - 1
-    neighbours = any(len(node.path) > within and node.path[:within] == path[:-1] for node in spans.headers())
-    return not fits or len(path) == 1 or (neighbours and isinstance(value, Mapping))
+    parent_depth = len(path) - 1
+    has_neighbours = any(
+        len(node.path) > parent_depth and node.path[:parent_depth] == path[:-1] for node in spans.headers()
+    )
+    return not fits or len(path) == 1 or (has_neighbours and isinstance(value, Mapping))
 
 
 def _add_table(spans: Spans, edit: Editor, path: Path, value: Any, after: str | None) -> None:
-    entry = isinstance(value, list | tuple)
-    rows = value if entry else [value]
-    body = spans.newline.join(table_text(path, row, spans.newline, entry=entry) for row in rows)
+    is_array = isinstance(value, list | tuple)
+    rows = value if is_array else [value]
+    body = spans.newline.join(table_text(path, row, spans.newline, entry=is_array) for row in rows)
     pieces = _header_pieces(spans, (*path[:-1], after)) if after is not None else []
     pieces = pieces or (_header_pieces(spans, path[:-1]) if len(path) > 1 else [])
     _insert_block(spans, edit, pieces[-1].end if pieces else len(spans.text), body)
@@ -140,14 +144,14 @@ def _add_line(spans: Spans, edit: Editor, owner: Node | None, path: Path, value:
 
 
 def _add_pair(spans: Spans, edit: Editor, owner: Node, path: Path, value: Any) -> None:
-    inner = [piece for piece in spans.pieces(path[:-1])[:1] if piece.node is owner]
-    if not inner or spans.text[owner.value] != "{":
+    owner_pieces = [piece for piece in spans.pieces(path[:-1])[:1] if piece.node is owner]
+    if not owner_pieces or spans.text[owner.value] != "{":
         raise Refused("only a table can have keys")
     pair = f"{key_text(str(path[-1]))} = {inline_value(value)}"
     pairs = [node for node in spans.nodes if node.kind == "pair" and owner.value < node.start < owner.end]
-    top = [node for node in pairs if len(node.path) - len(node.parts) == len(path) - 1]
-    if top:
-        edit.insert(top[-1].end, f", {pair}")
+    own_pairs = [node for node in pairs if len(node.path) - len(node.parts) == len(path) - 1]
+    if own_pairs:
+        edit.insert(own_pairs[-1].end, f", {pair}")
     else:
         edit.replace(owner.value, owner.end, f"{{ {pair} }}")
 
@@ -172,11 +176,11 @@ def _remove_key(spans: Spans, edit: Editor, path: Path) -> None:
         if piece.node.kind == "pair":
             _remove_pair(spans, edit, piece)
         else:
-            edit.delete(_blank_start(spans.text, piece), piece.end)
+            edit.delete(_deletion_start(spans.text, piece), piece.end)
 
 
-def _blank_start(text: str, piece: Piece) -> int:
-    """Return the start of a deletion: before the blank lines above, if a blank line or the end follows."""
+def _deletion_start(text: str, piece: Piece) -> int:
+    """Return the start of a deletion, including the blank lines above if a blank line or the end follows."""
     start = piece.start
     if not _BLANK_LINE.match(text, piece.end):
         return start
@@ -208,9 +212,9 @@ def _copy_table(spans: Spans, edit: Editor, path: Path, name: str) -> None:
 
 
 def _renamed_text(spans: Spans, piece: Piece, depth: int, name: str) -> str:
-    """Return the whole lines of a piece with another name for the step at ``depth`` of its paths."""
+    """Return the lines of a piece with another name for the step at ``depth`` of its paths."""
     editor = Editor(spans.text)
-    for start, end in _key_parts(spans, piece.node.path[: depth + 1]):
+    for start, end in _key_spans(spans, piece.node.path[: depth + 1]):
         if piece.start <= start < piece.end:
             editor.replace(start, end, key_text(name))
     text, at = "", piece.start
@@ -221,7 +225,7 @@ def _renamed_text(spans: Spans, piece: Piece, depth: int, name: str) -> str:
     return text if piece.node.kind == "pair" or text.endswith("\n") else text + spans.newline
 
 
-def _key_parts(spans: Spans, path: Path) -> Iterator[tuple[int, int]]:
+def _key_spans(spans: Spans, path: Path) -> Iterator[tuple[int, int]]:
     """Yield the positions of a path's last step in headers and keys."""
     depth = len(path) - 1
     for node in spans.nodes:
@@ -256,10 +260,12 @@ def _insert_entry(spans: Spans, edit: Editor, path: Path, value: Any) -> None:
         edit.insert(node.end - 1, inline_value(value))
     elif index < len(slots):
         slot = slots[index]
-        own = slot.own_line
+        on_own_line = slot.own_line
         edit.insert(
             slot.start,
-            f"{_indent(spans, slot)}{inline_value(value)},{spans.newline}" if own else f"{inline_value(value)}, ",
+            f"{_indent(spans, slot)}{inline_value(value)},{spans.newline}"
+            if on_own_line
+            else f"{inline_value(value)}, ",
         )
     elif slots[-1].own_line:
         _append_lines(spans, edit, slots[-1], inline_value(value))
@@ -291,7 +297,7 @@ def _indent(spans: Spans, slot: Slot) -> str:
 
 
 def _append_lines(spans: Spans, edit: Editor, last: Slot, body: str, tail: str = "") -> None:
-    """Add lines after the line on which an entry ends, keeping its comment; add a missing comma."""
+    """Add lines after the one on which an entry ends, after its comment; add a missing comma."""
     newline = spans.newline
     comma = _TO_COMMA.match(spans.text, last.end)
     if comma is None:
@@ -317,7 +323,7 @@ def _remove_entry(spans: Spans, edit: Editor, path: Path) -> None:
     array, index = _array_and_index(path)
     if spans.node(array) is None:
         for piece in spans.pieces(path):
-            edit.delete(_blank_start(spans.text, piece), piece.end)
+            edit.delete(_deletion_start(spans.text, piece), piece.end)
         return
     text, slots = spans.text, spans.slots(array)
     slot, last = slots[index], index == len(slots) - 1
@@ -342,7 +348,7 @@ def _copy_entry(spans: Spans, edit: Editor, path: Path) -> None:
     text, newline = spans.text, spans.newline
     if spans.node(array) is None:
         pieces = spans.pieces(path)
-        copies = (_lines(text, piece, newline) for piece in pieces)
+        copies = (_whole_lines(text, piece, newline) for piece in pieces)
         _insert_block(spans, edit, pieces[-1].end, newline.join(copies))
         return
     slots = spans.slots(array)
@@ -356,7 +362,7 @@ def _copy_entry(spans: Spans, edit: Editor, path: Path) -> None:
         _append_lines(spans, edit, slot, text[slot.start : slot.end].lstrip(" \t"), tail)
 
 
-def _lines(text: str, piece: Piece, newline: str) -> str:
+def _whole_lines(text: str, piece: Piece, newline: str) -> str:
     lines = text[piece.start : piece.end]
     return lines if lines.endswith("\n") else lines + newline
 
@@ -392,13 +398,13 @@ def _move_table(spans: Spans, edit: Editor, array: Path, order: list[int]) -> No
     for place, source in enumerate(order):
         if place == source:
             continue
-        body = spans.newline.join(_lines(text, piece, spans.newline) for piece in pieces[source])
+        body = spans.newline.join(_whole_lines(text, piece, spans.newline) for piece in pieces[source])
         first, *others = pieces[place]
         if not text[first.start : first.end].endswith("\n"):
             body = body.removesuffix(spans.newline)
         edit.replace(first.start, first.end, body)
         for piece in others:
-            edit.delete(_blank_start(text, piece), piece.end)
+            edit.delete(_deletion_start(text, piece), piece.end)
 
 
 Document: TypeAlias = dict[str, Any]
@@ -446,7 +452,7 @@ class Move:
 
 @dataclass(frozen=True, slots=True)
 class Rename:
-    """Rename a table; ``references`` are the places of texts that refer to it and are changed, too."""
+    """Rename a table, and change the texts at the paths ``references``, which refer to it."""
 
     path: Path
     name: str
@@ -457,22 +463,25 @@ Edit: TypeAlias = Set | Unset | Insert | Duplicate | Move | Rename
 
 
 class WriterError(AssertionError):
-    """The edited text does not have the intended meaning: a bug of the writer."""
+    """The edited text does not have the intended meaning, which is a bug in this module."""
 
 
 def apply_edit(text: str, edit: Edit) -> tuple[str, tuple[Splices, ...]]:
-    """Return the text after an edit, and the splices of its steps, each relative to the text before it."""
+    """Return the text after an edit, and its splices, each relative to the text after the previous ones.
+
+    Raises Refused if the edit is not possible, and WriterError if the text does not have the intended meaning.
+    """
     document = _parse(text)
-    meant = meant_document(document, edit)
+    intended = intended_document(document, edit)
     steps: list[Splices] = []
     parts = list(_single_edits(document, edit))
     while parts:
-        part = parts.pop(0)
+        single_edit = parts.pop(0)
         spans, editor = spans_of(text), Editor(text)
-        if isinstance(part, Set) and _is_written_apart(spans, part.path):
-            parts = [Unset(part.path), part, *parts]
+        if isinstance(single_edit, Set) and _has_headers_or_dotted_keys(spans, single_edit.path):
+            parts = [Unset(single_edit.path), single_edit, *parts]
             continue
-        _write_edit(spans, editor, part)
+        _write_edit(spans, editor, single_edit)
         if editor.splices:
             steps.append(editor.splices)
             text = apply_splices(text, editor.splices)
@@ -480,8 +489,8 @@ def apply_edit(text: str, edit: Edit) -> tuple[str, tuple[Splices, ...]]:
         edited = _parse(text)
     except tomllib.TOMLDecodeError as error:
         raise WriterError(f"{edit} produced invalid TOML: {error}") from error
-    if not is_same_value(edited, meant) and not is_same_value(
-        _prune_empty_tables(copy.deepcopy(edited), edit.path), _prune_empty_tables(meant, edit.path)
+    if not is_same_value(edited, intended) and not is_same_value(
+        _prune_empty_tables(copy.deepcopy(edited), edit.path), _prune_empty_tables(intended, edit.path)
     ):
         raise WriterError(f"{edit} did not produce the intended document")
     return text, tuple(steps)
@@ -493,26 +502,26 @@ def _parse(text: str) -> Document:
     return tomllib.loads(text)
 
 
-def meant_document(document: Mapping[str, Any], edit: Edit) -> Document:
+def intended_document(document: Mapping[str, Any], edit: Edit) -> Document:
     """Return the document after an edit; unchanged parts are shared with the previous document."""
-    meant: Document = dict(document)
+    intended: Document = dict(document)
     *parent, last = edit.path
     if isinstance(edit, Set):
         _check_value(edit.value)
-        node = _own_value(meant, parent, makes=True)
+        node = _private_copy(intended, parent, creates_missing=True)
         if isinstance(node, list) or isinstance(last, int):
             _value_at(node, last)
         elif not isinstance(node, dict):
             raise Refused(f"{_path_text(tuple(parent))} is not a table, so it cannot have the key {last}")
         node[last] = copy.deepcopy(edit.value)
-        return meant
-    node = _own_value(meant, parent)
+        return intended
+    node = _private_copy(intended, parent)
     if isinstance(edit, Insert):
         _check_value(edit.value)
         if not isinstance(node, list) or not isinstance(last, int) or not 0 <= last <= len(node):
             raise Refused(f"a new entry cannot be inserted at position {last} of {_path_text(tuple(parent))}")
         node.insert(last, copy.deepcopy(edit.value))
-        return meant
+        return intended
     value = _value_at(node, last)
     if isinstance(edit, Unset):
         del node[last]
@@ -523,17 +532,17 @@ def meant_document(document: Mapping[str, Any], edit: Edit) -> Document:
             raise Refused(f"{_path_text(edit.path)} cannot be moved to position {edit.to + 1}")
         node.insert(edit.to, node.pop(last))
     else:
-        _rename(meant, node, edit)
-    return meant
+        _rename(intended, node, edit)
+    return intended
 
 
-def _own_value(document: Document, path: Iterable[str | int], *, makes: bool = False) -> Any:
-    """Return a private copy of the value at a path: tables and arrays on the way are copied, others shared."""
+def _private_copy(document: Document, path: Iterable[str | int], *, creates_missing: bool = False) -> Any:
+    """Copy the tables and arrays along a path, and return the copied value at its end; other values are shared."""
     node: Any = document
     for step in path:
-        absent = isinstance(node, dict) and isinstance(step, str) and step not in node
-        inner = {} if makes and absent else _value_at(node, step)
-        node[step] = dict(inner) if isinstance(inner, dict) else list(inner) if _is_array(inner) else inner
+        is_missing = isinstance(node, dict) and isinstance(step, str) and step not in node
+        value = {} if creates_missing and is_missing else _value_at(node, step)
+        node[step] = dict(value) if isinstance(value, dict) else list(value) if _is_array(value) else value
         node = node[step]
     return node
 
@@ -560,8 +569,8 @@ def _rename(document: Document, node: Any, edit: Rename) -> None:
         raise Refused("entries of an array do not have names")
     _check_free(node, edit.name)
     for *parent, last in edit.references:
-        _own_value(document, parent)[last] = edit.name
-    node = _own_value(document, edit.path[:-1])
+        _private_copy(document, parent)[last] = edit.name
+    node = _private_copy(document, edit.path[:-1])
     node[edit.name] = node.pop(edit.path[-1])
 
 
@@ -611,7 +620,7 @@ def _path_text(path: Path) -> str:
 
 
 def _single_edits(document: Document, edit: Edit) -> Iterator[Edit]:
-    """Yield edits that each change one place of the text."""
+    """Split an edit into edits that each change one place of the text."""
     if not isinstance(edit, Set):
         yield edit
         return
@@ -619,8 +628,8 @@ def _single_edits(document: Document, edit: Edit) -> Iterator[Edit]:
     for depth, step in enumerate(edit.path):
         if isinstance(node, dict) and step not in node:
             value = edit.value
-            for missing in reversed(edit.path[depth + 1 :]):
-                value = {missing: value}
+            for missing_key in reversed(edit.path[depth + 1 :]):
+                value = {missing_key: value}
             yield Set(edit.path[: depth + 1], value, edit.after if depth == len(edit.path) - 1 else None)
             return
         node = node[step]
@@ -628,17 +637,17 @@ def _single_edits(document: Document, edit: Edit) -> Iterator[Edit]:
 
 
 def _edits_between(path: Path, old: Any, new: Any) -> Iterator[Edit]:
-    """Yield the fewest edits that turn one value into another; unchanged parts keep place and comments."""
+    """Yield edits that turn one value into another; unchanged parts keep their place and comments."""
     if is_same_value(old, new):
         return
     if isinstance(old, dict) and isinstance(new, Mapping) and new:
         for key in [key for key in new if key in old]:
             yield from _edits_between((*path, key), old[key], new[key])
-        previous = None
+        previous_key = None
         for key in new:
             if key not in old:
-                yield Set((*path, key), new[key], previous)
-            previous = key
+                yield Set((*path, key), new[key], previous_key)
+            previous_key = key
         yield from (Unset((*path, key)) for key in old if key not in new)
     elif isinstance(old, list) and isinstance(new, list | tuple) and old and new:
         yield from _edits_between_lists(path, old, list(new))
@@ -664,7 +673,7 @@ def _write_edit(spans: Spans, editor: Editor, edit: Edit) -> None:
     elif isinstance(edit, Move):
         _move_entry(spans, editor, path, edit.to)
     elif isinstance(edit, Rename):
-        for start, end in _key_parts(spans, path):
+        for start, end in _key_spans(spans, path):
             editor.replace(start, end, key_text(edit.name))
         for reference in edit.references:
             if (node := spans.node(reference)) is not None:
@@ -682,17 +691,17 @@ def _write_edit(spans: Spans, editor: Editor, edit: Edit) -> None:
         _replace_value(spans, editor, path, edit.value)
 
 
-def _is_written_apart(spans: Spans, path: Path) -> bool:
-    """Return whether a value is written with headers or dotted keys, so that it cannot be replaced in place."""
+def _has_headers_or_dotted_keys(spans: Spans, path: Path) -> bool:
+    """Return whether a value has headers or dotted keys, so that it must be removed and added again."""
     node = spans.node(path)
-    apart = node.kind in {"table", "array table"} if node is not None else bool(spans.pieces(path))
-    if apart and isinstance(path[-1], int):
+    is_apart = node.kind in {"table", "array table"} if node is not None else bool(spans.pieces(path))
+    if is_apart and isinstance(path[-1], int):
         raise Refused(f"{_path_text(path)} is a table with a header, so it cannot be replaced with a single value")
-    return apart
+    return is_apart
 
 
 def _prune_empty_tables(document: Document, path: Path) -> Document:
-    """Return a document without the empty tables and arrays around ``path``, which TOML may not write."""
+    """Remove the empty tables and arrays along ``path``, which the text may omit, and return the document."""
     for length in range(len(path), 0, -1):
         node: Any = document
         for step in path[: length - 1]:

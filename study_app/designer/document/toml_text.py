@@ -1,4 +1,4 @@
-"""Where everything of a TOML text is written, with its comments; values as text, and splices of the text."""
+"""Source spans of the keys, values and comments in a TOML text; values in TOML notation; splices."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from study_app.protocol.source import Node, Path, scan_nodes
 
 
 class Refused(StudyError):
-    """The requested change of the study is not possible; its message gives the reason, and nothing was changed."""
+    """The requested change of the study is not possible; the study is unchanged, and the message gives the reason."""
 
 
 class Splice(NamedTuple):
@@ -29,7 +29,7 @@ class Splice(NamedTuple):
 
 
 Splices: TypeAlias = tuple[Splice, ...]
-"""Splices of one text, in order of their places, which do not overlap."""
+"""Splices of one text that do not overlap, in the order of their positions."""
 
 
 class Editor:
@@ -37,12 +37,12 @@ class Editor:
 
     def __init__(self, text: str) -> None:
         self.text = text
-        self._found: list[Splice] = []
+        self._replacements: list[Splice] = []
 
     def replace(self, start: int, end: int, after: str) -> None:
         """Replace the text from ``start`` to ``end``; a replacement without a change is dropped."""
         if (before := self.text[start:end]) != after:
-            self._found.append(Splice(start, before, after))
+            self._replacements.append(Splice(start, before, after))
 
     def insert(self, at: int, after: str) -> None:
         self.replace(at, at, after)
@@ -55,7 +55,7 @@ class Editor:
     def splices(self) -> Splices:
         """The collected splices, overlapping deletions joined."""
         joined: list[Splice] = []
-        for splice in sorted(self._found, key=lambda splice: splice.at):
+        for splice in sorted(self._replacements, key=lambda splice: splice.at):
             if joined and splice.at < (end := joined[-1].at + len(joined[-1].before)):
                 last = joined.pop()
                 whole = self.text[last.at : max(end, splice.at + len(splice.before))]
@@ -89,16 +89,16 @@ def apply_splices(text: str, splices: Iterable[Splice]) -> str:
 
 
 def revert_splices(splices: Splices) -> Splices:
-    """Return the splices that undo these in the resulting text."""
-    shift, undoing = 0, list[Splice]()
+    """Return the splices that undo the given ones in the resulting text."""
+    shift, reverted = 0, list[Splice]()
     for at, before, after in splices:
-        undoing.append(Splice(at + shift, after, before))
+        reverted.append(Splice(at + shift, after, before))
         shift += len(after) - len(before)
-    return tuple(undoing)
+    return tuple(reverted)
 
 
 _ENDS: Final = re.compile("\r\n|\r|\u2029")
-"""What an editor takes as the end of a line beyond line feeds."""
+"""Line ends other than line feeds that the text editor recognises."""
 
 
 def with_line_feeds(text: str) -> str:
@@ -114,13 +114,13 @@ def with_own_line_ends(text: str, typed: str) -> str:
     return text[:begin] + typed[first : len(typed) - last].replace("\n", newline) + text[end:]
 
 
-def _original_position(text: str, place: int) -> int:
+def _original_position(text: str, position: int) -> int:
     """Return the position in the file's text for a position in the displayed text."""
     for match in _ENDS.finditer(text):
-        if match.start() >= place:
+        if match.start() >= position:
             break
-        place += len(match[0]) - 1
-    return place
+        position += len(match[0]) - 1
+    return position
 
 
 _RULER: Final = re.compile(r"\s*#\s*[-=*#~]{3,}")
@@ -141,8 +141,8 @@ class Piece(NamedTuple):
 class Slot(NamedTuple):
     """An array entry with its surroundings.
 
-    ``start`` to ``end`` is the entry with the comments above, followed by a comma until ``tail`` (or none), and the
-    comment after it until ``tail_end``. With ``own_line`` nothing precedes the entry on its line.
+    From ``start`` to ``end`` it contains the comments above and the entry, which begins at ``entry``. A comma, if any,
+    ends at ``tail``, and the comment after it at ``tail_end``. With ``own_line`` the entry is the first on its line.
     """
 
     start: int
@@ -171,7 +171,7 @@ class Spans:
         self._starts = [node.start for node in self._lines]
 
     def node(self, path: Path) -> Node | None:
-        """Return the header, key or entry at a path; None if there is none, or it is only a part of other paths."""
+        """Return the node of a header, key or entry; None if there is none with exactly this path."""
         return self._by_path.get(path)
 
     def pieces(self, path: Path) -> list[Piece]:
@@ -195,9 +195,9 @@ class Spans:
 
     def last_of(self, header: Node | None) -> Node | None:
         """Return the last key in a header's section, or the header if it has none; None means the root."""
-        place = -1 if header is None else self._place(header)
+        index = -1 if header is None else self._line_index(header)
         last = header
-        for node in self._lines[place + 1 :]:
+        for node in self._lines[index + 1 :]:
             if node.kind != "key":
                 break
             last = node
@@ -205,7 +205,7 @@ class Spans:
 
     def section(self, header: Node | None) -> Iterator[Node]:
         """Yield the keys of a header's section; None means the root."""
-        for node in self._lines[0 if header is None else self._place(header) + 1 :]:
+        for node in self._lines[0 if header is None else self._line_index(header) + 1 :]:
             if node.kind != "key":
                 return
             yield node
@@ -222,10 +222,10 @@ class Spans:
 
     def owned_start(self, node: Node) -> int:
         """Return the start of a header or key including its line and the comments directly above."""
-        place = self._place(node)
-        return self._with_comments(node.start, self.line_end(self._lines[place - 1]) if place else 0)
+        index = self._line_index(node)
+        return self._with_comments(node.start, self.line_end(self._lines[index - 1]) if index else 0)
 
-    def _place(self, node: Node) -> int:
+    def _line_index(self, node: Node) -> int:
         return bisect_right(self._starts, node.start) - 1
 
     def _line_start(self, position: int) -> int:
@@ -248,8 +248,8 @@ class Spans:
         index = 0
         while (entry := self._by_path.get((*path, index))) is not None:
             line = self._line_start(entry.start)
-            own = line >= floor and not self.text[line : entry.start].strip()
-            start = self._with_comments(entry.start, floor) if own else entry.start
+            own_line = line >= floor and not self.text[line : entry.start].strip()
+            start = self._with_comments(entry.start, floor) if own_line else entry.start
             comma = _COMMA.match(self.text, entry.end)
             after = comma.end() if comma else entry.end
             tail = _TAIL.match(self.text, after)
@@ -260,7 +260,7 @@ class Spans:
                     end=entry.end,
                     tail=after,
                     tail_end=tail.end() if tail else after,
-                    own_line=own,
+                    own_line=own_line,
                 )
             )
             floor = slots[-1].tail_end
@@ -313,17 +313,17 @@ def table_text(path: tuple[str | int, ...], value: Mapping[str, Any], newline: s
     ``entry`` means that it is an entry of an array of tables.
     """
     name = ".".join(key_text(key) for key in path if isinstance(key, str))
-    lines, inner = [f"[[{name}]]" if entry else f"[{name}]"], list[str]()
+    lines, inner_tables = [f"[[{name}]]" if entry else f"[{name}]"], list[str]()
     for key, part in value.items():
         column = len(key_text(key)) + 3
         fits = column + len(inline_value(part)) <= WIDTH
         if isinstance(part, Mapping) and part and not fits:
-            inner.append(table_text((*path, key), part, newline))
+            inner_tables.append(table_text((*path, key), part, newline))
         elif isinstance(part, list | tuple) and part and not fits and all(isinstance(row, Mapping) for row in part):
-            inner += [table_text((*path, key), row, newline, entry=True) for row in part]
+            inner_tables += [table_text((*path, key), row, newline, entry=True) for row in part]
         else:
             lines.append(f"{key_text(key)} = {toml_value(part, newline=newline, column=column)}")
-    return newline.join(["".join(f"{line}{newline}" for line in lines), *inner])
+    return newline.join(["".join(f"{line}{newline}" for line in lines), *inner_tables])
 
 
 def _toml_string(value: str, like: str, newline: str) -> str:

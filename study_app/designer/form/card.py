@@ -78,7 +78,7 @@ KINDS = {
     "choices": "Chosen", "choice": "Automatic", "texts": "Texts", "references": "Named", "reference": "Named",
     "table": "Table", "list": "List", "points": "Points", "localised": "Text", "switch": "Yes or no",
 }  # fmt: skip
-"""What the kinds of a value that may be of several are called."""
+"""Labels of the kinds of a value that can have several kinds."""
 
 
 class _EitherField(Field):
@@ -92,7 +92,7 @@ class _EitherField(Field):
         self.box.addWidget(self.kinds, 0, Qt.AlignmentFlag.AlignLeft)
         self.inner = _field_for(self._chosen_row(row))
         self.inner.asked.connect(self.asked)
-        self.inner.came.connect(self.came)
+        self.inner.focused.connect(self.focused)
         self.box.addWidget(self.inner)
         self.setFocusProxy(self.inner)
         self.show_value()
@@ -102,7 +102,9 @@ class _EitherField(Field):
         super().show_row(row)
 
     def show_value(self) -> None:
-        values = [(at, KINDS.get(kind.kind, kind.kind)) for at, kind in enumerate(self.row.either)]
+        values = [
+            (index, KINDS.get(alternative.kind, alternative.kind)) for index, alternative in enumerate(self.row.either)
+        ]
         self.kinds.show_values(values, self.row.number)
 
     def _chosen_row(self, row: FormRow) -> FormRow:
@@ -112,18 +114,18 @@ class _EitherField(Field):
         """Request a value of another kind, converted from the current one as far as possible."""
         if at == self.row.number:
             return
-        to, value = self.row.either[at], self.row.value
-        first = value[0] if isinstance(value, tuple) and value else value
-        if to.kind in {"choice", "reference"}:
-            self.set_value(to.choices[0].value if to.choices else "")
-        elif to.kind == "choices":
-            self.set_value([choice.value for choice in to.choices][:1])
-        elif to.kind in {"number", "whole number"}:
-            self.set_value(first if isinstance(first, int | float) else 1)
-        elif to.kind in {"numbers", "vector"}:
+        new_row, value = self.row.either[at], self.row.value
+        first_value = value[0] if isinstance(value, tuple) and value else value
+        if new_row.kind in {"choice", "reference"}:
+            self.set_value(new_row.choices[0].value if new_row.choices else "")
+        elif new_row.kind == "choices":
+            self.set_value([choice.value for choice in new_row.choices][:1])
+        elif new_row.kind in {"number", "whole number"}:
+            self.set_value(first_value if isinstance(first_value, int | float) else 1)
+        elif new_row.kind in {"numbers", "vector"}:
             self.set_value([value] if isinstance(value, int | float) else [1])
         else:
-            self.set_value(str(first))
+            self.set_value(str(first_value))
 
 
 def _field_for(row: FormRow) -> Field:
@@ -148,9 +150,9 @@ def _field_for(row: FormRow) -> Field:
     return LineField(row) if kind not in {"unknown", "table"} else UnknownField(row)
 
 
-_MOST_REPAIRS = 3
+_MAX_REPAIRS = 3
 _SOURCES = _LIQUID_FILE, _INSTRUMENT = ("liquids", "file"), ("questionnaires", "instrument")
-"""Section and key of the sources of a whole element, which are chosen before they are added."""
+"""Section and key of sources that replace a whole element; a file or questionnaire is chosen first."""
 EDITORS: Final[Mapping[tuple[str, str], SpecialEditor]] = {
     key: editor
     for editor in (
@@ -163,7 +165,7 @@ EDITORS: Final[Mapping[tuple[str, str], SpecialEditor]] = {
 
 
 class _FaultLine(QWidget):
-    """A sentence about a fault, or a hint at what an unfinished entry needs, below an editor."""
+    """A line below an editor with a fault, or with a hint on an unfinished entry."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -196,44 +198,44 @@ class _RowWidget(Themed, QWidget):
         if special is not None and special.adds is not None:
             self.field.add_extra(special.adds(self.field))
         self.keys = Segments("Choose one of the two keys") if row.keys else None
-        self.words = label(row.label, "label", wraps=True)
+        self.label = label(row.label, "label", wraps=True)
         if not wide:
-            self.words.setFixedWidth(LABEL_PX)
-        self.words.setMinimumHeight(FIELD_PX)
-        self.words.setAlignment(Qt.AlignmentFlag.AlignVCenter)
-        self.words.setBuddy(self.field)
+            self.label.setFixedWidth(LABEL_PX)
+        self.label.setMinimumHeight(FIELD_PX)
+        self.label.setAlignment(Qt.AlignmentFlag.AlignVCenter)
+        self.label.setBuddy(self.field)
         self.remove = remove_button(f"Remove {row.label} from the file", self._ask_to_remove)
-        room = self.remove.sizePolicy()
-        room.setRetainSizeWhenHidden(True)
-        self.remove.setSizePolicy(room)
-        across = hbox(spacing=8)
+        policy = self.remove.sizePolicy()
+        policy.setRetainSizeWhenHidden(True)
+        self.remove.setSizePolicy(policy)
+        line = hbox(spacing=8)
         top = Qt.AlignmentFlag.AlignTop
         if bare:
-            across.addWidget(self.field, 1)
+            line.addWidget(self.field, 1)
         else:
-            across.addWidget(self.words, int(wide), top)
-            across.addWidget(label(self.field.caption, "small", "text2") if wide else self.field, int(not wide))
+            line.addWidget(self.label, int(wide), top)
+            line.addWidget(label(self.field.caption, "small", "text2") if wide else self.field, int(not wide))
         if not bare or row.is_removable:
-            across.addWidget(self.remove, 0, top)
+            line.addWidget(self.remove, 0, top)
         self.repairs: list[RepairButton] = []
         self._offered: dict[ProblemRow, tuple[str, ...]] = {}
         self._buttons = vbox(spacing=6, margins=(LABEL_PX + 32, 0, 0, 0))
         column = vbox(spacing=4, margins=0, parent=self)
-        heads = wide and len(row.languages) > 1 and not is_stacked(row)
-        labelled = not bare and not (heads and row.required)
-        if labelled or bare:
-            add_layout(column, across)
-        if not labelled:  # the names of the languages, or the editor, already label it
-            self.words.setParent(self)
-            self.words.hide()
+        has_headings = wide and len(row.languages) > 1 and not is_stacked(row)
+        has_label = not bare and not (has_headings and row.required)
+        if has_label or bare:
+            add_layout(column, line)
+        if not has_label:  # the language headings, or the editor itself, label the row
+            self.label.setParent(self)
+            self.label.hide()
         if self.keys is not None:
             self.keys.show_values(row.keys, row.path[-1])
             self.keys.chosen.connect(self._switch_key)
-            above = hbox((self.keys, 0, Qt.AlignmentFlag.AlignLeft), margins=(0 if wide else LABEL_PX + 8, 0, 0, 0))
-            insert_layout(column, 0, above)
-        if heads:
-            of = "" if labelled else f"{row.label}, "
-            column.addWidget(_LanguageHeads(f"{of}{language}" for _, language in row.languages))
+            key_line = hbox((self.keys, 0, Qt.AlignmentFlag.AlignLeft), margins=(0 if wide else LABEL_PX + 8, 0, 0, 0))
+            insert_layout(column, 0, key_line)
+        if has_headings:
+            prefix = "" if has_label else f"{row.label}, "
+            column.addWidget(_LanguageHeadings(f"{prefix}{language}" for _, language in row.languages))
         if wide and not bare:
             column.addWidget(self.field)
         add_layout(column, self._buttons)
@@ -241,22 +243,22 @@ class _RowWidget(Themed, QWidget):
         self.show_row(row)
 
     @cached_property
-    def wrong(self) -> _FaultLine:
+    def fault_line(self) -> _FaultLine:
         """The faults below the editor; created on first use."""
-        made = _FaultLine()
+        line = _FaultLine()
         column = self.layout()
-        assert isinstance(column, QVBoxLayout)  # noqa: S101 - made so
-        made.hide()
-        column.insertWidget(column.count() - 2, made)
-        name_scroll_bars(made)
-        return made
+        assert isinstance(column, QVBoxLayout)  # noqa: S101 - set in __init__
+        line.hide()
+        column.insertWidget(column.count() - 2, line)
+        name_scroll_bars(line)
+        return line
 
     def _ask_to_remove(self) -> None:
-        """Request to remove the key; typed text is submitted first, because it would restore the key later."""
+        """Request to remove the key; pending text is submitted first, since it would add the key again later."""
         for part in self.field.findChildren(QWidget):
             if isinstance(part, TypedLine | TypedText):
                 part.flush()
-        if self.remove.hasFocus():  # it is hidden with the value, and Qt would move the focus to the next row
+        if self.remove.hasFocus():  # the button is hidden with the value, and Qt would move the focus to the next row
             self.field.take_keyboard()
         self.field.asked.emit(RemoveKey(self.row.path))
 
@@ -278,7 +280,7 @@ class _RowWidget(Themed, QWidget):
         self.show_messages()
 
     def begin(self, row: FormRow) -> None:
-        """Show the row of another element without typed text, rejection or selection."""
+        """Show the row of another element; typed text, rejections and selections are discarded."""
         for field in (self.field, *self.field.findChildren(Field)):
             field.refusal = ""
         typed = [part for part in self.field.findChildren(QWidget) if isinstance(part, TypedLine | TypedText)]
@@ -289,35 +291,43 @@ class _RowWidget(Themed, QWidget):
         self.refusal, self.row = "", row
         self.field.show_row(row)
         for part in typed:
-            part.begin_value()
+            part.accept_shown_text()
         self.show_messages()
 
     def show_messages(self) -> None:
         self.remove.setVisible(self.row.is_removable and self.remove.parent() is not None)
         refused = [field.refusal for field in (self.field, *self.field.findChildren(Field)) if field.refusal]
         corrections = [sentence for sentence in (self.refusal, *refused, *self.row.faults) if sentence]
-        times = Counter(corrections)
-        if corrections or "wrong" in self.__dict__:
-            said = (sentence if count == 1 else f"{count} × {sentence}" for sentence, count in times.items())
-            self.wrong.show_text("\n".join(said), is_hint=self.row.unfinished and not (self.refusal or refused))
-            self.wrong.setVisible(bool(corrections))
+        counts = Counter(corrections)
+        if corrections or "fault_line" in self.__dict__:
+            sentences_shown = (
+                sentence if count == 1 else f"{count} × {sentence}" for sentence, count in counts.items()
+            )
+            self.fault_line.show_text(
+                "\n".join(sentences_shown), is_hint=self.row.unfinished and not (self.refusal or refused)
+            )
+            self.fault_line.setVisible(bool(corrections))
         row = self.row
         sentences = filter(None, (row.help, row.permitted, *corrections))
         self.field.setAccessibleDescription(" ".join(f"{sentence.rstrip('.')}." for sentence in sentences))
-        some_missing = isinstance(self.field, LanguagesField) and self.field.has_missing_texts
+        some_texts_missing = isinstance(self.field, LanguagesField) and self.field.has_missing_texts
         lines = self.field.lines if isinstance(self.field, LanguagesField) else {}
-        sound = [line for code, line in lines.items() if row.faulty_languages and code not in row.faulty_languages]
+        faultless_lines = [
+            line for code, line in lines.items() if row.faulty_languages and code not in row.faulty_languages
+        ]
         for part in self.field.findChildren(QWidget):
             if not isinstance(part, TypedLine | TypedText):
                 continue
             part.setAccessibleDescription(self.field.accessibleDescription())
             if not refused:
-                blamed = part.focusPolicy() != Qt.FocusPolicy.NoFocus and not (some_missing and part.words())
-                blamed = blamed and part not in sound
-                part.show_refused(bool(self.row.faults) and not self.row.unfinished and blamed)
+                is_marked = part.focusPolicy() != Qt.FocusPolicy.NoFocus and not (
+                    some_texts_missing and part.typed_text()
+                )
+                is_marked = is_marked and part not in faultless_lines
+                part.show_refused(bool(self.row.faults) and not self.row.unfinished and is_marked)
 
     def show_repairs(self, known: Mapping[ProblemRow, tuple[str, ...]]) -> None:
-        """Offer the first repair of each problem of this row, omitting repairs with the same text."""
+        """Offer the first repair of each problem of this row; a repair whose text is not unique is omitted."""
         path = self.row.path
         offered = {
             problem: sentences
@@ -327,24 +337,28 @@ class _RowWidget(Themed, QWidget):
         if offered == self._offered:
             return
         self._offered = offered
-        before, self.repairs = self.repairs, []
-        held = next((button.text() for button in before if button.hasFocus()), None)
-        several = len(offered) > 1
-        asked = [(problem, word) for problem, sentences in offered.items() for word in sentences[: 1 if several else 2]]
-        times = Counter(word for _problem, word in asked)
-        for problem, word in [(problem, word) for problem, word in asked if times[word] == 1][:_MOST_REPAIRS]:
-            made = RepairButton(problem, word)
-            made.clicked.connect(lambda _on=False, row=problem, word=word: self.repair_asked.emit(row, word))
+        old_buttons, self.repairs = self.repairs, []
+        focused_text = next((button.text() for button in old_buttons if button.hasFocus()), None)
+        has_several = len(offered) > 1
+        repairs = [
+            (problem, text) for problem, sentences in offered.items() for text in sentences[: 1 if has_several else 2]
+        ]
+        counts = Counter(text for _problem, text in repairs)
+        for problem, text in [(problem, text) for problem, text in repairs if counts[text] == 1][:_MAX_REPAIRS]:
+            made = RepairButton(problem, text)
+            made.clicked.connect(lambda _on=False, problem=problem, text=text: self.repair_asked.emit(problem, text))
             made.typed.connect(self._type_letter)
             name_scroll_bars(made)
             self._buttons.addWidget(made, 0, Qt.AlignmentFlag.AlignRight)
             made.show()  # at once: Tab skips widgets that a layout has not shown yet
             self.repairs.append(made)
-        if held is not None and not self.repairs:
+        if focused_text is not None and not self.repairs:
             self.field.take_keyboard()
-        elif held is not None:  # the same repair again, if it is still offered
-            min(self.repairs, key=lambda button: button.text() != held).setFocus(Qt.FocusReason.OtherFocusReason)
-        for button in before:
+        elif focused_text is not None:  # focus the same repair again, if it is still offered
+            min(self.repairs, key=lambda button: button.text() != focused_text).setFocus(
+                Qt.FocusReason.OtherFocusReason
+            )
+        for button in old_buttons:
             remove_widget(button)
 
     def _type_letter(self, event: QKeyEvent) -> None:
@@ -358,8 +372,8 @@ class _RowWidget(Themed, QWidget):
     def help(self) -> str:
         """The help text of the row: its description, or that of the current choice, and the permitted values."""
         row = self.row
-        shown = row.default if row.value is None else row.value
-        sentence = next((choice.sentence for choice in row.choices if choice.value == shown), "")
+        current = row.default if row.value is None else row.value
+        sentence = next((choice.sentence for choice in row.choices if choice.value == current), "")
         reason = f" ({row.reason})" if row.reason else ""
         permitted = f"Permitted: {row.permitted}{reason}." if row.permitted and not row.choices else ""
         text = " ".join(filter(None, (sentence or row.help, permitted)))
@@ -380,27 +394,27 @@ def _is_wide(row: FormRow) -> bool:
 
 def _editor_structure(row: FormRow) -> object:
     """Return the part of a row's state that, when it changes, requires a new editor."""
-    special, own = _special_editor_of(row), row
-    inner = own.either[row.number or 0].kind if own.either else ""
-    choices = tuple(choice.value for choice in own.choices) if own.kind in {"choice", "choices", "kind"} else ()
+    special = _special_editor_of(row)
+    chosen_kind = row.either[row.number or 0].kind if row.either else ""
+    choices = tuple(choice.value for choice in row.choices) if row.kind in {"choice", "choices", "kind"} else ()
     extra = None if special is None else special.structure(row)
-    return own.model, own.kind, inner, choices, row.languages, own.required, row.keys, extra
+    return row.model, row.kind, chosen_kind, choices, row.languages, row.required, row.keys, extra
 
 
-class _LanguageHeads(QWidget):
-    """Names of languages above the columns of their texts; ``inset`` is the margin left and right [px]."""
+class _LanguageHeadings(QWidget):
+    """The languages' names above the columns of their texts; ``inset`` is the left and right margin [px]."""
 
     def __init__(self, languages: Iterable[str], inset: tuple[int, int] = (0, 0)) -> None:
         super().__init__()
-        heads = ((label(language, "small", "text2"), 1) for language in languages)
-        hbox(*heads, spacing=8, margins=(inset[0], 0, inset[1], 0), parent=self)
+        headings = ((label(language, "small", "text2"), 1) for language in languages)
+        hbox(*headings, spacing=8, margins=(inset[0], 0, inset[1], 0), parent=self)
 
 
-_ACROSS = 2
+_COLUMNS = 2
 _ADD_PX = 235
 """The greatest width of a button in a column of `_AddKeys` [px]."""
-_FOOT_FROM = 460
-"""The height of the form from which it has a foot [px]."""
+_FOOT_MIN_PX = 460
+"""Minimum height of the form with a foot [px]."""
 
 
 class _AddKeys(QWidget):
@@ -410,21 +424,21 @@ class _AddKeys(QWidget):
         super().__init__()
         grid = grid_of(0, 0, margins=0, parent=self)
         self.buttons: dict[Path, QWidget] = {}
-        at = 0
-        for inner, name, help_ in keys:
-            made = self.buttons[inner] = add_button(f"Add {name}", name)
-            made.setToolTip(help_)
-            made.clicked.connect(lambda _checked=False, inner=inner: add(inner))
-            columns = _ACROSS if made.sizeHint().width() > _ADD_PX else 1
-            at += -at % columns  # a long name has a line of its own
-            grid.addWidget(made, at // _ACROSS, at % _ACROSS, 1, columns, Qt.AlignmentFlag.AlignLeft)
-            at += columns
+        position = 0
+        for key, name, description in keys:
+            button = self.buttons[key] = add_button(f"Add {name}", name)
+            button.setToolTip(description)
+            button.clicked.connect(lambda _checked=False, key=key: add(key))
+            columns = _COLUMNS if button.sizeHint().width() > _ADD_PX else 1
+            position += -position % columns  # a button with a long name takes a whole line
+            grid.addWidget(button, position // _COLUMNS, position % _COLUMNS, 1, columns, Qt.AlignmentFlag.AlignLeft)
+            position += columns
 
 
 class FormCard(Card):
     """Shows a `Form`; parts common to the old and the new form keep their widgets, with caret and focus.
 
-    Signals: ``asked`` (a request), ``repair_asked`` (problem, text).
+    Signals: ``asked`` (a request), ``repair_asked`` (a problem and the text of a repair).
     """
 
     asked = Signal(object)
@@ -458,16 +472,16 @@ class FormCard(Card):
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
-        self.foot.setVisible(self.height() >= _FOOT_FROM)
+        self.foot.setVisible(self.height() >= _FOOT_MIN_PX)
 
     def _request(self, asked: object) -> None:
-        """Request a step; after a rename the form stays at its element."""
+        """Request a step; after a rename, the form still shows the same element."""
         before, self._renames = self._renames, isinstance(asked, RenameElement | LeaveText)
         self.asked.emit(asked)
         self._renames = before
 
     def show_form(self, form: Form, *, read_only: bool) -> None:
-        """Show a form: existing parts are kept, missing ones are created, others removed."""
+        """Show a form: keep the parts that exist, create missing ones, and remove the others."""
         before = self.form
         stays = before is not None and (
             form.path == before.path or (self._renames and form.path[:-1] == before.path[:-1])
@@ -505,33 +519,33 @@ class FormCard(Card):
         inside_form = keyboard is not None and self.inside.isAncestorOf(keyboard)
         old, self._parts, self.rows, self.adds = self._parts, {}, [], {}
         for key, make, row in self._form_parts(form):
-            kept = old.pop(key, None)
-            part = self._parts[key] = kept or make()
+            existing = old.pop(key, None)
+            part = self._parts[key] = existing or make()
             if isinstance(part, _RowWidget) and row is not None:
-                if before is None and kept is not None:
+                if before is None and existing is not None:
                     part.begin(row)
                 else:
                     part.show_row(row)
                 self.rows.append(part)
             elif isinstance(part, _AddKeys):
-                self.adds |= {(*form.path, *inner): made for inner, made in part.buttons.items()}
-        gone = next((part for part in old.values() if inside_form and part.isAncestorOf(keyboard)), None)
-        if gone is not None and keyboard is not None:
+                self.adds |= {(*form.path, *inner): button for inner, button in part.buttons.items()}
+        removed = next((part for part in old.values() if inside_form and part.isAncestorOf(keyboard)), None)
+        if removed is not None and keyboard is not None:
             keyboard.clearFocus()  # otherwise Qt moves the keyboard focus
         self._remove_parts(old)
-        for place, part in enumerate(self._parts.values()):
-            if self.sections.indexOf(part) != place:
-                self.sections.insertWidget(place, part)
+        for position, part in enumerate(self._parts.values()):
+            if self.sections.indexOf(part) != position:
+                self.sections.insertWidget(position, part)
                 name_scroll_bars(part)
                 part.show()  # at once: a layout shows it later, and a hidden widget takes no focus
-        if gone is not None:
-            self._refocus(form, before, gone)
+        if removed is not None:
+            self._refocus(form, before, removed)
 
-    def _refocus(self, form: Form, before: Form | None, gone: QWidget) -> None:
-        """Move the focus from a removed part to the row in its place or the row it added; else to the first row."""
+    def _refocus(self, form: Form, before: Form | None, removed: QWidget) -> None:
+        """Move the focus from a removed part to the row that replaced it or that it added, or to the first row."""
         path: Path | None = None
-        if before is not None and isinstance(gone, _RowWidget):
-            path = gone.row.path
+        if before is not None and isinstance(removed, _RowWidget):
+            path = removed.row.path
             path = (*form.path, *path[len(before.path) :]) if path[: len(before.path)] == before.path else path
         elif before is not None:
             path = added_row(form, before)
@@ -544,40 +558,40 @@ class FormCard(Card):
             remove_widget(part)
 
     def _form_parts(self, form: Form) -> Iterator[tuple[object, Callable[[], QWidget], FormRow | None]]:
-        """Yield the parts of a form from top to bottom: identity, factory and row."""
+        """Yield the key, the factory and the row, if any, of each part of a form, from top to bottom."""
         for number, section in enumerate(form.sections):
-            at = form.path[:1], section.title, section.path[len(form.path) :]
+            section_key = form.path[:1], section.title, section.path[len(form.path) :]
             if number:
-                yield ("rule", at), Rule, None
+                yield ("rule", section_key), Rule, None
             if section.title:
                 removable = section.path != form.path and not self.read_only
-                yield ("title", at), partial(self._section_heading, section, removable=removable), None
+                yield ("title", section_key), partial(self._section_heading, section, removable=removable), None
             if section.faults:
                 sentences = "\n".join(section.faults)
                 ink: Ink = "text2" if section.unfinished else "bad"
-                yield ("faults", at, sentences, ink), partial(label, sentences, "label", ink, wraps=True), None
-            heads: tuple[tuple[str, str], ...] = ()
+                yield ("faults", section_key, sentences, ink), partial(label, sentences, "label", ink, wraps=True), None
+            shown_languages: tuple[tuple[str, str], ...] = ()
             for row in section.rows:
-                beside = () if is_stacked(row) or _is_wide(row) else row.languages
-                if len(beside) > 1 and beside != heads:
-                    names = tuple(language for _, language in beside)
+                languages = () if is_stacked(row) or _is_wide(row) else row.languages
+                if len(languages) > 1 and languages != shown_languages:
+                    names = tuple(language for _, language in languages)
                     yield (
-                        ("heads", at, row.path[-1], names),
-                        partial(_LanguageHeads, names, (LABEL_PX + 8, FIELD_PX + 8)),
+                        ("heads", section_key, row.path[-1], names),
+                        partial(_LanguageHeadings, names, (LABEL_PX + 8, FIELD_PX + 8)),
                         None,
                     )
-                heads = beside
+                shown_languages = languages
                 inner = row.path[len(form.path) :] if row.path[: len(form.path)] == form.path else row.path
-                yield (at, inner, _editor_structure(row)), partial(self._make_row, row), row
+                yield (section_key, inner, _editor_structure(row)), partial(self._make_row, row), row
             if section.absent and not self.read_only:
                 added = tuple(
                     (row.path[len(form.path) :], row.label + " …" * (row.path[::2] in _SOURCES), row.help)
                     for row in section.absent
                 )
-                yield ("adds", at, added), partial(_AddKeys, added, self._add_key), None
+                yield ("adds", section_key, added), partial(_AddKeys, added, self._add_key), None
 
     def _add_key(self, inner: Path) -> None:
-        """Request to add a key; ask first which liquid file or standard questionnaire to use."""
+        """Request to add a key; let the user choose a liquid file or standard questionnaire first."""
         path = self._path_in_form(inner)
         if path[::2] == _LIQUID_FILE:
             if name := choose_protocol(self, "Choose a liquid file"):
@@ -596,27 +610,27 @@ class FormCard(Card):
         return inner if self.form is None else (*self.form.path, *inner)
 
     def _section_heading(self, section: Section, *, removable: bool) -> QWidget:
-        made, inner = QWidget(), () if self.form is None else section.path[len(self.form.path) :]
-        heading = hbox(label(section.title, "strong"), STRETCH, margins=0, parent=made)
+        widget, inner = QWidget(), () if self.form is None else section.path[len(self.form.path) :]
+        heading = hbox(label(section.title, "strong"), STRETCH, margins=0, parent=widget)
         if section.path != (() if self.form is None else self.form.path):
-            away = IconButton("cross", f"Remove {section.title} from the file", size=FIELD_PX, role="plain")
-            away.clicked.connect(lambda: self.asked.emit(RemoveKey(self._path_in_form(inner))))
-            away.setEnabled(removable)
-            heading.addWidget(away)
-        return made
+            remove = IconButton("cross", f"Remove {section.title} from the file", size=FIELD_PX, role="plain")
+            remove.clicked.connect(lambda: self.asked.emit(RemoveKey(self._path_in_form(inner))))
+            remove.setEnabled(removable)
+            heading.addWidget(remove)
+        return widget
 
     def _make_row(self, row: FormRow) -> _RowWidget:
-        made = _RowWidget(row)
-        made.field.asked.connect(self._request)
-        made.repair_asked.connect(self.repair_asked)
-        if isinstance(made.field, EntryList) and self.read_only:
-            made.field.make_read_only()
-        made.field.came.connect(lambda: self._show_focused_row(made))
-        made.field.setEnabled(not self.read_only or row.kind in {"list", "tables", "references", "reference"})
-        for part in (made.remove, made.keys):
+        row_widget = _RowWidget(row)
+        row_widget.field.asked.connect(self._request)
+        row_widget.repair_asked.connect(self.repair_asked)
+        if isinstance(row_widget.field, EntryList) and self.read_only:
+            row_widget.field.make_read_only()
+        row_widget.field.focused.connect(lambda: self._show_focused_row(row_widget))
+        row_widget.field.setEnabled(not self.read_only or row.kind in {"list", "tables", "references", "reference"})
+        for part in (row_widget.remove, row_widget.keys):
             if part is not None:
                 part.setEnabled(not self.read_only)
-        return made
+        return row_widget
 
     def flush(self) -> None:
         self.head.id.flush()
@@ -625,10 +639,8 @@ class FormCard(Card):
                 part.flush()
 
     def _scroll_to(self, row: QWidget) -> None:
-        """Scroll to the question of a row, the row, and its focused part, as far as there is room for them.
-
-        New rows are laid out first.
-        """
+        """Scroll so that a row's question, the row, and its focused part are visible, the last one with priority."""
+        # new rows have no position before they are laid out
         QApplication.sendPostedEvents(None, QEvent.Type.LayoutRequest.value)
         if self.panel.tinted:
             self.area.ensureWidgetVisible(self.panel, 0, 0)
@@ -637,16 +649,16 @@ class FormCard(Card):
         if keyboard is not None and row.isAncestorOf(keyboard):
             self.area.ensureWidgetVisible(keyboard, 0, 40)
 
-    def _row_of(self, path: Path) -> _RowWidget | None:
-        around = [row for row in self.rows if path[: len(row.row.path)] == row.row.path]
-        return max(around, key=lambda row: len(row.row.path), default=None)
+    def _innermost_row(self, path: Path) -> _RowWidget | None:
+        containing = [row for row in self.rows if path[: len(row.row.path)] == row.row.path]
+        return max(containing, key=lambda row: len(row.row.path), default=None)
 
     def focus_row(self, path: Path) -> bool:
-        """Focus the row of a place and scroll to it; return whether it exists.
+        """Focus the row that contains a path and scroll to it; return whether there is one.
 
-        For a key that is missing in the file, the button that adds it is focused.
+        If the key is missing in the file, focus the button that adds it.
         """
-        row = self._row_of(path)
+        row = self._innermost_row(path)
         if row is None:
             if (button := self.adds.get(path)) is not None:
                 button.setFocus(Qt.FocusReason.OtherFocusReason)
@@ -662,25 +674,25 @@ class FormCard(Card):
             self.focus_row(self.rows[0].row.path)
 
     def focus_first_field(self) -> None:
-        """Focus the first field to type in, in the first language, or the first row in a form without such a field."""
+        """Focus the first text field, or the first row of a form without one."""
         if (field := next(self._typed_fields(), None)) is not None:
             self._focus_typed(field)
             if isinstance(field, TypedLine):
-                field.end(False)  # otherwise the key Delete, meant for the element, deletes a letter
+                field.end(False)  # otherwise Delete, which is meant for the element, would delete a letter
         else:
             self.focus_first()
 
     def focus_first_text(self, *, filled: bool) -> None:
-        """Focus the first text and select it; empty texts are preferred unless all are filled in.
+        """Focus and select the first text; unless ``filled``, the first empty one is preferred.
 
-        A new element without texts is called by its ID, which gets the focus; in another form the first row gets it.
+        In the form of a new element without texts, focus its ID; in other forms without texts, focus the first row.
         """
         fields = list(self._typed_fields())
         texts = [field for field in fields if isinstance(field.parent(), LanguagesField)]
         if not (filled or texts) and self.head.id_line.isVisibleTo(self):
             self.head.edit_id()
             return
-        empty = (field for field in fields if not filled and not field.words() and not field.placeholderText())
+        empty = (field for field in fields if not filled and not field.typed_text() and not field.placeholderText())
         field = next(iter((*empty, *texts)), None)
         if field is None:
             self.focus_first()
@@ -689,7 +701,7 @@ class FormCard(Card):
         field.selectAll()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """In the list of texts to write, let Enter lead to the next missing text."""
+        """In the list of texts to write, go to the next missing text at Enter."""
         if self.form is None or not self.form.lists_texts or event.key() not in {Qt.Key.Key_Return, Qt.Key.Key_Enter}:
             super().keyPressEvent(event)
             return
@@ -704,7 +716,9 @@ class FormCard(Card):
 
     def _is_to_write(self, field: TypedLine | TypedText) -> bool:
         row = next(row.row for row in self.rows if row.isAncestorOf(field))
-        return not field.words().strip() or field.property(LANGUAGE) in {text.language for text in row.untranslated}
+        return not field.typed_text().strip() or field.property(LANGUAGE) in {
+            text.language for text in row.untranslated
+        }
 
     def _typed_fields(self) -> Iterator[TypedLine | TypedText]:
         for row in self.rows:
@@ -719,8 +733,8 @@ class FormCard(Card):
         self._scroll_to(row)
 
     def refuse(self, path: Path, sentence: str) -> None:
-        """Show the reason for a rejected change at the field of a place."""
-        if (row := self._row_of(path)) is not None:
+        """Show the reason for a rejected change below the row that contains its path."""
+        if (row := self._innermost_row(path)) is not None:
             row.refusal = sentence
             row.show_messages()
         else:
@@ -737,31 +751,31 @@ class FormCard(Card):
         return [button for row in self.rows for button in row.repairs if button.problem == problem]
 
     def _show_focused_row(self, row: _RowWidget) -> None:
-        self._focused = row if row in self.rows else self._focused  # its own step may have replaced the row
+        self._focused = row if row in self.rows else self._focused  # the row's own step may have replaced it
         row.show_messages()
         self.show_help()
 
     def show_help_of(self, part: QWidget | None) -> None:
         """Show the help of the row that contains a part, if any."""
-        row = self._row_with(part)
+        row = self._row_containing(part)
         if row is not None and row is not self._focused:
             self._show_focused_row(row)
 
     def row_path_of(self, part: QWidget) -> Path:
         """Return the path of the row that contains a part, () if there is none."""
-        row = self._row_with(part)
+        row = self._row_containing(part)
         return () if row is None else row.row.path
 
-    def _row_with(self, part: QWidget | None) -> _RowWidget | None:
+    def _row_containing(self, part: QWidget | None) -> _RowWidget | None:
         return next((row for row in self.rows if part is not None and row.isAncestorOf(part)), None)
 
     def show_note(self, sentence: str) -> None:
-        """Show a sentence at the foot, also of a low form, until another field or step has its help there."""
+        """Show a sentence in the foot, also of a low form, until the help of another field or step replaces it."""
         self.foot.show_help("", "", sentence)
         self.foot.show()
 
     def show_help(self) -> None:
-        self.foot.setVisible(self.height() >= _FOOT_FROM)
+        self.foot.setVisible(self.height() >= _FOOT_MIN_PX)
         row = self._focused if self._focused in self.rows else next(iter(self.rows), None)
         if row is None:
             self.foot.show_help("", "", "")

@@ -1,4 +1,4 @@
-"""The list of trial designs with a picture of each kind."""
+"""The list of trial designs, with a picture of each kind."""
 
 from collections.abc import Sequence
 from typing import Final
@@ -12,10 +12,10 @@ from study_app.gui.widgets import Choice
 from study_app.protocol.trials import Design
 
 _SIDE_PX, _GAP_PX, _RATIO = 14, 4, 3
-_SIZE: Final = QSize(5 * _SIDE_PX + 4 * _GAP_PX, _SIDE_PX)  # four intervals and the reply
+_SIZE: Final = QSize(5 * _SIDE_PX + 4 * _GAP_PX, _SIDE_PX)  # up to four intervals and the reply
 _REPLIES: Final = {"choice": "?", "number": "#", "setting": "↕"}
 _SIGNS: Final = {"samedifferent": "=", "oddity": "≠"}
-"""Signs of kinds whose question is not which interval has more of something."""
+"""Reply signs of designs whose question is not which interval has more of something."""
 
 
 class DesignList(Coloured, Choice):
@@ -38,15 +38,15 @@ class DesignList(Coloured, Choice):
 
 
 def _design_pixmap(design: Design, theme: Theme) -> QPixmap:
-    """Return the squares of one trial, filled if they hold the comparison, and the sign of the reply."""
+    """Draw one trial: a square for each interval, filled for the comparison, and the sign of the reply."""
     pixmap = QPixmap(_SIZE * _RATIO)
     pixmap.setDevicePixelRatio(_RATIO)
     pixmap.fill(Qt.GlobalColor.transparent)
     painter = QPainter(pixmap)
     painter.setRenderHint(QPainter.RenderHint.Antialiasing)
     square = QRectF(1, 1, _SIDE_PX - 2, _SIDE_PX - 2)
-    *_, shown = filter(any, design.arrangements)  # the last one with a comparison
-    for is_comparison in shown:
+    *_, arrangement = filter(any, design.arrangements)  # the last arrangement with a comparison
+    for is_comparison in arrangement:
         painter.setPen(QPen(QColor(theme.accent), 1.4))
         painter.setBrush(QColor(theme.accent if is_comparison else theme.surface))
         painter.drawRoundedRect(square, 3, 3)

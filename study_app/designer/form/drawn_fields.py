@@ -16,7 +16,7 @@ from study_app.designer.document.study import Study
 from study_app.designer.form.fields import Extra, Field, SpecialEditor
 from study_app.designer.measures.levels import (
     LIMIT_NAMES,
-    LevelWords,
+    LevelFormat,
     Limit,
     Ticks,
     block_of,
@@ -32,17 +32,17 @@ from study_app.protocol.presented import level_limits
 from study_app.protocol.source import Path, value_at
 from study_app.protocol.trials import ORDINALS, AnyTask, Stimulus
 
-_FARTHEST: Final = 3.0
-"""A limit is drawn up to so many times the highest level, or spans above it."""
-ROOM: Final = 1.3
-_MOST_TICKS: Final = 6
+_LIMIT_RANGE: Final = 3.0
+"""A limit is drawn if it is below this multiple of the highest level, or within this many spans above it."""
+MARGIN_RATIO: Final = 1.3
+_MAX_TICKS: Final = 6
 
 
 @dataclass(frozen=True, slots=True)
 class _AxisLimit:
     """A limit: its name with its value, and the level at which it is reached."""
 
-    words: str
+    label: str
     level: float
 
 
@@ -50,22 +50,22 @@ class _AxisLimit:
 class _LevelAxis:
     """An axis of levels."""
 
-    # the ends of the levels
+    # the lowest and the highest level
     low: float
     high: float
     # the ends of the axis
     least: float
     most: float
     logarithmic: bool  # whether levels are spaced logarithmically
-    levels: tuple[float, ...]  # the levels between which a method chooses
+    levels: tuple[float, ...]  # the levels from which a method chooses
     factor: float  # the display factor of levels
     unit: str  # the display unit of levels
     caption: str  # the kind of level and its spacing, as text
-    standard: str  # the highest standard in words, "" without one
+    standard: str  # the highest standard as text, "" without one
     # the levels of the force limit ("norm") and the slope limit, if near
     limits: Mapping[Limit, _AxisLimit]
     ticks: Ticks  # labelled levels of the axis
-    sentence: str  # the axis in a sentence
+    sentence: str  # a sentence that describes the axis
 
 
 def _level_axis(study: Study, row: Row) -> _LevelAxis | None:
@@ -74,42 +74,46 @@ def _level_axis(study: Study, row: Row) -> _LevelAxis | None:
         stimulus = Stimulus.model_validate(value_at(study.document, row.path[:-1]))
     except ValidationError:
         return None
-    scale = LevelWords(stimulus)
+    scale = LevelFormat(stimulus)
     low, high = stimulus.levels
     standard, limits = _limits(study, row, scale)
-    log = stimulus.spacing == "log"
-    near = [
+    is_log = stimulus.spacing == "log"
+    near_levels = [
         limit.level
         for limit in limits.values()
-        if limit.level <= (_FARTHEST * high if log else high + _FARTHEST * (high - low))
+        if limit.level <= (_LIMIT_RANGE * high if is_log else high + _LIMIT_RANGE * (high - low))
     ]
-    top = max(high, *near) if near else high
-    least, most = (low / ROOM**2, top * ROOM) if log else (low - 0.1 * (top - low), top + 0.15 * (top - low))
-    if not log and stimulus.level_kind != "value":
-        least = max(0.0, least)
+    highest_shown = max(high, *near_levels) if near_levels else high
+    axis_min, axis_max = (
+        (low / MARGIN_RATIO**2, highest_shown * MARGIN_RATIO)
+        if is_log
+        else (low - 0.1 * (highest_shown - low), highest_shown + 0.15 * (highest_shown - low))
+    )
+    if not is_log and stimulus.level_kind != "value":
+        axis_min = max(0.0, axis_min)
     factor = scale.factor
-    ticks = (log_ticks if log else even_ticks)(least * factor, most * factor, _MOST_TICKS)
-    shown = {name: limit for name, limit in limits.items() if limit.level <= most}
-    spacing = "in ratio" if log else "even"
-    beyond = "".join(f" {capitalised(limit.words)}." for limit in shown.values())
+    ticks = (log_ticks if is_log else even_ticks)(axis_min * factor, axis_max * factor, _MAX_TICKS)
+    shown_limits = {name: limit for name, limit in limits.items() if limit.level <= axis_max}
+    spacing = "in ratio" if is_log else "even"
+    limit_sentences = "".join(f" {capitalised(limit.label)}." for limit in shown_limits.values())
     return _LevelAxis(
         low=low,
         high=high,
-        least=least,
-        most=most,
-        logarithmic=log,
+        least=axis_min,
+        most=axis_max,
+        logarithmic=is_log,
         levels=stimulus.grid,
         factor=factor,
         unit=scale.unit,
-        caption=f"{scale.kind}{f', {scale.unit}' if scale.unit else ''}, {'logarithmic' if log else 'linear'}",
+        caption=f"{scale.kind}{f', {scale.unit}' if scale.unit else ''}, {'logarithmic' if is_log else 'linear'}",
         standard=standard,
-        limits=shown,
+        limits=shown_limits,
         ticks=tuple((value / factor, rounded(value)) for value in ticks),
-        sentence=f"{stimulus.steps} levels from {scale.words(low)} to {scale.words(high)}, {spacing}.{beyond}",
+        sentence=f"{stimulus.steps} levels from {scale.text(low)} to {scale.text(high)}, {spacing}.{limit_sentences}",
     )
 
 
-def _limits(study: Study, row: Row, scale: LevelWords) -> tuple[str, dict[Limit, _AxisLimit]]:
+def _limits(study: Study, row: Row, scale: LevelFormat) -> tuple[str, dict[Limit, _AxisLimit]]:
     """Return the highest standard as text, and the limits of the block that presents the levels."""
     protocol = study.formed
     block = block_of(protocol, row.path[:-1])
@@ -118,8 +122,8 @@ def _limits(study: Study, row: Row, scale: LevelWords) -> tuple[str, dict[Limit,
     highest = max((standard for standard in protocol.standards_of(block) if standard is not None), default=None)
     standard = "" if highest is None else f"standard {rounded(highest)} {scale.value_unit}".rstrip()
     limits: dict[Limit, _AxisLimit] = {}
-    if (reached := level_limits(protocol, block)) is not None:
-        values: dict[Limit, float | None] = {"norm": reached.force, "slope": reached.loop}
+    if (reached_at := level_limits(protocol, block)) is not None:
+        values: dict[Limit, float | None] = {"norm": reached_at.force, "slope": reached_at.loop}
         for name, value in values.items():
             if value is not None:
                 level = scale.stimulus.level_between(highest, value)
@@ -158,41 +162,41 @@ class _AxisView(Extra, Themed, QWidget):
     def paintEvent(self, _event: QPaintEvent) -> None:
         if self.axis is None:
             return
-        painter, axis, t = smooth_painter(self), self.axis, self.theme
+        painter, axis, theme = smooth_painter(self), self.axis, self.theme
         painter.setPen(Qt.PenStyle.NoPen)
         track = QRectF(MARGIN, TRACK_Y - TRACK_PX / 2, self.width() - 2 * MARGIN, TRACK_PX)
-        painter.setBrush(QColor(t.sunk))
+        painter.setBrush(QColor(theme.sunk))
         painter.drawRect(track)
         low, high = self._x(axis.low), self._x(axis.high)
-        painter.setBrush(QColor(t.selected))
+        painter.setBrush(QColor(theme.selected))
         painter.drawRect(QRectF(low, track.top(), high - low, TRACK_PX))
         for name, limit in axis.limits.items():
             x = self._x(limit.level)
-            painter.setBrush(QBrush(QColor(limit_colour(t, name)), Qt.BrushStyle.BDiagPattern))
+            painter.setBrush(QBrush(QColor(limit_colour(theme, name)), Qt.BrushStyle.BDiagPattern))
             painter.drawRect(QRectF(x, track.top(), track.right() - x, TRACK_PX))
-        painter.setPen(QPen(QColor(t.accent), 1.4))
+        painter.setPen(QPen(QColor(theme.accent), 1.4))
         for level in axis.levels:
             x = self._x(level)
             painter.drawLine(QPointF(x, track.top()), QPointF(x, track.bottom()))
-        painter.setPen(QPen(QColor(t.accent), 2))
-        painter.setBrush(QColor(t.surface))
+        painter.setPen(QPen(QColor(theme.accent), 2))
+        painter.setBrush(QColor(theme.surface))
         for x in (low, high):
             painter.drawEllipse(QPointF(x, TRACK_Y), 7, 7)
         painter.setFont(font("small", tabular=True))
         self._paint_limits(painter, axis, track)
-        painter.setPen(QColor(t.text3))
+        painter.setPen(QColor(theme.text3))
         for level, label in axis.ticks:
             x = self._x(level)
             painter.drawLine(QPointF(x, track.bottom() + 6), QPointF(x, track.bottom() + 10))
             room = QRectF(x - 30, track.bottom() + 11, 60, 16)
             painter.drawText(room, Qt.AlignmentFlag.AlignHCenter, label)
         below = QRectF(MARGIN, HEIGHT - 20, self.width() - 2 * MARGIN, 18)
-        painter.setPen(QColor(t.text2))
+        painter.setPen(QColor(theme.text2))
         painter.drawText(below, Qt.AlignmentFlag.AlignLeft, axis.standard)
         painter.drawText(below, Qt.AlignmentFlag.AlignRight, axis.caption)
 
     def _paint_limits(self, painter: QPainter, axis: _LevelAxis, track: QRectF) -> None:
-        """Paint where the limits begin, with the name of the higher one above that of the lower one."""
+        """Paint a line and a name at each limit, the name of the higher one above that of the lower one."""
         limits = [(limit, limit_colour(self.theme, name)) for name, limit in axis.limits.items()]
         for row, (limit, ink) in enumerate(sorted(limits, key=lambda pair: pair[0].level)):
             x, top = self._x(limit.level), 14.0 * (1 - row)
@@ -200,7 +204,7 @@ class _AxisView(Extra, Themed, QWidget):
             painter.drawLine(QPointF(x, top + 2), QPointF(x, track.bottom()))
             painter.setPen(QColor(ink))
             room = QRectF(0, top, x - 5, 16)
-            painter.drawText(room, Qt.AlignmentFlag.AlignRight, limit.words)
+            painter.drawText(room, Qt.AlignmentFlag.AlignRight, limit.label)
 
 
 LEVELS: Final = SpecialEditor((("Stimulus", "levels"),), adds=lambda _field: _AxisView(), wide=True, facts=_level_axis)
@@ -213,17 +217,16 @@ _PhaseKind: TypeAlias = Literal["interval", "pause", "question", "feedback"]
 class _Phase:
     """A phase of a trial."""
 
-    kind: _PhaseKind  # what it is
-    # its name, and the text in its picture
+    kind: _PhaseKind
     name: str
-    words: str
-    duration_s: float  # how long it takes [s]
-    field: Path = ()  # its place in the file; () if the program sets it
+    caption: str  # the text in its picture
+    duration_s: float
+    field: Path = ()  # the path of its duration in the file; () if the program sets it
     about: bool = False  # whether the duration is approximate
 
     @property
     def opens(self) -> str:
-        """The label of its field; "" if it has none."""
+        """The label of the field that it opens; "" if it has none."""
         return label_of(self.field[-1]) if self.field else ""
 
     @property
@@ -258,32 +261,41 @@ def _trial_strip(study: Study, row: Row) -> _TrialStrip | None:
         return None
     design, task = protocol.design_of(block), protocol.tasks[block.task]
     phases: list[_Phase] = []
-    free = task.expected_s != task.limit_s
+    is_approximate = task.expected_s != task.limit_s
 
-    def of_design(key: str) -> Path:
+    def design_field(key: str) -> Path:
         return ("designs", str(block.design), key) if block.design in protocol.designs else ()
 
     for number in range(design.intervals):
         if number:
-            phases.append(_Phase("pause", label_of("pause_s"), "", design.pause_s, of_design("pause_s")))
+            phases.append(_Phase("pause", label_of("pause_s"), "", design.pause_s, design_field("pause_s")))
         ordinal = ORDINALS[number] if design.intervals > 1 else ""
         phases.append(
-            _Phase("interval", "Interval", ordinal, task.expected_s, ("tasks", block.task, _duration_key(task)), free)
+            _Phase(
+                "interval",
+                "Interval",
+                ordinal,
+                task.expected_s,
+                ("tasks", block.task, _duration_key(task)),
+                is_approximate,
+            )
         )
     method = protocol.method_of(block) if block.stimulus is not None else None
     if method is not None and method.adjusts:
         field = ("methods", str(block.method), "most_s") if block.method in protocol.methods else ()
         phases.append(_Phase("question", "Setting", "", method.setting_s, field, about=True))
     else:
-        phases.append(_Phase("question", "Question", design.reply, design.answer_s, of_design("question"), about=True))
+        phases.append(
+            _Phase("question", "Question", design.reply, design.answer_s, design_field("question"), about=True)
+        )
     if design.shows_feedback(block.phase == "practice"):
-        phases.append(_Phase("feedback", "Feedback", "", design.feedback_s, of_design("feedback_s")))
-    phases.append(_Phase("pause", label_of("between_s"), "", design.between_s, of_design("between_s")))
+        phases.append(_Phase("feedback", "Feedback", "", design.feedback_s, design_field("feedback_s")))
+    phases.append(_Phase("pause", label_of("between_s"), "", design.between_s, design_field("between_s")))
     return _TrialStrip(tuple(phases), sum(phase.duration_s for phase in phases))
 
 
 def _duration_key(task: AnyTask) -> str:
-    """Return the key that holds the duration of a task."""
+    """Return the key that determines the duration of a task."""
     return next((key for key in ("count", "duration_s", "cycles", "max_s") if getattr(task, key, None)), "kind")
 
 
@@ -310,49 +322,49 @@ class _PhaseButton(Themed, QAbstractButton):
     def paintEvent(self, _event: QPaintEvent) -> None:
         if self.phase is None:
             return
-        painter, t, phase = smooth_painter(self), self.theme, self.phase
+        painter, theme, phase = smooth_painter(self), self.theme, self.phase
         picture = QRectF(0, 0, self.width(), PICTURE_PX).adjusted(1, 1, -1, -1)
-        lit = self.hasFocus() or (self.underMouse() and bool(phase.field))
-        painter.setPen(QPen(QColor(t.accent if lit else t.border), 2 if self.hasFocus() else 1))
-        painter.setBrush(QColor(t.selected if phase.kind == "interval" else t.sunk))
+        is_highlighted = self.hasFocus() or (self.underMouse() and bool(phase.field))
+        painter.setPen(QPen(QColor(theme.accent if is_highlighted else theme.border), 2 if self.hasFocus() else 1))
+        painter.setBrush(QColor(theme.selected if phase.kind == "interval" else theme.sunk))
         painter.drawRoundedRect(picture, 6, 6)
         middle = picture.center()
         if phase.kind == "interval":
             self._paint_interval(painter, phase, picture)
         elif phase.kind == "question":
-            draw_icon(painter, "list", QRectF(middle.x() - 9, middle.y() - 9, 18, 18), t.accent, 2.0)
+            draw_icon(painter, "list", QRectF(middle.x() - 9, middle.y() - 9, 18, 18), theme.accent, 2.0)
         elif phase.kind == "feedback":
-            draw_icon(painter, "check", QRectF(middle.x() - 9, middle.y() - 9, 18, 18), t.ok, 2.2)
+            draw_icon(painter, "check", QRectF(middle.x() - 9, middle.y() - 9, 18, 18), theme.ok, 2.2)
         painter.setFont(font("small"))
         metrics = painter.fontMetrics()
-        for ink, text, below in ((t.text, phase.name, 15), (t.text2, phase.duration, 30)):
+        for ink, text, below in ((theme.text, phase.name, 15), (theme.text2, phase.duration, 30)):
             painter.setPen(QColor(ink))
             shown = metrics.elidedText(text, Qt.TextElideMode.ElideRight, self.width())
             painter.drawText(QPointF(0, picture.bottom() + below), shown)
 
     def _paint_interval(self, painter: QPainter, phase: _Phase, picture: QRectF) -> None:
-        t, way = self.theme, QPainterPath()
+        theme, path = self.theme, QPainterPath()
         middle = picture.center().y() - 5
         step = picture.width() / 4
-        way.moveTo(picture.left() + 4, middle)
+        path.moveTo(picture.left() + 4, middle)
         for number in range(4):
-            lift = 8 if number % 2 else -8
+            offset = 8 if number % 2 else -8
             begin = picture.left() + 4 + number * (step - 2)
-            way.quadTo(QPointF(begin + step / 2, middle + lift), QPointF(begin + step - 2, middle))
+            path.quadTo(QPointF(begin + step / 2, middle + offset), QPointF(begin + step - 2, middle))
         painter.setBrush(Qt.BrushStyle.NoBrush)
-        painter.setPen(QPen(QColor(t.text3), 1, Qt.PenStyle.DotLine))
-        painter.drawPath(way)
-        painter.setPen(QPen(QColor(t.accent), 2))
-        painter.setBrush(QColor(t.surface))
+        painter.setPen(QPen(QColor(theme.text3), 1, Qt.PenStyle.DotLine))
+        painter.drawPath(path)
+        painter.setPen(QPen(QColor(theme.accent), 2))
+        painter.setBrush(QColor(theme.surface))
         painter.drawEllipse(QPointF(picture.center().x(), middle), 6, 6)
-        painter.setPen(QColor(t.text2))
+        painter.setPen(QColor(theme.text2))
         painter.setFont(font("key"))
         painter.drawText(picture.adjusted(0, 0, 0, -3), Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignBottom,
-                         phase.words)  # fmt: skip
+                         phase.caption)  # fmt: skip
 
 
 class _StripView(Extra, Themed, QWidget):
-    """The phases of one trial, as wide as they are long, but wide enough for their texts.
+    """The phases of one trial; their widths grow with their durations, but fit their texts.
 
     ``opened`` carries the path of the field of the pressed phase.
     """
@@ -413,19 +425,21 @@ class _StripView(Extra, Themed, QWidget):
         painter.drawText(head, Qt.AlignmentFlag.AlignRight, self.strip.duration)
 
 
-def _phase_widths(phases: tuple[_Phase, ...], whole: float) -> list[float]:
+def _phase_widths(phases: tuple[_Phase, ...], total_px: float) -> list[float]:
     """Return the widths of the phases: wide enough for their texts, and longer phases are wider."""
     metrics = QFontMetrics(font("small"))
     least_widths = [max(map(metrics.horizontalAdvance, (phase.name, phase.duration))) + GAP for phase in phases]
-    rest, total = max(0.0, whole - sum(least_widths)), sum(phase.duration_s for phase in phases) or 1.0
-    share = min(1.0, whole / sum(least_widths))
-    return [share * least + rest * phase.duration_s / total for least, phase in zip(least_widths, phases, strict=True)]
+    spare_px, total = max(0.0, total_px - sum(least_widths)), sum(phase.duration_s for phase in phases) or 1.0
+    scale = min(1.0, total_px / sum(least_widths))
+    return [
+        scale * least + spare_px * phase.duration_s / total for least, phase in zip(least_widths, phases, strict=True)
+    ]
 
 
 def _trial_strip_below(field: Field) -> _StripView:
-    made = _StripView()
-    made.opened.connect(lambda path: field.asked.emit(GoTo(path[:2], path)))
-    return made
+    strip = _StripView()
+    strip.opened.connect(lambda path: field.asked.emit(GoTo(path[:2], path)))
+    return strip
 
 
 TRIAL: Final = SpecialEditor((("Block", "design"),), adds=_trial_strip_below, wide=True, facts=_trial_strip)

@@ -1,6 +1,6 @@
-"""The editors of the rows of a form, one for each kind of value, and the fields that they are typed in.
+"""The editors of a form's rows, one for each kind of value, and their text fields.
 
-What is typed is handed on within moments, at Enter, and on leaving the field.
+Typed text is submitted after a short delay, at Enter, and when the field is left.
 """
 
 from __future__ import annotations
@@ -43,18 +43,18 @@ from study_app.number_text import number_of, typed_numbers, unclear_number
 from study_app.protocol.questions import STATEMENT
 from study_app.protocol.wording import language_name
 
-HAND_ON_MS = 150
-"""What is typed is handed on so long after the first key [ms]: typing without a rest is kept as well."""
+SUBMIT_DELAY_MS = 150
+"""Delay from the first unsubmitted key until typed text is submitted, even while typing continues [ms]."""
 CLICK_MS = 10
-"""How often it is looked whether the click is done that the keyboard left a field by [ms]."""
-MOST_LINES, SENTENCE_EDGE_PX = 6, 16
-"""How many lines a sentence has at most, and what its field needs above and below them [px]."""
+"""Interval of checking whether the click that took the focus from a field has ended [ms]."""
+MAX_LINES, SENTENCE_EDGE_PX = 6, 16
+"""Greatest number of lines of a sentence, and the total margin above and below them [px]."""
 _LINE_BREAK = re.compile(r"\s*[\r\n\u2028\u2029]+\s*")
 _WINDOW_REASONS = {Qt.FocusReason.ActiveWindowFocusReason, Qt.FocusReason.PopupFocusReason}
-KEYS_OF_PLACE = (QKeySequence.StandardKey.Undo, QKeySequence.StandardKey.Redo, QKeySequence.StandardKey.Save)
+PAGE_KEYS = (QKeySequence.StandardKey.Undo, QKeySequence.StandardKey.Redo, QKeySequence.StandardKey.Save)
 
 LANGUAGE: Final = "language"
-"""The property of a field with the code of its text's language."""
+"""The field property with the language code of its text."""
 
 
 def removes_key(event: QKeyEvent) -> bool:
@@ -63,87 +63,87 @@ def removes_key(event: QKeyEvent) -> bool:
 
 
 def remove_button(name: str, remove: Callable[[], object]) -> IconButton:
-    """Return a × that Tab skips, because a key in its field does the same."""
-    made = IconButton("cross", name, with_key(name, "remove"), size=FIELD_PX, role="plain")
-    made.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
-    made.clicked.connect(lambda _on=False: remove())
-    return made
+    """Return a × button that Tab skips, because a key in its field does the same."""
+    button = IconButton("cross", name, with_key(name, "remove"), size=FIELD_PX, role="plain")
+    button.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
+    button.clicked.connect(lambda _on=False: remove())
+    return button
 
 
 if TYPE_CHECKING:
-    _Base = QWidget
+    _WidgetBase = QWidget
 else:
-    _Base = object  # mixed into fields of Qt
+    _WidgetBase = object  # a mixin of Qt's fields
 
 
-class _Typed(_Base):
+class _Typed(_WidgetBase):
     """Common base of single-line and multi-line fields.
 
-    ``typed`` carries the text, ``left`` follows when the field is left.
+    ``typed`` carries the submitted text; ``focused`` and ``left`` are emitted when the field gets and loses the focus.
     """
 
     typed: Any
-    came: Any
+    focused: Any
     left: Any
-    rests = True
-    """Whether what is typed is handed on while typing, not only at Enter and on leaving."""
+    submits_while_typing = True
+    """Whether text is submitted while typing, not only at Enter and when the field is left."""
     beside: Sequence[_Typed] = ()
-    """The fields of all languages of a text in several languages."""
+    """The fields of a text in several languages, including this one."""
 
     def begin(self) -> None:
         self.pending = False
         self._before = ""
-        self._rest = QTimer(self)
-        self._rest.setSingleShot(True)
-        self._rest.timeout.connect(self._flush_after_click)
+        self._submit_timer = QTimer(self)
+        self._submit_timer.setSingleShot(True)
+        self._submit_timer.timeout.connect(self._flush_after_click)
 
     def note_typing(self) -> None:
         self.pending = True
-        if self.rests and not self._rest.isActive():
-            self._rest.start(HAND_ON_MS)
+        if self.submits_while_typing and not self._submit_timer.isActive():
+            self._submit_timer.start(SUBMIT_DELAY_MS)
 
     def flush(self) -> None:
-        self._rest.stop()
+        self._submit_timer.stop()
         if self.pending:
             self.pending = False
-            self.typed.emit(self.words())
+            self.typed.emit(self.typed_text())
 
     def _flush_after_click(self) -> None:
-        """Submit the typed text once no button is pressed and no list is open, before another form discards it."""
+        """Submit the text as soon as no mouse button is pressed and no list is open, before another form is shown."""
         if QApplication.mouseButtons() == Qt.MouseButton.NoButton and QApplication.activePopupWidget() is None:
             self.flush()
             if not self.hasFocus():
                 self.left.emit()
         else:
-            self._rest.start(CLICK_MS)
+            self._submit_timer.start(CLICK_MS)
 
     def accept(self) -> None:
-        """Submit the typed text; afterwards Esc restores this text, unless it is rejected."""
+        """Submit the typed text; unless it is rejected, Esc restores this text from now on."""
         self.flush()
         if self.property("state") != "refused":
-            self._before = self.words()
+            self._before = self.typed_text()
 
-    def words(self) -> str:
+    def typed_text(self) -> str:
         raise NotImplementedError
 
     def has_nothing_to_delete(self) -> bool:
-        """Return whether there is nothing left to delete: no text here after the caret, and none in other languages."""
-        return self.is_at_end() and not any(field.words() for field in self.beside if field is not self)
+        """Return whether there is no text after the caret, and none in the other languages."""
+        return self.is_at_end() and not any(field.typed_text() for field in self.beside if field is not self)
 
     def is_at_end(self) -> bool:
-        """Return whether the caret is at the end of a text that is not or completely selected."""
+        """Return whether the caret is at the end of a text without a selection, or all of it is selected."""
         raise NotImplementedError
 
-    def begin_value(self) -> None:
-        """Use the displayed text as the value of another element, without a rejection; press Esc to restore it."""
+    def accept_shown_text(self) -> None:
+        """Accept the shown text as the value of another element: Esc restores it, and no rejection is marked."""
         self.show_refused(False)
-        self._before = self.words()
+        self._before = self.typed_text()
 
     def restore(self) -> None:
         """Restore the text that was present when the field got the focus."""
-        self._rest.stop()
+        self._submit_timer.stop()
         self.pending = False
-        if self.words() != self._before:
+        if self.typed_text() != self._before:
             self.show_text(self._before)
             self.typed.emit(self._before)
 
@@ -151,22 +151,22 @@ class _Typed(_Base):
         """Show a text, unless another one is being typed."""
         raise NotImplementedError
 
-    def show_refused(self, yes: bool) -> None:
+    def show_refused(self, refused: bool) -> None:
         """Mark the field as rejected, or remove the mark."""
-        set_property(self, "state", "refused" if yes else "")
+        set_property(self, "state", "refused" if refused else "")
 
-    def leaves_to_place(self, event: QEvent) -> bool:
-        """Return whether a key is handled by the page, such as undo, which concerns the whole study."""
+    def is_page_key(self, event: QEvent) -> bool:
+        """Submit the text and ignore the key if the page handles it, such as undo; return whether it does."""
         if event.type() != QEvent.Type.ShortcutOverride or not isinstance(event, QKeyEvent):
             return False
-        if not any(event.matches(key) for key in KEYS_OF_PLACE):
+        if not any(event.matches(key) for key in PAGE_KEYS):
             return False
         self.flush()
         event.ignore()
         return True
 
     def event(self, event: QEvent) -> bool:
-        return True if self.leaves_to_place(event) else super().event(event)
+        return True if self.is_page_key(event) else super().event(event)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.key() == Qt.Key.Key_Escape:
@@ -179,24 +179,24 @@ class _Typed(_Base):
     def focusInEvent(self, event: QFocusEvent) -> None:
         super().focusInEvent(event)
         if self.property("state") != "refused":
-            self._before = self.words()
-        self.came.emit()
+            self._before = self.typed_text()
+        self.focused.emit()
 
     def focusOutEvent(self, event: QFocusEvent) -> None:
         super().focusOutEvent(event)
         if event.reason() != Qt.FocusReason.MouseFocusReason:
             self.flush()
-            QTimer.singleShot(0, self, self.left.emit)  # after the focus has moved, since the form may be rebuilt
+            QTimer.singleShot(0, self, self.left.emit)  # only when the focus has moved, because the form may be rebuilt
         else:
-            self._rest.start(CLICK_MS)
+            self._submit_timer.start(CLICK_MS)
 
 
 class TypedLine(_Typed, QLineEdit):
-    """One line; ``stepped`` is emitted when an arrow key counts up (1) or down (-1)."""
+    """A single-line field; ``stepped`` carries 1 for the up arrow key and -1 for the down arrow key."""
 
     stepped = Signal(int)
     typed = Signal(str)
-    came = Signal()
+    focused = Signal()
     left = Signal()
 
     def __init__(self, name: str) -> None:
@@ -226,32 +226,32 @@ class TypedLine(_Typed, QLineEdit):
             self._caret = self.cursorPosition()
             self.home(False)  # a long text is shown from its start
 
-    def words(self) -> str:
+    def typed_text(self) -> str:
         return self.text()
 
     def is_at_end(self) -> bool:
-        last = len(self.text().encode("utf-16-le", "surrogatepass")) // 2  # in UTF-16 units, as Qt counts
-        return self.selectedText() == self.text() or (not self.hasSelectedText() and self.cursorPosition() == last)
+        end = len(self.text().encode("utf-16-le", "surrogatepass")) // 2  # in UTF-16 units, as Qt counts
+        return self.selectedText() == self.text() or (not self.hasSelectedText() and self.cursorPosition() == end)
 
     def show_text(self, text: str) -> None:
         if not self.pending and text != self.text():
-            at = self.cursorPosition()
+            caret = self.cursorPosition()
             self.setText(text)
-            self.setCursorPosition(at if self.hasFocus() else 0)  # Qt leaves the caret at the end of a shorter text
+            self.setCursorPosition(caret if self.hasFocus() else 0)  # Qt leaves the caret at the end of a shorter text
 
 
 class TypedText(_Typed, QPlainTextEdit):
-    """Several lines; Tab leaves the field."""
+    """A multi-line field; Tab leaves it."""
 
     typed = Signal(str)
-    came = Signal()
+    focused = Signal()
     left = Signal()
 
     def __init__(self, name: str) -> None:
         super().__init__()
         self.begin()
         self.setAccessibleName(name)
-        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)  # the wheel scrolls past it
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)  # the wheel must not focus it
         self.setTabChangesFocus(True)
         self.setUndoRedoEnabled(False)
         self.setFont(font("label", weight=400))
@@ -260,13 +260,13 @@ class TypedText(_Typed, QPlainTextEdit):
         self.textChanged.connect(self._note_change)
 
     def _note_change(self) -> None:
-        """React to typed text; Qt also emits the signal for a new font or margin."""
-        if self.words() != self._known:
-            self._known = self.words()
+        """Note typed text; Qt emits the signal for a new font or margin, too."""
+        if self.typed_text() != self._known:
+            self._known = self.typed_text()
             if not self._showing:
                 self.note_typing()
 
-    def words(self) -> str:
+    def typed_text(self) -> str:
         return self.document().toRawText().replace("\u2029", "\n")
 
     def is_at_end(self) -> bool:
@@ -277,42 +277,44 @@ class TypedText(_Typed, QPlainTextEdit):
         return QSize(120, 118)
 
     def show_text(self, text: str) -> None:
-        if not self.pending and text != self.words():
+        if not self.pending and text != self.typed_text():
             self._showing = True
-            self.setPlainText(text)  # Qt makes a paragraph of each line separator, so the text may differ
+            self.setPlainText(text)  # Qt turns each line separator into a paragraph, so the text may differ
             self._showing = False
 
     def focusOutEvent(self, event: QFocusEvent) -> None:
         super().focusOutEvent(event)
         if event.reason() not in _WINDOW_REASONS:
-            cursor = self.textCursor()  # a line loses its selection in Qt, a text does not
+            cursor = self.textCursor()  # in Qt, a line edit loses its selection, but a text edit keeps it
             cursor.clearSelection()
             self.setTextCursor(cursor)
 
 
 class TypedSentence(TypedText):
-    """A sentence that wraps into as many lines as it needs and fit; Enter accepts it."""
+    """A sentence that wraps into up to ``max_lines`` lines; Enter accepts it."""
 
-    def __init__(self, name: str, *, most_lines: int = MOST_LINES) -> None:
+    def __init__(self, name: str, *, max_lines: int = MAX_LINES) -> None:
         super().__init__(name)
-        self._most_lines = most_lines
+        self._most_lines = max_lines
         self.setProperty("dense", "true")
         self.document().setDocumentMargin(0)
         self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         across = self.horizontalScrollBar()
-        across.rangeChanged.connect(lambda: across.setRange(0, 0))  # Qt scrolls to a caret behind a space
+        across.rangeChanged.connect(
+            lambda: across.setRange(0, 0)
+        )  # otherwise Qt scrolls to a caret after a trailing space
         self.textChanged.connect(self._fit)
         self._fit()
 
     def _fit(self) -> None:
-        block, needed = self.document().firstBlock(), 0.0
+        block, needed_px = self.document().firstBlock(), 0.0
         while block.isValid():
-            needed += self.document().documentLayout().blockBoundingRect(block).height()
+            needed_px += self.document().documentLayout().blockBoundingRect(block).height()
             block = block.next()
-        most = self._most_lines * self.fontMetrics().lineSpacing()
-        scrolls = Qt.ScrollBarPolicy.ScrollBarAsNeeded if needed > most else Qt.ScrollBarPolicy.ScrollBarAlwaysOff
-        self.setVerticalScrollBarPolicy(scrolls)
-        self.setFixedHeight(max(FIELD_PX, min(most, math.ceil(needed)) + SENTENCE_EDGE_PX))
+        max_px = self._most_lines * self.fontMetrics().lineSpacing()
+        policy = Qt.ScrollBarPolicy.ScrollBarAsNeeded if needed_px > max_px else Qt.ScrollBarPolicy.ScrollBarAlwaysOff
+        self.setVerticalScrollBarPolicy(policy)
+        self.setFixedHeight(max(FIELD_PX, min(max_px, math.ceil(needed_px)) + SENTENCE_EDGE_PX))
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
@@ -329,7 +331,7 @@ class TypedSentence(TypedText):
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter}:
             self.accept()
-            event.ignore()  # as a line does
+            event.ignore()  # as in a single-line field
         else:
             super().keyPressEvent(event)
 
@@ -337,12 +339,15 @@ class TypedSentence(TypedText):
         self.insertPlainText(_LINE_BREAK.sub(" ", source.text()))
 
 
-MOST_SEGMENTS, SEGMENT_LETTERS = 4, 34
+MAX_SEGMENTS, SEGMENT_LETTERS = 4, 34
 NUMBER_PX, NARROWEST_LIST = 96, 120
 
 
 class Extra:
-    """A widget with facts about a row; placed to the right of an editor of at least this width (0: below it)."""
+    """A widget with facts about a row, below its editor.
+
+    If ``beside_px`` is positive, it is to the right of an editor that leaves this width for it [px].
+    """
 
     beside_px = 0
 
@@ -353,12 +358,12 @@ class Extra:
 class Field(Themed, QWidget):
     """Edits the value of one row.
 
-    ``asked`` carries a request, ``came`` is emitted when it gets the focus; ``caption`` is above an editor as wide as
-    the form.
+    ``asked`` carries a request, ``focused`` is emitted when it gets the focus. ``caption`` is the text above an editor
+    that is as wide as the form.
     """
 
     asked = Signal(object)
-    came = Signal()
+    focused = Signal()
     caption = ""
 
     def __init__(self, row: FormRow) -> None:
@@ -375,7 +380,7 @@ class Field(Themed, QWidget):
         self.show_extra()
 
     def add_extra(self, extra: QWidget) -> None:
-        """Add a widget with facts below the editor; an `Extra` is placed to its right if there is room."""
+        """Add a widget with facts below the editor, or to its right as described in `Extra`."""
         self.extra = extra
         self.outer.addWidget(extra, 0, Qt.AlignmentFlag.AlignVCenter)
         self.show_extra()
@@ -419,9 +424,9 @@ class Field(Themed, QWidget):
 class LineField(Field):
     """A plain text, one number, or several numbers, in one line."""
 
-    def __init__(self, row: FormRow, typed_in: Callable[[str], Any] = TypedLine) -> None:
+    def __init__(self, row: FormRow, make_line: Callable[[str], Any] = TypedLine) -> None:
         super().__init__(row)
-        self.line = typed_in(row.label)
+        self.line = make_line(row.label)
         if row.kind in {"number", "whole number"}:
             self.line.setFixedWidth(NUMBER_PX + (48 if self.placeholder() else 0))
             self.line.setAlignment(Qt.AlignmentFlag.AlignRight)
@@ -431,15 +436,15 @@ class LineField(Field):
         if row.kind in {"number", "whole number"}:
             permitted = cut_text(row.range, "small", "text2", right=True)
             self.box.addWidget(permitted, 1)
-        self.line.typed.connect(self._take_text)
-        self.line.came.connect(self.came)
+        self.line.typed.connect(self._submit_text)
+        self.line.focused.connect(self.focused)
         if row.kind in {"number", "whole number"}:
             self.line.stepped.connect(self._count)
         self.setFocusProxy(self.line)
         self.show_value()
 
     def _count(self, by: int) -> None:
-        """Increase or decrease the last displayed digit."""
+        """Increment or decrement the last digit that is shown."""
         shown = self.line.text().strip() or str(self.row.default or 0)
         number = number_of(shown)
         if number is None or self.line.isReadOnly():
@@ -447,7 +452,7 @@ class LineField(Field):
         digits = len(shown.replace(",", ".").partition(".")[2]) if isinstance(number, float) else 0
         value = round(number + by * 10.0**-digits, digits)
         self.line.setText(f"{value:.{digits}f}")
-        self._take_text(self.line.text())
+        self._submit_text(self.line.text())
 
     def show_value(self) -> None:
         value = self.row.value
@@ -455,8 +460,8 @@ class LineField(Field):
         if not self.refusal:
             self.line.show_text("" if value is None else typed_value(value))
 
-    def _take_text(self, text: str) -> None:
-        row, before = self.row, self.refusal
+    def _submit_text(self, text: str) -> None:
+        row, previous_refusal = self.row, self.refusal
         self.refusal = ""
         value: Any = text
         if not text.strip() and row.value is not None and not row.required and row.kind != "text":
@@ -464,16 +469,16 @@ class LineField(Field):
         elif row.kind in {"number", "whole number"}:
             value = number_of(text)
             if value is None or (row.kind == "whole number" and isinstance(value, float)):
-                why = unclear_number(text) if value is None else f"“{text}” is not a whole number"
-                self.refusal = f"{why}. {kept_value_sentence(row.value)}"
+                reason = unclear_number(text) if value is None else f"“{text}” is not a whole number"
+                self.refusal = f"{reason}. {kept_value_sentence(row.value)}"
         elif row.kind in {"numbers", "vector"}:
             try:
                 value = [number for _, number in typed_numbers(text)]
             except ValueError as unclear:
                 self.refusal = f"{unclear}. {kept_value_sentence(row.value)}"
         self.line.show_refused(bool(self.refusal))
-        if self.refusal or before:
-            self.came.emit()  # the form shows or removes its faults
+        if self.refusal or previous_refusal:
+            self.focused.emit()  # updates the faults in the form
         if not self.refusal and (text.strip() or row.kind == "text" or row.required):
             self.set_value(value, typing=True)
 
@@ -497,19 +502,19 @@ class SwitchField(Field):
 
 
 class ChoiceField(Field):
-    """A choice between values: few short ones side by side, others in a list; references have an arrow.
+    """A choice of a value: a few short ones as segments, others in a list; an arrow opens a reference.
 
-    The kinds of a question are side by side if there is room.
+    The kinds of a question are segments if there is room.
     """
 
     def __init__(self, row: FormRow) -> None:
         super().__init__(row)
-        labels = [self.words(choice, None) for choice in row.choices]
-        few = 1 < len(labels) <= MOST_SEGMENTS and sum(len(text) + 3 for text in labels) <= SEGMENT_LETTERS
-        few = few and row.kind != "reference"
-        self.segments = Segments(row.label) if few or row.kind == "kind" else None
-        made = DesignList() if row.path[-1] == "design" else Choice()
-        self.list = None if few else make_dense(made, row.label)
+        labels = [self.choice_text(choice, None) for choice in row.choices]
+        as_segments = 1 < len(labels) <= MAX_SEGMENTS and sum(len(text) + 3 for text in labels) <= SEGMENT_LETTERS
+        as_segments = as_segments and row.kind != "reference"
+        self.segments = Segments(row.label) if as_segments or row.kind == "kind" else None
+        choice_list = DesignList() if row.path[-1] == "design" else Choice()
+        self.list = None if as_segments else make_dense(choice_list, row.label)
         if self.segments is not None:
             self.segments.chosen.connect(self._choose_value)
             self.box.addWidget(self.segments)
@@ -521,23 +526,23 @@ class ChoiceField(Field):
         if self.segments is not None:
             self.box.addStretch()
         self._values: list[str | None] = []
-        opens = f"Open the element that {row.label} refers to"
-        self.arrow = IconButton("arrow_right", opens, with_key(f"{opens}; back", "back"), size=FIELD_PX)
+        tip = f"Open the element that {row.label} refers to"
+        self.arrow = IconButton("arrow_right", tip, with_key(f"{tip}; back", "back"), size=FIELD_PX)
         self.arrow.clicked.connect(lambda: self.asked.emit(Do("select", (self.row.target,))))
         if row.kind == "reference":
             self.box.addWidget(self.arrow)
         self.setFocusProxy(self.segments or self.list or self.arrow)
         self.show_value()
-        self._make_room()
+        self._choose_layout()
 
     def show_value(self) -> None:
         row = self.row
         shown = row.default if row.value is None else row.value
         if self.segments is not None:
-            self.segments.show_values([(choice.value, self.words(choice, None)) for choice in row.choices], shown)
+            self.segments.show_values([(choice.value, self.choice_text(choice, None)) for choice in row.choices], shown)
         if self.list is None:
             return
-        values = [(choice.value, self.words(choice, row.default)) for choice in row.choices]
+        values = [(choice.value, self.choice_text(choice, row.default)) for choice in row.choices]
         if row.kind == "reference":
             values = [(name, f"{name} ({note})" if note else name) for name, note in row.notes]
         if shown is not None and shown not in [value for value, _ in values]:
@@ -556,20 +561,20 @@ class ChoiceField(Field):
         self.list.setPlaceholderText("" if known else "There is nothing to choose from yet")
         self.arrow.setEnabled(row.target is not None)
 
-    def words(self, choice: Any, default: object) -> str:
-        """Return the label of a choice; a statement has no kind in the file."""
+    def choice_text(self, choice: Any, default: object) -> str:
+        """Return the label of a choice; a question without a kind is a statement."""
         if choice.value is None and self.row.kind == "kind" and "items" in self.row.path:
             return STATEMENT.capitalize()
         return choice_label(choice, default)
 
-    def _make_room(self) -> None:
+    def _choose_layout(self) -> None:
         if self.segments is not None and self.list is not None:
             both: tuple[QWidget, QWidget] = (self.segments, self.list)
             shown, hidden = both if self.width() >= self.segments.sizeHint().width() else both[::-1]
-            held = self.window().focusWidget()
+            focused = self.window().focusWidget()
             shown.show()
             self.setFocusProxy(shown)
-            if held is not None and (held is hidden or hidden.isAncestorOf(held)):
+            if focused is not None and (focused is hidden or hidden.isAncestorOf(focused)):
                 shown.setFocus()
             hidden.hide()
 
@@ -579,17 +584,17 @@ class ChoiceField(Field):
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
-        self._make_room()
+        self._choose_layout()
 
     def _choose_at(self, at: int) -> None:
-        """Choose a value; the last entries add an element and refer to it."""
-        added = self.row.additions
-        new = at - (len(self._values) - len(added))
-        if new < 0:
+        """Choose the value of a list entry; the last entries add an element and refer to it."""
+        additions = self.row.additions
+        addition_index = at - (len(self._values) - len(additions))
+        if addition_index < 0:
             self._choose_value(self._values[at])
             return
         self.show_value()
-        self.asked.emit(added[new][1])
+        self.asked.emit(additions[addition_index][1])
 
     def _choose_value(self, value: Any) -> None:
         row = self.row
@@ -597,7 +602,7 @@ class ChoiceField(Field):
             self.asked.emit(SwitchKind(row.path[:-1], value))
         elif row.kind != "kind" and value is not None and value != row.value:
             self.set_value(value)
-        self.came.emit()
+        self.focused.emit()
 
 
 class ChecksField(Field):
@@ -609,13 +614,13 @@ class ChecksField(Field):
         self.box.setSpacing(0)
         self.checks: dict[str, Check] = {}
         for choice in row.choices:
-            made = Check(choice_label(choice, None))
-            made.setFont(font("label", weight=400))
-            made.setAccessibleName(f"{row.label}, {made.text()}")
-            made.setToolTip(plain_tip(choice.sentence))
-            made.clicked.connect(self._apply_checked)
-            self.checks[str(choice.value)] = made
-            self.box.addWidget(made)
+            check = Check(choice_label(choice, None))
+            check.setFont(font("label", weight=400))
+            check.setAccessibleName(f"{row.label}, {check.text()}")
+            check.setToolTip(plain_tip(choice.sentence))
+            check.clicked.connect(self._apply_checked)
+            self.checks[str(choice.value)] = check
+            self.box.addWidget(check)
         if self.checks:
             self.setFocusProxy(next(iter(self.checks.values())))
         self.show_value()
@@ -634,7 +639,7 @@ class ChecksField(Field):
 
 
 class UnknownField(Field):
-    """A key that does not belong to the table: its value can only be removed."""
+    """The value of a key that does not belong to the table; it can only be removed."""
 
     def __init__(self, row: FormRow) -> None:
         super().__init__(row)
@@ -648,20 +653,20 @@ class UnknownField(Field):
 
 def add_button(name: str, accessible_name: str = "") -> ActionButton:
     """Return a plain button with a plus sign."""
-    made = small_button("plus", accessible_name or name, role="plain", height=32)
-    made.setAccessibleName(name)
-    return made
+    button = small_button("plus", accessible_name or name, role="plain", height=32)
+    button.setAccessibleName(name)
+    return button
 
 
 def kept_value_sentence(value: Any) -> str:
-    """Return the sentence about the value that the study keeps while the typed one is rejected."""
+    """Return the sentence on the value that the study keeps while the typed text is rejected."""
     if value is None:
         return "This text is not in the study; press Esc to clear the field."
     return f"The study still contains {typed_value(value)}; press Esc to restore it."
 
 
 def typed_value(value: Any) -> str:
-    """Return a value as it would be typed: numbers of a list separated by spaces."""
+    """Return a value as it is typed: numbers of a list are separated by spaces."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, tuple | list):
@@ -672,28 +677,28 @@ def typed_value(value: Any) -> str:
 class LanguagesField(Field):
     """A text in each language, side by side, or stacked for more than two languages or several lines."""
 
-    def __init__(self, row: FormRow, typed_in: type[TypedLine | TypedText] = TypedLine) -> None:
+    def __init__(self, row: FormRow, make_line: type[TypedLine | TypedText] = TypedLine) -> None:
         super().__init__(row)
-        several, down = row.kind == "paragraphs", is_stacked(row)
-        if down:
+        is_multiline, stacked = row.kind == "paragraphs", is_stacked(row)
+        if stacked:
             self.box.setDirection(QBoxLayout.Direction.TopToBottom)
         self.lines: dict[str, TypedLine | TypedText] = {}
         for code, language in row.languages:
             name = row.label if len(row.languages) == 1 else f"{row.label}, {language}"
-            made = (TypedText if several else typed_in)(name)
-            made.setProperty(LANGUAGE, code)
+            line_edit = (TypedText if is_multiline else make_line)(name)
+            line_edit.setProperty(LANGUAGE, code)
             if len(row.languages) > 1:
-                made.setPlaceholderText(f"Missing in {language}")
-                made.setToolTip(plain_tip(language))
+                line_edit.setPlaceholderText(f"Missing in {language}")
+                line_edit.setToolTip(plain_tip(language))
             if is_right_to_left(code):
-                made.setLayoutDirection(Qt.LayoutDirection.RightToLeft)
-            made.typed.connect(lambda text, code=code: self.asked.emit(SetText(self.row.path, code, text)))
-            made.left.connect(lambda: self.asked.emit(LeaveText(self.row.path)))
-            made.came.connect(self.came)
-            self.lines[code] = made
-            if down and len(row.languages) > 1:
+                line_edit.setLayoutDirection(Qt.LayoutDirection.RightToLeft)
+            line_edit.typed.connect(lambda text, code=code: self.asked.emit(SetText(self.row.path, code, text)))
+            line_edit.left.connect(lambda: self.asked.emit(LeaveText(self.row.path)))
+            line_edit.focused.connect(self.focused)
+            self.lines[code] = line_edit
+            if stacked and len(row.languages) > 1:
                 self.box.addWidget(label(language, "small", "text2"))
-            self.box.addWidget(made)
+            self.box.addWidget(line_edit)
         if len(self.lines) > 1:
             for line in self.lines.values():
                 line.beside = tuple(self.lines.values())
@@ -701,36 +706,36 @@ class LanguagesField(Field):
         self.show_value()
 
     @cached_property
-    def copied(self) -> QLabel:
-        """The label that marks texts still in another language; created on first use."""
-        made = label("", "small", "warn")
-        made.hide()
-        self.outer.addWidget(made)
-        return made
+    def untranslated_note(self) -> QLabel:
+        """The label of texts that are not translated yet; created on first use."""
+        note = label("", "small", "warn")
+        note.hide()
+        self.outer.addWidget(note)
+        return note
 
     @property
     def has_missing_texts(self) -> bool:
-        written = [bool(line.words().strip()) for line in self.lines.values()]
-        return any(written) and not all(written)
+        filled = [bool(line.typed_text().strip()) for line in self.lines.values()]
+        return any(filled) and not all(filled)
 
     def show_value(self) -> None:
-        """Show each text; a plain text is in the first language. Untranslated texts are marked."""
+        """Show each text, and mark untranslated ones; a plain text is that of the first language."""
         value, untranslated = self.row.value, self.row.untranslated
-        if untranslated or "copied" in self.__dict__:
+        if untranslated or "untranslated_note" in self.__dict__:
             source = language_name(untranslated[0].source) if untranslated else ""
-            lacking = ", ".join(language_name(text.language) for text in untranslated)
-            same = f"Same text as in {source}, not yet translated into {lacking}"
+            languages = ", ".join(language_name(text.language) for text in untranslated)
+            note = f"Same text as in {source}, not yet translated into {languages}"
             if all(text.is_word for text in untranslated):
-                same = f"Same word as in {source}: translate it, unless {lacking} has the same word"
-            self.copied.setText(same)
-            self.copied.setVisible(bool(untranslated))
+                note = f"Same word as in {source}: translate it, unless {languages} has the same word"
+            self.untranslated_note.setText(note)
+            self.untranslated_note.setVisible(bool(untranslated))
         for number, (code, line) in enumerate(self.lines.items()):
             text = value.get(code, "") if isinstance(value, dict) else value if number == 0 else ""
             line.show_text(text if isinstance(text, str) else "")
 
     def take_keyboard(self) -> None:
-        copied = {text.language for text in self.row.untranslated}
-        to_write = (line for code, line in self.lines.items() if not line.words() or code in copied)
+        untranslated = {text.language for text in self.row.untranslated}
+        to_write = (line for code, line in self.lines.items() if not line.typed_text() or code in untranslated)
         next(to_write, self).setFocus(Qt.FocusReason.OtherFocusReason)
 
 
@@ -744,11 +749,11 @@ class SpecialEditor:
     """An editor of certain keys; bounds, faults, help and removal stay with the row."""
 
     keys: tuple[tuple[str, str], ...]  # title of the model in the JSON Schema, such as "Block", and the key
-    make: Callable[[FormRow], Field] | None = None  # makes the editor of a row; None: that of its kind
-    adds: Callable[[Field], QWidget] | None = None  # makes what shows its facts, an `Extra`
+    make: Callable[[FormRow], Field] | None = None  # makes the editor of a row; None for the editor of its kind
+    adds: Callable[[Field], QWidget] | None = None  # makes the widget that shows its facts, an `Extra`
     wide: bool = False  # whether it takes the width of the form, with the label above it
     labelled: bool = True  # whether the label is shown; a screen reader says it in any case
     # returns the state that, when it changes, requires a new editor
     structure: Callable[[FormRow], object] = lambda _row: None
-    # returns the facts that it shows beyond its row's value, as a frozen value; the study may have faults
+    # returns the facts to show besides the value, as an immutable value; the study may have faults
     facts: Callable[[Study, Row], Any] | None = None

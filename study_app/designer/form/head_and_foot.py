@@ -27,7 +27,7 @@ from study_app.protocol.source import Path
 
 _TILE = 40
 _HELP_LINES = 2
-"""The lines of help that always have room, so that another field's help does not move the form under the pointer."""
+"""Number of help lines for which there is always room, so that longer help does not move the form."""
 
 
 class _Tile(Themed, QWidget):
@@ -49,7 +49,7 @@ class _Tile(Themed, QWidget):
 class FormHead(QWidget):
     """The head of the form. Signals: ``asked`` (a request), ``feel_asked`` (path), ``id_typed`` (path, current text).
 
-    ``unlock_asked`` is emitted if a locked id is to be changed.
+    ``unlock_asked`` is emitted if the user wants to change a locked ID.
     """
 
     asked = Signal(object)
@@ -72,7 +72,7 @@ class FormHead(QWidget):
         self.id = TypedLine("ID")
         self.id.setMinimumWidth(110)
         self.id.setMaximumWidth(230)
-        self.id.rests = False
+        self.id.submits_while_typing = False
         self.unlock = small_button("lock", "Change anyway …", height=34)
         self.unlock.hide()
         self._lock: tuple[object, str] = ((), "")
@@ -95,9 +95,9 @@ class FormHead(QWidget):
             grid, hbox(self.ask, self.feel, self.series, self.up, self.down, self.copy, self.delete, spacing=8), 0, 2
         )
         self.id_line = QWidget()
-        words_of_id = label("ID", "label")
-        words_of_id.setFixedWidth(LABEL_PX)
-        parts = (words_of_id, (self.id, 8), self.unlock, (self.used, 1))
+        id_label = label("ID", "label")
+        id_label.setFixedWidth(LABEL_PX)
+        parts = (id_label, (self.id, 8), self.unlock, (self.used, 1))
         hbox(*parts, spacing=8, margins=(0, 4, 0, 0), parent=self.id_line)
         grid.addWidget(self.id_line, 1, 0, 1, 3)
         grid.addWidget(self.refusal, 2, 0, 1, 3)
@@ -119,14 +119,14 @@ class FormHead(QWidget):
         self.tile.icon = form.icon
         self.tile.update()
         self.title.show_text(form.title)
-        at = "" if form.position is None else f"{form.position[0]} of {form.position[1]}"
-        self.kind.show_text("  ·  ".join(filter(None, (form.kind, at))))
+        position = "" if form.position is None else f"{form.position[0]} of {form.position[1]}"
+        self.kind.show_text("  ·  ".join(filter(None, (form.kind, position))))
         self.used.show_text(form.used)
         self.ask.setVisible(bool(form.asks) and not read_only)
         self.asks.clear()
-        for sentence, asked in form.asks:
+        for sentence, request in form.asks:
             self.asks.addAction(button_text(sentence)).triggered.connect(
-                lambda _on=False, asked=asked: self.asked.emit(asked)
+                lambda _on=False, request=request: self.asked.emit(request)
             )
         self.id_line.setVisible(form.id is not None)
         self._read_only = read_only
@@ -142,9 +142,9 @@ class FormHead(QWidget):
         self.feel.setAccessibleName(form.feel or "Feel")
         self.feel.setToolTip(f"{form.feel} in the lab")
         self.series.setVisible(form.series and not read_only)
-        alone = form.position is not None  # next to the arrows there is only room for the icon
-        self.series.show_action("bars", "" if alone else "Series …")
-        self.series.setMaximumWidth(34 if alone else QWIDGETSIZE_MAX)
+        has_arrows = form.position is not None  # next to the arrows, there is only room for the icon
+        self.series.show_action("bars", "" if has_arrows else "Series …")
+        self.series.setMaximumWidth(34 if has_arrows else QWIDGETSIZE_MAX)
         self.series.setAccessibleName(f"Series of {form.title}")
         place, count = form.position or (0, 0)
         for button in (self.up, self.down):
@@ -156,18 +156,18 @@ class FormHead(QWidget):
         for button in (self.copy, self.delete):
             button.setEnabled(not read_only and len(form.path) > 1 and form.id is not None)
 
-    def show_lock(self, path: object, why: str) -> None:
-        self._lock = (path, why)
+    def show_lock(self, path: object, reason: str) -> None:
+        self._lock = (path, reason)
         self._apply_lock()
 
     def _apply_lock(self) -> None:
-        path, why = self._lock
-        locked = bool(why) and self.form is not None and self.form.path == path
+        path, reason = self._lock
+        locked = bool(reason) and self.form is not None and self.form.path == path
         self.id.setReadOnly(self._read_only or locked)
-        self.id.setToolTip(why if locked else command_tip("rename"))
+        self.id.setToolTip(reason if locked else command_tip("rename"))
         self.unlock.setVisible(locked and not self._read_only)
-        self.unlock.setToolTip(why)
-        self.unlock.setAccessibleDescription(why)
+        self.unlock.setToolTip(reason)
+        self.unlock.setAccessibleDescription(reason)
 
     def edit_id(self) -> None:
         self.id.setFocus(Qt.FocusReason.ShortcutFocusReason)
@@ -189,23 +189,23 @@ class FormHead(QWidget):
 
 
 class FormFoot(Themed, QWidget):
-    """Label, place and description of a field."""
+    """The label, the path and the description of a field."""
 
     def __init__(self) -> None:
         super().__init__()
         self.title = label("", "label")
         self.place = cut_text("", "small", "text2", right=True)
-        self.words = label("", "small", "text2", wraps=True)
-        self.words.setAlignment(Qt.AlignmentFlag.AlignTop)
-        self.words.setMinimumHeight(_HELP_LINES * self.words.fontMetrics().lineSpacing())
+        self.help_label = label("", "small", "text2", wraps=True)
+        self.help_label.setAlignment(Qt.AlignmentFlag.AlignTop)
+        self.help_label.setMinimumHeight(_HELP_LINES * self.help_label.fontMetrics().lineSpacing())
         self.glossary = small_button("info", "Glossary", role="plain", height=26)
         above = hbox(self.title, (self.place, 1), self.glossary, spacing=8)
-        vbox(above, self.words, spacing=3, margins=(12, 4, 4, 8), parent=self)
+        vbox(above, self.help_label, spacing=3, margins=(12, 4, 4, 8), parent=self)
 
     def show_help(self, title: str, place: str, text: str) -> None:
         self.title.setText(title)
         self.place.show_text(place)
-        self.words.setText(text)
+        self.help_label.setText(text)
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         painter = smooth_painter(self)

@@ -1,4 +1,4 @@
-"""Lists in the form, whose entries are moved, copied and removed, each time as one step."""
+"""Lists in the form; moving, copying or removing an entry is one step."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -41,7 +41,7 @@ _CAPTION: Final = f"force at a hand speed of {HAND_MPS:g} m/s"
 class _ConditionLine:
     """One condition of a block."""
 
-    liquid: Path | None  # the place of its liquid, None if it has several or is not in the study
+    liquid: Path | None  # the path of its liquid; None if it has several, or is not in the study
     note: str  # its liquid if the name differs, and the visual delay
     force: str  # its force with unit, "–" if unknown
     clipped: bool = False  # whether a limit clips the force
@@ -53,18 +53,18 @@ def _condition_line(study: Study, name: Any) -> _ConditionLine:
     table = conditions.get(name) if isinstance(conditions, Mapping) and isinstance(name, str) else None
     if not isinstance(table, Mapping):
         return _ConditionLine(None, "not in the study", UNKNOWN)
-    named = table.get("liquid")
-    known = isinstance(named, str) and isinstance(liquids, Mapping) and named in liquids
-    liquid: Path | None = ("liquids", str(named)) if known else None
-    several = table.get("liquids")
-    details = [title_of(document, liquid)] if liquid is not None and named != name else []
-    if isinstance(several, tuple):
-        details.append(f"{len(several)} liquids")
+    liquid_id = table.get("liquid")
+    known = isinstance(liquid_id, str) and isinstance(liquids, Mapping) and liquid_id in liquids
+    liquid: Path | None = ("liquids", str(liquid_id)) if known else None
+    liquid_ids = table.get("liquids")
+    details = [title_of(document, liquid)] if liquid is not None and liquid_id != name else []
+    if isinstance(liquid_ids, tuple):
+        details.append(f"{len(liquid_ids)} liquids")
     delay_ms = table.get("delay_ms", 0)
     if isinstance(delay_ms, int | float):
         details.append(f"{delay_ms:g} ms late")
-    valid = valid_part(study)
-    protocol = valid.protocol if valid.forces else None
+    valid_study_part = valid_part(study)
+    protocol = valid_study_part.protocol if valid_study_part.forces else None
     if protocol is None or liquid is None or name not in protocol.conditions:
         return _ConditionLine(liquid, ", ".join(details), UNKNOWN)
     force = steady_force(protocol.scene_for(str(name)))
@@ -74,8 +74,11 @@ def _condition_line(study: Study, name: Any) -> _ConditionLine:
 RIGHT: Final = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
 
 
-class _Rows(QListWidget):
-    """A list widget as high as its entries; ``keys`` are its own shortcuts, ``dropped`` carries the end of a drag."""
+class _EntryListWidget(QListWidget):
+    """A list widget as high as its entries.
+
+    ``keys`` are its shortcuts; ``dropped`` carries the index before which dragged entries were dropped.
+    """
 
     dropped = Signal(int)
 
@@ -95,8 +98,8 @@ class _Rows(QListWidget):
         return super().event(event)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        own = self._action_for(event)
-        own() if own else super().keyPressEvent(event)
+        action = self._action_for(event)
+        action() if action else super().keyPressEvent(event)
 
     def _action_for(self, event: QKeyEvent) -> Callable[[], object] | None:
         modifiers = event.modifiers() & ~Qt.KeyboardModifier.KeypadModifier
@@ -105,23 +108,23 @@ class _Rows(QListWidget):
     def focusInEvent(self, event: QFocusEvent) -> None:
         super().focusInEvent(event)
         if event.reason() != Qt.FocusReason.MouseFocusReason and not self.selectedIndexes():
-            self.setCurrentRow(max(0, self.currentRow()))  # where the keyboard is
+            self.setCurrentRow(max(0, self.currentRow()))  # shows where the focus is
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
-        self.doItemsLayout()  # else rows keep the width they had
+        self.doItemsLayout()  # otherwise the rows keep their old width
 
     def dropEvent(self, event: QDropEvent) -> None:
-        """Emit the entry before which the dragged ones were dropped; the study moves them."""
-        place = event.position().toPoint()
-        index = self.indexAt(place)
-        below = place.y() > self.visualRect(index).center().y()
+        """Emit the index before which entries were dropped; the study, not Qt, moves them."""
+        position = event.position().toPoint()
+        index = self.indexAt(position)
+        is_below = position.y() > self.visualRect(index).center().y()
         event.setDropAction(Qt.DropAction.IgnoreAction)
-        self.dropped.emit(index.row() + below if index.isValid() else self.count())
+        self.dropped.emit(index.row() + is_below if index.isValid() else self.count())
 
 
 class EntryRow(QFrame):
-    """The frame of an entry, with its parts in a line."""
+    """An entry of a list: a frame with its parts in a row."""
 
     def __init__(self, name: str, parts: Iterable[QWidget | tuple[QWidget, int]], *, faulty: bool) -> None:
         super().__init__()
@@ -131,17 +134,17 @@ class EntryRow(QFrame):
         self.setFixedHeight(FIELD_PX + 2)
         self.line = hbox(*parts, spacing=2, margins=(12, 0, 2, 0), parent=self)
 
-    def add_button(self, icon: str, name: str, do: Callable[[], object], action: str = "") -> IconButton:
-        made = IconButton(icon, name, with_key(name, action) if action else "", size=FIELD_PX - 2, role="plain")
+    def add_button(self, icon: str, name: str, action_: Callable[[], object], action: str = "") -> IconButton:
+        button = IconButton(icon, name, with_key(name, action) if action else "", size=FIELD_PX - 2, role="plain")
         if action:
-            made.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
-        made.clicked.connect(do)
-        self.line.addWidget(made)
-        return made
+            button.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
+        button.clicked.connect(action_)
+        self.line.addWidget(button)
+        return button
 
 
 class EntryList(Field):
-    """Entries in rows, recreated only if they change; the list keeps selection and focus."""
+    """A list of entries; its rows are recreated only if they change, and keep selection and focus."""
 
     def __init__(self, row: FormRow) -> None:
         super().__init__(row)
@@ -149,9 +152,9 @@ class EntryList(Field):
         self.box.setSpacing(6)
         self.ordered = row.kind != "tables"
         self.rows: list[EntryRow] = []
-        self._after: int | None = None
-        self._filled: object = None
-        self.list = _Rows()
+        self._selected_after_step: int | None = None
+        self._shown_state: object = None
+        self.list = _EntryListWidget()
         self.list.setAccessibleName(row.label)
         self.list.dropped.connect(lambda to: self.move_entry(self.chosen, to))
         self.list.itemDoubleClicked.connect(lambda item: self.open_entry(self.list.row(item)))
@@ -166,7 +169,7 @@ class EntryList(Field):
             self.list.itemClicked.connect(lambda item: self.open_entry(self.list.row(item)))
         self.box.addWidget(self.list)
 
-    def row_content(self) -> object:
+    def entries_state(self) -> object:
         """Return the state of the entries that, when it changes, requires new rows."""
         return self.row.entries
 
@@ -174,13 +177,16 @@ class EntryList(Field):
         raise NotImplementedError
 
     def show_value(self) -> None:
-        if self._filled == (filled := self.row_content()):
+        if self._shown_state == (state := self.entries_state()):
             return
-        self._filled, held = filled, self.window().focusWidget()
-        inside = held is not None and held is not self.list and self.list.isAncestorOf(held)
-        chosen, self._after = self.chosen if self._after is None else self._after, None
-        if inside:
-            held.clearFocus()
+        self._shown_state, focused = state, self.window().focusWidget()
+        focus_inside = focused is not None and focused is not self.list and self.list.isAncestorOf(focused)
+        chosen, self._selected_after_step = (
+            self.chosen if self._selected_after_step is None else self._selected_after_step,
+            None,
+        )
+        if focus_inside:
+            focused.clearFocus()
         self.rows = []
         self.list.clear()
         self.fill_rows()
@@ -189,22 +195,22 @@ class EntryList(Field):
         if 0 <= chosen < len(self.rows):
             self.list.setCurrentRow(chosen)
         name_scroll_bars(self.list)
-        if inside or (held is self.list and not self.rows):
+        if focus_inside or (focused is self.list and not self.rows):
             self.take_keyboard()
 
     def add_row(self, name: str, *parts: QWidget | tuple[QWidget, int], faulty: bool = False) -> EntryRow:
-        made, item = EntryRow(name, parts, faulty=faulty), QListWidgetItem(self.list)
+        entry_row, item = EntryRow(name, parts, faulty=faulty), QListWidgetItem(self.list)
         item.setData(Qt.ItemDataRole.AccessibleTextRole, name)
         item.setSizeHint(QSize(0, FIELD_PX + 2))
-        self.list.setItemWidget(item, made)
-        self.rows.append(made)
-        return made
+        self.list.setItemWidget(item, entry_row)
+        self.rows.append(entry_row)
+        return entry_row
 
     def make_read_only(self) -> None:
         """Make the list read-only; entries can still be opened."""
         self.list.setDragEnabled(False)
         self.list.setAccessibleDescription("")
-        self.list.keys = {keys: do for keys, do in self.list.keys.items() if keys in {"Return", "Enter"}}
+        self.list.keys = {keys: action for keys, action in self.list.keys.items() if keys in {"Return", "Enter"}}
 
     @property
     def chosen(self) -> int:
@@ -224,11 +230,11 @@ class EntryList(Field):
     def _open_current(self) -> None:
         self.open_entry(self.list.currentRow())
 
-    def _request_step(self, asked: Request, after: int) -> None:
-        """Request a step, after which the entry at ``after`` is selected."""
-        self._after = after
-        self.asked.emit(asked)
-        self._after = None
+    def _request_step(self, request: Request, after: int) -> None:
+        """Request a step, and select the entry with the index ``after`` when it is done."""
+        self._selected_after_step = after
+        self.asked.emit(request)
+        self._selected_after_step = None
 
     def move_entry(self, at: int, to: int) -> None:
         """Request to move an entry before the one at ``to``."""
@@ -241,12 +247,12 @@ class EntryList(Field):
             self._request_step(RemoveKey(self.entry_path(at)), min(at, len(self.rows) - 2))
 
     def _duplicate(self) -> None:
-        if self.chosen >= 0 and self.row.kind != "references":  # listing a name twice is a fault
+        if self.chosen >= 0 and self.row.kind != "references":  # a list must not contain a name twice
             self._request_step(DuplicateElement(self.entry_path(self.chosen), stays=True), self.chosen + 1)
 
 
-class _NamesList(KeysOpenList):
-    """A list of things that can be added, without a current choice; ``chosen`` carries the value of an entry."""
+class _AdditionList(KeysOpenList):
+    """A list of possible additions without a current choice; ``chosen`` carries the value of an entry."""
 
     chosen = Signal(object)
 
@@ -276,7 +282,7 @@ class EntriesField(EntryList):
     def __init__(self, row: FormRow) -> None:
         super().__init__(row)
         name = f"Add to {row.label}"
-        self.names = _NamesList(name, "Add …") if row.kind == "references" or row.additions else None
+        self.names = _AdditionList(name, "Add …") if row.kind == "references" or row.additions else None
         if self.names is not None:
             self.names.chosen.connect(self.asked)
             self.add: QWidget = self.names
@@ -296,25 +302,31 @@ class EntriesField(EntryList):
         label, count = self.row.label, len(self.row.entries)
         for at, entry in enumerate(self.row.entries):
             title = cut_text(entry.title, "label", "bad" if entry.faults else "text")
-            shown = self.add_row(f"{label}, {entry.title}, {at + 1} of {count}", (title, 1), faulty=bool(entry.faults))
-            self.add_facts(shown, at)
+            entry_row = self.add_row(
+                f"{label}, {entry.title}, {at + 1} of {count}", (title, 1), faulty=bool(entry.faults)
+            )
+            self.add_note(entry_row, at)
             if self.ordered:
-                for by, icon, word in ((-1, "arrow_up", "up"), (1, "arrow_down", "down")):
-                    move = partial(self.move_entry, at, at - 1 if by < 0 else at + 2)
-                    shown.add_button(icon, f"Move {entry.title} {word}", move, word).setEnabled(0 <= at + by < count)
+                for offset, icon, direction in ((-1, "arrow_up", "up"), (1, "arrow_down", "down")):
+                    move = partial(self.move_entry, at, at - 1 if offset < 0 else at + 2)
+                    entry_row.add_button(icon, f"Move {entry.title} {direction}", move, direction).setEnabled(
+                        0 <= at + offset < count
+                    )
             action = "open entry" if self.ordered else ""
-            opens = shown.add_button("arrow_right", f"Open {entry.title}", partial(self.open_entry, at), action)
-            opens.setEnabled(bool(entry.target))
+            open_button = entry_row.add_button(
+                "arrow_right", f"Open {entry.title}", partial(self.open_entry, at), action
+            )
+            open_button.setEnabled(bool(entry.target))
             if self.ordered:
-                shown.add_button(
+                entry_row.add_button(
                     "cross", f"Remove {entry.title} from {label}", partial(self.remove_entry, at), "delete"
                 )
 
-    def add_facts(self, shown: EntryRow, at: int) -> None:
+    def add_note(self, entry_row: EntryRow, at: int) -> None:
         entry = self.row.entries[at]
         if entry.note and entry.note.replace("_", " ") != entry.title.lower():
             note = cut_text(entry.note, "small", "text2", right=True)
-            shown.line.addWidget(note)
+            entry_row.line.addWidget(note)
 
 
 class _ConditionsField(EntriesField):
@@ -330,23 +342,23 @@ class _ConditionsField(EntriesField):
         if 0 <= at < len(self.row.facts) and (liquid := self.row.facts[at].liquid):
             self.asked.emit(Do("select", (liquid,)))
 
-    def row_content(self) -> object:
+    def entries_state(self) -> object:
         return self.row.entries, self.row.facts
 
-    def add_facts(self, shown: EntryRow, at: int) -> None:
+    def add_note(self, entry_row: EntryRow, at: int) -> None:
         line = self.row.facts[at]
         note, force = Elided("small", "text2"), figures(f"{line.force}, clipped" if line.clipped else line.force)
         note.show_text(line.note)
         force.setMinimumWidth(52)
         for part in (note, force):
             part.setAlignment(RIGHT)
-            shown.line.addWidget(part)
+            entry_row.line.addWidget(part)
         name = f"Open the liquid used in {self.row.entries[at].title}"
-        shown.add_button("drop", name, partial(self._open_liquid, at), "open liquid").setEnabled(bool(line.liquid))
+        entry_row.add_button("drop", name, partial(self._open_liquid, at), "open liquid").setEnabled(bool(line.liquid))
 
 
 class LinesField(EntryList):
-    """Texts or points, one per line, with a button that adds one."""
+    """Texts or points, one per line, with a button that adds a line."""
 
     def __init__(self, row: FormRow) -> None:
         super().__init__(row)
@@ -356,7 +368,7 @@ class LinesField(EntryList):
         self.box.addWidget(self.add, 0, Qt.AlignmentFlag.AlignLeft)
         self.show_value()
 
-    def row_content(self) -> object:
+    def entries_state(self) -> object:
         return len(self.row.value or ())
 
     def fill_rows(self) -> None:
@@ -364,10 +376,10 @@ class LinesField(EntryList):
         count = len(row.value or ())
         for at in range(count):
             line = TypedLine(f"{row.label} {at + 1}")
-            line.typed.connect(partial(self._take_line, at))
-            line.came.connect(self.came)
-            shown = self.add_row(f"{row.label} {at + 1} of {count}", (line, 1))
-            shown.add_button("cross", f"Remove {line.accessibleName()}", partial(self.remove_entry, at), "delete")
+            line.typed.connect(partial(self._submit_line, at))
+            line.focused.connect(self.focused)
+            entry_row = self.add_row(f"{row.label} {at + 1} of {count}", (line, 1))
+            entry_row.add_button("cross", f"Remove {line.accessibleName()}", partial(self.remove_entry, at), "delete")
             self.lines.append(line)
         self.setFocusProxy(self.lines[0] if self.lines else self.add)
 
@@ -380,14 +392,14 @@ class LinesField(EntryList):
     def _value_of(self, text: str) -> Any:
         return text if self.row.kind == "texts" else [number for _, number in typed_numbers(text)]
 
-    def _take_line(self, at: int, text: str) -> None:
+    def _submit_line(self, at: int, text: str) -> None:
         self.refusal, value = "", None
         try:
             value = self._value_of(text)
         except ValueError as unclear:
             self.refusal = f"{unclear}. {kept_value_sentence(self.row.value[at])}"
         self.lines[at].show_refused(bool(self.refusal))
-        self.came.emit()
+        self.focused.emit()
         if not self.refusal:
             self.asked.emit(SetValue((*self.row.path, at), value, typing=True))
 
@@ -399,7 +411,7 @@ class LanguageListField(EntryList):
         super().__init__(row)
         self.make_read_only()
         self.copies: dict[str, ActionButton] = {}
-        self.names = _NamesList("Add a language to every text", "Language …")
+        self.names = _AdditionList("Add a language to every text", "Language …")
         self.names.chosen.connect(lambda code: self.asked.emit(ChangeLanguage("add", code)))
         self.box.addWidget(self.names, 0, Qt.AlignmentFlag.AlignLeft)
         self.setFocusProxy(self.names)
@@ -414,21 +426,21 @@ class LanguageListField(EntryList):
             note = cut_text(entry.note, right=True)
             note.setMinimumWidth(note.fontMetrics().horizontalAdvance(entry.note.partition(",")[0]) + 2)
             description = f"{entry.title}, {entry.note}, {at + 1} of {len(codes)}"
-            shown = self.add_row(description, title, note, faulty=bool(entry.faults))
+            entry_row = self.add_row(description, title, note, faulty=bool(entry.faults))
             if entry.target:
-                write = small_button("", "Write …", height=32)
-                write.setAccessibleName(f"Write the texts that are missing in {entry.title}")
-                write.clicked.connect(partial(self.open_entry, at))
-                shown.line.addWidget(write)
+                write_button = small_button("", "Write …", height=32)
+                write_button.setAccessibleName(f"Write the texts that are missing in {entry.title}")
+                write_button.clicked.connect(partial(self.open_entry, at))
+                entry_row.line.addWidget(write_button)
             if entry.faults and at:
-                made = self.copies[code] = add_button(
+                copy_button = self.copies[code] = add_button(
                     f"Copy the {first} text wherever {entry.title} is missing", f"Copy {first}"
                 )
-                made.clicked.connect(partial(self.asked.emit, ChangeLanguage("copy", code)))
-                shown.line.addWidget(made)
+                copy_button.clicked.connect(partial(self.asked.emit, ChangeLanguage("copy", code)))
+                entry_row.line.addWidget(copy_button)
             if len(codes) > 1:
                 name = f"Remove {entry.title} from every text"
-                shown.add_button("cross", name, partial(self.asked.emit, ChangeLanguage("remove", code)))
+                entry_row.add_button("cross", name, partial(self.asked.emit, ChangeLanguage("remove", code)))
         self.names.show_items((choice.sentence, choice.value) for choice in row.choices if choice.value not in codes)
 
 

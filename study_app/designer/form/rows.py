@@ -1,4 +1,4 @@
-"""What a form shows: its rows in sections, their words, and the lines of a questionnaire."""
+"""The content of a form: its rows in sections, their texts, and the lines of a questionnaire."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
@@ -20,14 +20,13 @@ _ICONS: Final = {"rating": "scale", "slider": "slider", "number": "number", "cho
 class QuestionLine:
     """The line of one question in a list."""
 
-    path: Path  # its place
-    number: int  # its place in the questionnaire, from 1
-    # its kind, and the name of its icon
+    path: Path
+    number: int  # position in the questionnaire, from 1
     kind: str
-    icon: str
+    icon: str  # the name of the icon
     texts: tuple[str, ...]  # its text in each language of the study, "" if missing
-    note: str = ""  # when it is shown, "" if always
-    faults: int = 0  # how many faults it has
+    note: str = ""  # the condition under which it is shown, "" if always
+    faults: int = 0  # number of faults
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,8 +40,8 @@ class QuestionLines:
 def question_lines(study: Study, path: Path) -> QuestionLines:
     """Return the lines of all questions in the list at ``path``."""
     codes = languages_of(study.document)
-    listed = value_at(study.document, path)
-    items = listed if isinstance(listed, tuple) else ()
+    value = value_at(study.document, path)
+    items = value if isinstance(value, tuple) else ()
     numbers = {str(item.get("id")): at for at, item in enumerate(items, start=1) if isinstance(item, Mapping)}
     lines = tuple(
         _question_line(study, (*path, at), item, codes, numbers)
@@ -58,14 +57,14 @@ def _question_line(
     kind, text = str(item.get("kind", STATEMENT)), item.get("text", "")
     texts = [text.get(code, "") for code in codes] if isinstance(text, Mapping) else [text, *[""] * (len(codes) - 1)]
     faults = sum(fault.path[: len(path)] == path for fault in study.shown_faults)
-    shown = tuple(text.strip() if isinstance(text, str) else "" for text in texts)
+    stripped = tuple(text.strip() if isinstance(text, str) else "" for text in texts)
     number = path[-1] + 1 if isinstance(path[-1], int) else 0
     return QuestionLine(
         path=path,
         number=number,
         kind=kind,
         icon=_ICONS.get(kind, "scale"),
-        texts=shown,
+        texts=stripped,
         note=_show_if_note(item, numbers),
         faults=faults,
     )
@@ -83,14 +82,14 @@ def _show_if_note(item: Mapping[str, Any], numbers: Mapping[str, int]) -> str:
 
 
 NO_QUESTIONS: Final = QuestionLines((), ())
-LEAST, MOST = "at least ", "at most "
+AT_LEAST, AT_MOST = "at least ", "at most "
 
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """An entry of a list, or a table of a section: path, name, and number of faults.
+    """An entry of a list, or a table of a section: path, title, note, and number of faults.
 
-    ``target`` is the element that it opens: the target of a reference, else itself.
+    ``target`` is the path of the element that it opens: the target of a reference, or the entry itself.
     """
 
     path: Path
@@ -104,20 +103,22 @@ class Entry:
 class FormRow(Row):
     """One row of the form."""
 
-    place: str = ""  # its place in the file, such as ``blocks.liquids.order``, with its line
-    faults: tuple[str, ...] = ()  # its faults, in the sentences of ``check``
+    place: str = ""  # its path and line in the file, such as ``blocks.liquids.order · line 385``
+    faults: tuple[str, ...] = ()  # the sentences of ``check`` on its faults
     unfinished: bool = False  # whether its entry is still being edited, so that its faults are only hints
-    faulty_languages: tuple[str, ...] = ()  # languages whose texts have all these faults; () if others have some, too
+    faulty_languages: tuple[
+        str, ...
+    ] = ()  # languages whose texts have these faults; () if other parts have faults, too
     languages: tuple[tuple[str, str], ...] = ()  # code and name of each language of the study, for texts
-    entries: tuple[Entry, ...] = ()  # what a list holds, or what references name
-    target: Path | None = None  # what a reference names
-    notes: tuple[tuple[str, str], ...] = ()  # elements that a reference can name, each with its `short_note` fact
-    additions: tuple[tuple[str, Request], ...] = ()  # the labels of elements that can be added here
-    number: int | None = None  # of alternatives ("either"), which one the value is
-    # keys of which exactly one is given, with their labels: this row's and the other one
+    entries: tuple[Entry, ...] = ()  # the entries of a list, or the targets of references
+    target: Path | None = None  # the element to which a reference refers
+    notes: tuple[tuple[str, str], ...] = ()  # IDs that a reference can have, each with its `short_note`
+    additions: tuple[tuple[str, Request], ...] = ()  # label and request of each element that can be added here
+    number: int | None = None  # for kind "either", the index of the alternative that the value has
+    # with `instead`, both keys with their labels
     keys: tuple[tuple[str, str], ...] = ()
-    untranslated: tuple[UntranslatedText, ...] = ()  # in which languages a text is not translated yet
-    facts: Any = None  # the facts shown by its special editor; None without one
+    untranslated: tuple[UntranslatedText, ...] = ()  # the texts that are not translated yet, one per language
+    facts: Any = None  # the facts that its special editor shows; None without one
 
     @property
     def is_removable(self) -> bool:
@@ -133,8 +134,8 @@ class FormRow(Row):
     @property
     def range(self) -> str:
         bounds = self.bounds
-        if len(bounds) == 2 and bounds[0].startswith(LEAST) and bounds[1].startswith(MOST):
-            return f"{bounds[0].removeprefix(LEAST)} to {bounds[1].removeprefix(MOST)}"
+        if len(bounds) == 2 and bounds[0].startswith(AT_LEAST) and bounds[1].startswith(AT_MOST):
+            return f"{bounds[0].removeprefix(AT_LEAST)} to {bounds[1].removeprefix(AT_MOST)}"
         return self.permitted
 
 
@@ -145,7 +146,7 @@ def values_of(row: Row) -> dict[str, Any]:
 
 @dataclass(frozen=True, slots=True)
 class Section:
-    """Rows under one heading ("" for the element's own), keys that can be added, and faults without a row."""
+    """Rows under a heading, or "" for the rows of the element itself; keys that can be added; faults without a row."""
 
     path: Path
     title: str
@@ -160,29 +161,25 @@ class Form:
     """The form of one element."""
 
     path: Path  # the element
-    # its title, the name of its icon, and its kind: "Block"
     title: str
-    icon: str
-    kind: str
+    icon: str  # the name of the icon
+    kind: str  # such as "Block"
     id: str | None = None  # its name in the file, None if it has none
-    sections: tuple[Section, ...] = ()  # its rows
-    # faults that belong to no row, whether they are only hints, and faults of its id
-    faults: tuple[str, ...] = ()
-    unfinished: bool = False
-    id_faults: tuple[str, ...] = ()
-    # its position in the session or list, from 1, and their number; None without an order
+    sections: tuple[Section, ...] = ()
+    faults: tuple[str, ...] = ()  # faults that belong to no row
+    unfinished: bool = False  # whether these faults are only hints
+    id_faults: tuple[str, ...] = ()  # faults of its ID
+    # its position in the session or list, from 1, and the length of that; None without an order
     position: tuple[int, int] | None = None
-    # the questions of its questionnaire, itself included; none if it is no question
-    questions: QuestionLines = NO_QUESTIONS
-    # the section and the elements that it is in, with their titles, and itself
+    questions: QuestionLines = NO_QUESTIONS  # for a question, all questions of its questionnaire
+    # path and title of the section and the elements that contain it, and of itself
     around: tuple[tuple[Path, str], ...] = ()
-    feel: str = ""  # the label of the button that opens the lab with its liquids, "" if it has none
-    series: bool = False  # whether a series of it is possible: elements that differ in one number
-    used: str = ""  # how many other elements use it (`usage_text`); "" if that is not shown
-    asks: tuple[tuple[str, Request], ...] = ()  # places where a questionnaire can be added
+    feel: str = ""  # the label of the button that opens its liquids in the lab, "" without liquids
+    series: bool = False  # whether a series of copies that differ in one number is possible
+    used: str = ""  # the number of elements that use it (`usage_text`); "" if that is not shown
+    asks: tuple[tuple[str, Request], ...] = ()  # label and request of each way to add a questionnaire to the session
     lists_texts: bool = False  # whether it lists texts to write or translate; Enter then leads to the next one
-    # whether nothing can be edited but the text of the file, in which the study cannot be read
-    unreadable: bool = False
+    unreadable: bool = False  # whether the file cannot be read as a study, so that only its text can be edited
 
     @property
     def rows(self) -> tuple[FormRow, ...]:
@@ -206,7 +203,7 @@ def new_element_label(section: str) -> str:
 
 
 def choice_label(choice: Choice, default: object) -> str:
-    """Return the label of a choice; the default is marked."""
+    """Return the label of a choice, in which the default is marked."""
     if choice.value is None:
         return "Not set"
     package, _, name = str(choice.value).rpartition(":")

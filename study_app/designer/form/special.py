@@ -1,4 +1,4 @@
-"""Editors of certain keys: sentences, order, points of a scale, kind and list of questions, hypotheses."""
+"""Editors of special keys: sentences, order, scale points, kind and list of questions, hypotheses."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -62,45 +62,47 @@ from study_app.protocol.source import entries, names, value_at
 from study_app.protocol.trials import DESIGN_KINDS, TASK_KINDS
 from study_app.protocol.wording import language_name, languages_of
 
-_ROUNDS: Final = 3
-_SQUARES: Final[Mapping[Any, Literal["williams", "latin"]]] = {"williams": "williams", "latin": "latin"}
+_MULTIPLES_SHOWN: Final = 3
+_SQUARE_KINDS: Final[Mapping[Any, Literal["williams", "latin"]]] = {"williams": "williams", "latin": "latin"}
 
 
 def _order_balance(study: Study, row: Row) -> tuple[Verdict, str] | None:
-    """Return how balanced the order of a block is, and the explanation.
+    """Return a verdict on the balance of a block's order, and its explanation.
 
-    None if it has only one condition, or another method determines its order.
+    None if the block has only one condition, or a design determines its order.
     """
     block = value_at(study.document, row.path[:-1])
     conditions = block.get("conditions") if isinstance(block, Mapping) else None
     if not isinstance(conditions, tuple) or len(conditions) < 2 or "design" in block:
         return None
-    order, codes = row.default if row.value is None else row.value, len(conditions)
+    order, condition_count = row.default if row.value is None else row.value, len(conditions)
     if order == "fixed":
         return ("neutral", "ring", "same for everyone"), "The effects of condition and position cannot be separated."
-    if not isinstance(order, str) or order not in _SQUARES:
-        drawn = "A new order is drawn for each session, so positions are balanced only on average."
-        return ("neutral", "ring", "balanced on average"), drawn
-    square, repetitions = _SQUARES[order], block.get("repetitions", 1)
-    rows = row_count(square, codes)
-    numbers = ", ".join(str(rows * number) for number in range(1, _ROUNDS + 1))
-    carries = square == "williams" and isinstance(repetitions, int) and has_even_borders(codes, max(1, repetitions))
-    at = f"for any multiple of {rows} participants{' in a group' if study.document.get('groups') else ''}."
-    if carries or codes == 2:
-        return ("ok", "check", f"balanced for {numbers} …"), f"Positions and carry-over are balanced {at}"
-    return ("warn", "warning", f"partly for {numbers} …"), f"Only positions are balanced {at}"
+    if not isinstance(order, str) or order not in _SQUARE_KINDS:
+        explanation = "A new order is drawn for each session, so positions are balanced only on average."
+        return ("neutral", "ring", "balanced on average"), explanation
+    square, repetitions = _SQUARE_KINDS[order], block.get("repetitions", 1)
+    rows = row_count(square, condition_count)
+    numbers = ", ".join(str(rows * number) for number in range(1, _MULTIPLES_SHOWN + 1))
+    balances_carry_over = (
+        square == "williams" and isinstance(repetitions, int) and has_even_borders(condition_count, max(1, repetitions))
+    )
+    when = f"for any multiple of {rows} participants{' in a group' if study.document.get('groups') else ''}."
+    if balances_carry_over or condition_count == 2:
+        return ("ok", "check", f"balanced for {numbers} …"), f"Positions and carry-over are balanced {when}"
+    return ("warn", "warning", f"partly for {numbers} …"), f"Only positions are balanced {when}"
 
 
 @dataclass(frozen=True, slots=True)
 class _ScalePoints:
-    """Code and name of each language, and the labels of each point in each language, "" if missing."""
+    """The languages of a scale, by code and name, and for each point its label in each language, "" if missing."""
 
     languages: tuple[tuple[str, str], ...]
     points: tuple[tuple[str, ...], ...]
 
 
 def _scale_points(study: Study, row: Row) -> _ScalePoints:
-    """Return the points of a scale in the study's languages and any additional ones."""
+    """Return the points of a scale in the study's languages and in other languages that the scale has."""
     labels = row.value if isinstance(row.value, Mapping) else {}
     codes = list(dict.fromkeys([*languages_of(study.document), *labels]))
     columns = [labels[code] if isinstance(labels.get(code), tuple) else () for code in codes]
@@ -140,22 +142,22 @@ class _QuestionRow(Themed, QWidget):
             return self._missing_part()
         if not note:
             return _column_text(text, "label")
-        both = QWidget()
-        vbox(_column_text(text, "label"), _column_text(note, "small", "text2"), spacing=0, margins=0, parent=both)
-        both.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Minimum)
-        return both
+        part = QWidget()
+        vbox(_column_text(text, "label"), _column_text(note, "small", "text2"), spacing=0, margins=0, parent=part)
+        part.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Minimum)
+        return part
 
     def _missing_part(self) -> QWidget:
-        made = QWidget()
-        made.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Minimum)
+        part = QWidget()
+        part.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Minimum)
         self.write = small_button("", "Write", height=32)
         self.write.setAccessibleName(f"Write the missing text for question {self.line.number}")
         self.write.clicked.connect(self.opened)
         faulty = self.line.faults > 0
         ink: Ink = "bad" if faulty else "text2"
         missing = Icon("warning" if faulty else "info", ink, 16), label("Missing", "label", ink)
-        hbox(*missing, STRETCH, self.write, spacing=6, margins=0, parent=made)
-        return made
+        hbox(*missing, STRETCH, self.write, spacing=6, margins=0, parent=part)
+        return part
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
         if event.button() == Qt.MouseButton.LeftButton and self.rect().contains(event.position().toPoint()):
@@ -163,12 +165,12 @@ class _QuestionRow(Themed, QWidget):
 
 
 def _column_text(text: str, role: TypeRole, ink: Ink = "text") -> QLabel:
-    """Return a text label as wide as its column."""
-    made = label(text, role, ink, wraps=True)
-    policy = made.sizePolicy()
+    """Return a label that takes the width of its column."""
+    text_label = label(text, role, ink, wraps=True)
+    policy = text_label.sizePolicy()
     policy.setHorizontalPolicy(QSizePolicy.Policy.Ignored)
-    made.setSizePolicy(policy)
-    return made
+    text_label.setSizePolicy(policy)
+    return text_label
 
 
 class QuestionRows(Themed, QWidget):
@@ -195,20 +197,20 @@ class QuestionRows(Themed, QWidget):
             remove_widget(old)
         self.rows = []
         if len(languages) > 1:
-            heads = QWidget()
+            headings = QWidget()
             columns = ((_column_text(language, "small", "text2"), 1) for language in languages)
-            hbox(*columns, spacing=8, margins=(_INSET_PX, 0, OPEN_PX + 8, 0), parent=heads)
-            self.column.addWidget(heads)
+            hbox(*columns, spacing=8, margins=(_INSET_PX, 0, OPEN_PX + 8, 0), parent=headings)
+            self.column.addWidget(headings)
         for line in lines:
-            made = _QuestionRow(line)
-            made.opened.connect(lambda path=line.path: self.asked.emit(Do("write", (path,))))
-            add_parts(self.column, made, Rule())
-            made.show()  # at once: a layout shows it later, and would then move the row that was scrolled to
-            self.rows.append(made)
+            question_row = _QuestionRow(line)
+            question_row.opened.connect(lambda path=line.path: self.asked.emit(Do("write", (path,))))
+            add_parts(self.column, question_row, Rule())
+            question_row.show()  # at once: otherwise the layout shows it later, and moves the row that was scrolled to
+            self.rows.append(question_row)
 
 
 class Panel(Themed, QWidget):
-    """The background of the form: tinted, with an accent line at the left while one of several questions is edited."""
+    """The background of the form; tinted, with an accent line at the left, while a question is edited."""
 
     tinted = False
 
@@ -220,14 +222,14 @@ class Panel(Themed, QWidget):
 
 
 DESCRIPTION: Final = SpecialEditor(
-    (("StudyHead", "description"),), partial(LineField, typed_in=partial(TypedSentence, most_lines=3))
+    (("StudyHead", "description"),), partial(LineField, make_line=partial(TypedSentence, max_lines=3))
 )
 
 
 _QUESTIONS: Final = (*(kind.__name__ for kind in questions.KINDS.own.values()), *questions.KINDS.others)
 _TASKS: Final = (*(kind.__name__ for kind in TASK_KINDS.own.values()), *TASK_KINDS.others)
 _DESIGNS: Final = tuple({kind.__name__ for kind in DESIGN_KINDS.values()})
-"""The titles of their tables."""
+"""Titles of the models of questions, tasks and designs in the JSON Schema."""
 
 
 SENTENCES: Final = SpecialEditor(
@@ -237,7 +239,7 @@ SENTENCES: Final = SpecialEditor(
         *((kind, "instruction") for kind in _TASKS),
         *((kind, "question") for kind in _DESIGNS),
     ),
-    partial(LanguagesField, typed_in=TypedSentence),
+    partial(LanguagesField, make_line=TypedSentence),
     wide=True,
 )
 
@@ -263,25 +265,25 @@ class _PointsField(Field):
     def __init__(self, row: FormRow) -> None:
         super().__init__(row)
         self.box.setDirection(QBoxLayout.Direction.TopToBottom)
-        cells, languages, last = grid(6, 6), row.facts.languages, len(row.facts.points) - 1
+        grid_layout, languages, last = grid(6, 6), row.facts.languages, len(row.facts.points) - 1
         for column, (_code, language) in enumerate(languages, start=1):
-            cells.addWidget(label(language, "small", "text2"), 0, column)
+            grid_layout.addWidget(label(language, "small", "text2"), 0, column)
         self.lines: list[list[TypedLine]] = []
         for at in range(last + 1):
-            sign = f"{at + 1}  {({0: 'lowest', last: 'highest'}).get(at, '')}".strip()
-            cells.addWidget(figures(sign, "label", "text2"), at + 1, 0)
+            position_text = f"{at + 1}  {({0: 'lowest', last: 'highest'}).get(at, '')}".strip()
+            grid_layout.addWidget(figures(position_text, "label", "text2"), at + 1, 0)
             self.lines.append([TypedLine(f"Point {at + 1}, {language}") for _code, language in languages])
             for column, (line, (code, language)) in enumerate(zip(self.lines[-1], languages, strict=True)):
                 line.setProperty(LANGUAGE, code)
                 line.setPlaceholderText(f"Missing in {language}")
                 if is_right_to_left(code):
                     line.setLayoutDirection(Qt.LayoutDirection.RightToLeft)
-                line.typed.connect(partial(self.take_text, at, column))
-                line.came.connect(self.came)
-                cells.addWidget(line, at + 1, column + 1)
-            away = remove_button(f"Remove Point {at + 1}", partial(self.remove, at))
-            cells.addWidget(away, at + 1, len(languages) + 1)
-        add_layout(self.box, cells)
+                line.typed.connect(partial(self.submit_text, at, column))
+                line.focused.connect(self.focused)
+                grid_layout.addWidget(line, at + 1, column + 1)
+            remove = remove_button(f"Remove Point {at + 1}", partial(self.remove, at))
+            grid_layout.addWidget(remove, at + 1, len(languages) + 1)
+        add_layout(self.box, grid_layout)
         self.add = add_button(f"Add to {row.label}", "Point")
         self.add.clicked.connect(self.add_entry)
         self.box.addWidget(self.add, 0, Qt.AlignmentFlag.AlignLeft)
@@ -298,25 +300,25 @@ class _PointsField(Field):
         missing = (line for lines in self.lines for line in lines if not line.text())
         next(missing, self).setFocus(Qt.FocusReason.OtherFocusReason)
 
-    def _count_written(self, code: str) -> int:
+    def _text_count(self, code: str) -> int:
         return len((self.row.value or {}).get(code, ()))
 
-    def take_text(self, at: int, column: int, text: str) -> None:
+    def submit_text(self, at: int, column: int, text: str) -> None:
         code = self.row.facts.languages[column][0]
-        path, count = (*self.row.path, code), self._count_written(code)
-        missing = [*((self.row.value or {}).get(code, ())), *[""] * (at - count), text]
-        changed = SetValue((*path, at), text, typing=True) if at < count else SetValue(path, missing, typing=True)
-        self.asked.emit(changed)
+        path, count = (*self.row.path, code), self._text_count(code)
+        labels = [*((self.row.value or {}).get(code, ())), *[""] * (at - count), text]
+        request = SetValue((*path, at), text, typing=True) if at < count else SetValue(path, labels, typing=True)
+        self.asked.emit(request)
 
     def add_entry(self) -> None:
         path, label = self.row.path, f"Point {len(self.lines) + 1}"
-        added = (AddEntry((*path, code), label) for code, _ in self.row.facts.languages if self._count_written(code))
-        self.asked.emit(Several("Add point", tuple(added)))
+        requests = (AddEntry((*path, code), label) for code, _ in self.row.facts.languages if self._text_count(code))
+        self.asked.emit(Several("Add point", tuple(requests)))
 
     def remove(self, at: int) -> None:
         path = self.row.path
-        gone = (RemoveKey((*path, code, at)) for code, _ in self.row.facts.languages if at < self._count_written(code))
-        self.asked.emit(Several(f"Remove point {at + 1}", tuple(gone)))
+        requests = (RemoveKey((*path, code, at)) for code, _ in self.row.facts.languages if at < self._text_count(code))
+        self.asked.emit(Several(f"Remove point {at + 1}", tuple(requests)))
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         at = next((at for at, lines in enumerate(self.lines) if any(line.hasFocus() for line in lines)), None)
@@ -363,8 +365,8 @@ QUESTION_LIST: Final = SpecialEditor(
 )
 
 
-def _order_of_blocks(study: Study, _row: Row) -> str:
-    """Return a sentence on the blocks' order for the planned participants; "" while it is unknown."""
+def _block_order_sentence(study: Study, _row: Row) -> str:
+    """Return the sentences on the block order of the planned participants in each group; "" while it is unknown."""
     protocol = valid_part(study).protocol
     if protocol is None or len(protocol.main_blocks) < 2:
         return ""
@@ -375,12 +377,12 @@ def _order_of_blocks(study: Study, _row: Row) -> str:
 
 
 def _choice_sentences(_study: Study, row: Row) -> str:
-    """Return the sentence about each choice, one per line."""
+    """Return the sentence on each choice, one per line."""
     described = [choice for choice in row.choices if choice.value is not None and choice.sentence]
     return "\n".join(f"{label_of(choice.value or '')}: {choice.sentence}." for choice in described)
 
 
-class _Said(Extra, QLabel):
+class _Sentence(Extra, QLabel):
     """A sentence below a choice that explains it."""
 
     def __init__(self) -> None:
@@ -392,9 +394,11 @@ class _Said(Extra, QLabel):
         self.setText(facts)
 
 
-BLOCK_ORDER: Final = SpecialEditor((("StudyHead", "block_order"),), adds=lambda _field: _Said(), facts=_order_of_blocks)
+BLOCK_ORDER: Final = SpecialEditor(
+    (("StudyHead", "block_order"),), adds=lambda _field: _Sentence(), facts=_block_order_sentence
+)
 GROUP_ASSIGNMENT: Final = SpecialEditor(
-    (("StudyHead", "group_assignment"),), adds=lambda _field: _Said(), facts=_choice_sentences
+    (("StudyHead", "group_assignment"),), adds=lambda _field: _Sentence(), facts=_choice_sentences
 )
 
 _MEASURES: Final[tuple[tuple[str, str], ...]] = (
@@ -403,7 +407,7 @@ _MEASURES: Final[tuple[tuple[str, str], ...]] = (
 _RELATIONS: Final = (
     (None, "is different from"), ("higher", "is higher than"), ("lower", "is lower than"), ("equal", "is equal to"),
 )  # fmt: skip
-BOUND, RATIO = 0.5, 1.25
+DEFAULT_BOUND, DEFAULT_RATIO = 0.5, 1.25
 _NOTHING_TO_COMPARE: Final = (
     "A hypothesis compares two main blocks, two conditions of a block, or two groups. Add a second block, condition or "
     "group first."
@@ -416,29 +420,33 @@ _ONE_RESULT: Final = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Compared:
-    """A block, or a condition or group in a block, with its measures and their texts.
+    """A block, or a condition or group in a block, with its measures, each as ID and label.
 
-    A group with a ``pair`` of blocks or conditions (the key is ``pair_of``) is a side of an interaction.
+    A group with a ``pair`` of blocks or conditions, as the key ``pair_of`` says, is one side of an interaction.
     """
 
-    key: str  # the key of the file that names it
+    key: str  # the key that lists it in a hypothesis: "blocks", "conditions" or "groups"
     block: str
     name: str
-    words: str
+    label: str
     measures: tuple[tuple[str, str], ...]
     pair_of: str = ""
     pair: tuple[str, ...] = ()
 
     @property
     def place(self) -> tuple[object, ...]:
-        """What tells the item from others: the key, block, name and pair."""
+        """The values that identify the item: key, block, name and pair."""
         return self.key, self.block, self.name, self.pair_of, self.pair
 
-    def comparable_with(self, every: tuple["Compared", ...]) -> tuple["Compared", ...]:
-        """Return the items it can be compared with: blocks with a common measure, or items of the same block."""
-        alike = (item for item in every if item.key == self.key and item.name != self.name and item.pair == self.pair)
+    def comparable_with(self, items: tuple["Compared", ...]) -> tuple["Compared", ...]:
+        """Return the items with which it can be compared: blocks with a common measure, or items of the same block."""
+        candidates = (
+            item for item in items if item.key == self.key and item.name != self.name and item.pair == self.pair
+        )
         return tuple(
-            item for item in alike if self.shared_measures(item) and (self.key == "blocks" or item.block == self.block)
+            item
+            for item in candidates
+            if self.shared_measures(item) and (self.key == "blocks" or item.block == self.block)
         )
 
     def shared_measures(self, other: "Compared") -> tuple[tuple[str, str], ...]:
@@ -448,37 +456,39 @@ class Compared:
 
 @dataclass(frozen=True, slots=True)
 class Comparable:
-    """The items that hypotheses can compare, in file order, and a hint at what cannot be compared yet."""
+    """The items that hypotheses can compare, in file order, and a hint on items that cannot be compared yet."""
 
     items: tuple[Compared, ...]
     hint: str
 
 
 def _comparable(study: Study, _row: Row) -> Comparable:
-    after = _form_measures(study)
-    every = tuple(
-        item if item.key == "conditions" else replace(item, measures=(*item.measures, *after.get(item.block, ())))
+    form_measures = _form_measures(study)
+    all_items = tuple(
+        item
+        if item.key == "conditions"
+        else replace(item, measures=(*item.measures, *form_measures.get(item.block, ())))
         for item in _comparable_items(study)
     )
-    every += tuple(_interaction_sides(every))
-    items = tuple(item for item in every if item.comparable_with(every))
+    all_items += tuple(_interaction_sides(all_items))
+    items = tuple(item for item in all_items if item.comparable_with(all_items))
     compared = {item.name for item in items if item.key == "blocks"}
-    alone = any(
+    has_lone_block = any(
         place[1] not in compared and block.get("phase", "main") == "main" and {"design", "conditions"} <= block.keys()
         for place, block in entries(study.document, "blocks.*")
         if isinstance(block, Mapping)
     )
-    return Comparable(items, _ONE_RESULT if alone else "" if items else _NOTHING_TO_COMPARE)
+    return Comparable(items, _ONE_RESULT if has_lone_block else "" if items else _NOTHING_TO_COMPARE)
 
 
 def _measures_of_design(study: Study, block: str) -> tuple[tuple[str, str], ...]:
     """Return the measures of a block with a design; every measure if the block has problems."""
     protocol = valid_part(study).protocol
-    valid = None if protocol is None else protocol.blocks.get(block)
-    if protocol is None or valid is None:
+    valid_block = None if protocol is None else protocol.blocks.get(block)
+    if protocol is None or valid_block is None:
         return _MEASURES
-    known = protocol.measures_of(valid)
-    return tuple(measure for measure in _MEASURES if measure[0] in known)
+    available = protocol.measures_of(valid_block)
+    return tuple(measure for measure in _MEASURES if measure[0] in available)
 
 
 def _comparable_items(study: Study) -> Iterator[Compared]:
@@ -490,56 +500,58 @@ def _comparable_items(study: Study) -> Iterator[Compared]:
         if "design" in block:
             measures = _measures_of_design(study, name)
         else:
-            asked = entries(document, f"questionnaires.{block.get('questionnaire')}.items.*")
-            items = ((item, path) for path, item in asked if isinstance(item, Mapping) and "kind" not in item)
+            question_entries = entries(document, f"questionnaires.{block.get('questionnaire')}.items.*")
+            items = (
+                (item, path) for path, item in question_entries if isinstance(item, Mapping) and "kind" not in item
+            )
             measures = tuple((str(item.get("id")), title_of(document, path)) for item, path in items)
         if not measures:
             continue
-        yield Compared(key="blocks", block=name, name=name, words=title, measures=measures)
+        yield Compared(key="blocks", block=name, name=name, label=title, measures=measures)
         conditions = block.get("conditions") if "design" not in block else ()
-        for key, inner in (("conditions", conditions), ("groups", names(document, "groups"))):
-            for condition in inner if isinstance(inner, tuple | list) else ():
+        for key, listed in (("conditions", conditions), ("groups", names(document, "groups"))):
+            for condition in listed if isinstance(listed, tuple | list) else ():
                 label = f"{distinct_title(document, (key, str(condition)))} in {title}"
-                yield Compared(key=key, block=name, name=str(condition), words=label, measures=measures)
+                yield Compared(key=key, block=name, name=str(condition), label=label, measures=measures)
 
 
 def _form_measures(study: Study) -> dict[str, tuple[tuple[str, str], ...]]:
-    """Return the numbers and scores of the valid forms after each block as FORM/ID with their words."""
-    protocol, after = valid_part(study).protocol, dict[str, tuple[tuple[str, str], ...]]()
+    """Return for each block the numbers and scores of the questionnaires after it, as FORM/ID and label."""
+    protocol, measures_by_block = valid_part(study).protocol, dict[str, tuple[tuple[str, str], ...]]()
     if protocol is None:
-        return after
+        return measures_by_block
     for name, form in protocol.forms.items():
         title = distinct_title(study.document, ("questionnaires", name))
-        words = {score: f"{capitalised(score)} score" for score in form.scores} | {
+        labels = {score: f"{capitalised(score)} score" for score in form.scores} | {
             item.id: f"“{protocol.text(item.short, protocol.study.languages[0])}”"
             for item in form.items
             if item.value_type != "text"
         }
-        measures = tuple((f"{name}/{measure}", f"{label} ({title})") for measure, label in words.items())
+        measures = tuple((f"{name}/{measure}", f"{text} ({title})") for measure, text in labels.items())
         for block in filter(None, protocol.follows(name)):
-            after[block] = (*after.get(block, ()), *measures)
-    return after
+            measures_by_block[block] = (*measures_by_block.get(block, ()), *measures)
+    return measures_by_block
 
 
 def _interaction_sides(every: Sequence[Compared]) -> Iterator[Compared]:
-    """Yield each group with each pair of blocks, or of conditions of a block, whose difference can be compared."""
-    groups = {item.name: item.words.partition(" in ")[0] for item in every if item.key == "groups"}
+    """Yield an item for each group and each pair of blocks or conditions whose difference can be compared."""
+    groups = {item.name: item.label.partition(" in ")[0] for item in every if item.key == "groups"}
     for first, second in combinations([item for item in every if item.key != "groups"], 2):
         if groups and first.comparable_with((second,)):
-            words = f"{first.words} − {second.words}"
+            difference = f"{first.label} − {second.label}"
             for group, title in groups.items():
                 yield replace(
-                    first, key="groups", name=group, words=f"Interaction: {title}, {words}", pair_of=first.key,
+                    first, key="groups", name=group, label=f"Interaction: {title}, {difference}", pair_of=first.key,
                     pair=(first.name, second.name), measures=first.shared_measures(second),
                 )  # fmt: skip
 
 
 class Hypothesis(QWidget):
-    """One hypothesis; ``changed`` carries its current table."""
+    """The editor of one hypothesis; ``changed`` carries its new table."""
 
     changed = Signal(object)
     removed = Signal()
-    refused = Signal(str)  # why the typed bound is refused; "" if it is valid
+    refused = Signal(str)  # the reason for rejecting the typed bound; "" if it is valid
 
     def __init__(self, name: str) -> None:
         super().__init__()
@@ -552,11 +564,11 @@ class Hypothesis(QWidget):
             make_dense(box, f"{name}, {part}")
             box.setSizeAdjustPolicy(Choice.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
             box.setMinimumContentsLength(6)
-            box.activated.connect(self._take_choice)
+            box.activated.connect(self._submit_choice)
         self.within = label("within", "label")
         self.bound = TypedLine(f"{name}, largest negligible difference")
         self.bound.setFixedWidth(64)
-        self.bound.typed.connect(self._take_bound)
+        self.bound.typed.connect(self._submit_bound)
         self.away = remove_button(f"Remove {name}", self.removed.emit)
         above = hbox((self.measure, 3), label("of", "label"), (self.first, 5), self.away, spacing=8)
         below = hbox((self.relation, 3), (self.second, 6), self.within, self.bound, spacing=8)
@@ -571,12 +583,12 @@ class Hypothesis(QWidget):
     def show_value(self, value: Mapping[str, Any], known: tuple[Compared, ...]) -> None:
         self.value, self.known = value, known
         key = next((key for key in ("groups", "conditions") if value.get(key)), "blocks")
-        listed = (value.get(key) for key in ("blocks", key, "conditions"))
-        blocks, named, conditions = (tuple(map(str, entry)) if isinstance(entry, tuple) else () for entry in listed)
+        entries_ = (value.get(key) for key in ("blocks", key, "conditions"))
+        blocks, named, conditions = (tuple(map(str, entry)) if isinstance(entry, tuple) else () for entry in entries_)
         pairs = {"conditions": conditions, "blocks": blocks if len(blocks) > 1 else ()} if key == "groups" else {}
         pair = next(((of, names) for of, names in pairs.items() if names), ("", ()))
-        at = [(key, name if key == "blocks" else next(iter(blocks), ""), name, *pair) for name in named]
-        items = [next((item for item in known if item.place == place), None) for place in at]
+        places = [(key, name if key == "blocks" else next(iter(blocks), ""), name, *pair) for name in named]
+        items = [next((item for item in known if item.place == place), None) for place in places]
         first, second = (*items, None, None)[:2]
         self.others = () if first is None else first.comparable_with(known)
         self.measures = (
@@ -584,13 +596,13 @@ class Hypothesis(QWidget):
         )
         measure, relation = value.get("measure", "threshold"), _relation(value)
         measure = f"{value['form']}/{measure}" if value.get("form") else measure
-        first_name, two = (*named, "", "")[:2]
-        for box, word in ((self.measure, measure), (self.first, first_name), (self.second, two)):
-            box.setPlaceholderText(str(word))  # shown where it is not among the choices
+        first_name, second_name = (*named, "", "")[:2]
+        for box, shown_name in ((self.measure, measure), (self.first, first_name), (self.second, second_name)):
+            box.setPlaceholderText(str(shown_name))  # shown if it is not among the choices
         self._fill_choice(self.measure, self.measures, measure)
         self._fill_choice(self.relation, _RELATIONS, relation)
-        self._fill_choice(self.first, tuple((item, item.words) for item in known), first)
-        self._fill_choice(self.second, tuple((item, item.words) for item in self.others), second)
+        self._fill_choice(self.first, tuple((item, item.label) for item in known), first)
+        self._fill_choice(self.second, tuple((item, item.label) for item in self.others), second)
         self.bound.show_text("" if (bound := value.get("bound")) is None else typed_value(bound))
         for part in (self.within, self.bound):
             part.setVisible(bound is not None)
@@ -603,10 +615,10 @@ class Hypothesis(QWidget):
             box.addItems(labels)
         box.setCurrentIndex(next((at for at, (value, _) in enumerate(values) if value == chosen), -1))
 
-    def _take_choice(self) -> None:
-        """Emit the chosen hypothesis; replace choices that no longer fit the first item."""
+    def _submit_choice(self) -> None:
+        """Emit the chosen hypothesis; choices that do not fit the first item are replaced."""
         relation = _RELATIONS[max(0, self.relation.currentIndex())][0]
-        if not self.known or self.first.currentIndex() < 0:  # what it compares is not among the choices
+        if not self.known or self.first.currentIndex() < 0:  # the compared item is not among the choices
             keys = ("measure", "form", "blocks", "conditions", "groups")
             table = {key: self.value[key] for key in keys if key in self.value}
             self.changed.emit(
@@ -626,10 +638,10 @@ class Hypothesis(QWidget):
         """Return the current bound, the default bound of a new equality, or None."""
         before = self.value.get("bound")
         if relation == "equal" and before is None:
-            return RATIO if measure in {"threshold", "pse"} else BOUND
+            return DEFAULT_RATIO if measure in {"threshold", "pse"} else DEFAULT_BOUND
         return before if relation == "equal" or _relation(self.value) != "equal" else None
 
-    def _take_bound(self, text: str) -> None:
+    def _submit_bound(self, text: str) -> None:
         bound = number_of(text)
         self.refused.emit(
             "" if bound is not None else f"{unclear_number(text)}. {kept_value_sentence(self.value.get('bound'))}"
@@ -646,21 +658,21 @@ def _relation_keys(relation: Any, bound: Any) -> dict[str, Any]:
 
 def _comparison_keys(first: Compared, second: Compared, measure: str) -> dict[str, Any]:
     """Return the keys that state the items that a hypothesis compares."""
-    form, _, own = measure.rpartition("/")
-    table: dict[str, Any] = {"measure": own, **({"form": form} if form else {}), "blocks": [first.block]}
+    form, _, measure_id = measure.rpartition("/")
+    table: dict[str, Any] = {"measure": measure_id, **({"form": form} if form else {}), "blocks": [first.block]}
     return table | {first.key: [first.name, second.name]} | ({first.pair_of: [*first.pair]} if first.pair else {})
 
 
-def _comparisons(every: tuple[Compared, ...]) -> Iterator[dict[str, Any]]:
+def _comparisons(items: tuple[Compared, ...]) -> Iterator[dict[str, Any]]:
     """Yield the keys of each possible comparison."""
-    for first in every:
-        for second in first.comparable_with(every):
+    for first in items:
+        for second in first.comparable_with(items):
             for measure, _ in first.shared_measures(second):
                 yield _comparison_keys(first, second, measure)
 
 
-def _comparison(value: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what a hypothesis compares, regardless of the order and the expected direction."""
+def _comparison_key(value: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the table of a hypothesis without its direction and bound; the order of items does not matter."""
     return {
         key: frozenset(entry) if isinstance(entry, list | tuple) else entry
         for key, entry in value.items()
@@ -668,8 +680,8 @@ def _comparison(value: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def _items_compared(comparison: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a comparison without its measure."""
+def _compared_items(comparison: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the compared items of a comparison, without its measure."""
     return {key: entry for key, entry in comparison.items() if key not in {"measure", "form"}}
 
 
@@ -678,7 +690,7 @@ def _relation(value: Mapping[str, Any]) -> Any:
 
 
 class _HypothesesField(Field):
-    """A sentence with choices for each hypothesis."""
+    """The hypotheses, each as a sentence made of choices."""
 
     def __init__(self, row: FormRow) -> None:
         super().__init__(row)
@@ -702,22 +714,27 @@ class _HypothesesField(Field):
         self.why.setText(self.row.facts.hint)
 
     def _add_hypothesis(self) -> None:
-        """Add a hypothesis on a measure without one, if possible on the items that the last hypothesis compares."""
-        known = [_comparison(value) for value in self.row.value or () if isinstance(value, Mapping)]
-        measures = [(value.get("form"), value.get("measure", "threshold")) for value in known]
-        form, items = (measures[-1][0], _items_compared(known[-1])) if known else (None, {})
+        """Add a hypothesis on a measure that has none yet, if possible on the items of the last hypothesis."""
+        comparisons = [_comparison_key(value) for value in self.row.value or () if isinstance(value, Mapping)]
+        measures = [(value.get("form"), value.get("measure", "threshold")) for value in comparisons]
+        form, items = (measures[-1][0], _compared_items(comparisons[-1])) if comparisons else (None, {})
 
-        def is_repeated(value: Mapping[str, Any]) -> tuple[bool, ...]:
-            own = _comparison(value)
-            measure = own.get("form"), own["measure"]
-            return own in known, measure in measures, measure[0] != form, _items_compared(own) != items
+        def repetitions(value: Mapping[str, Any]) -> tuple[bool, ...]:
+            comparison = _comparison_key(value)
+            measure = comparison.get("form"), comparison["measure"]
+            return (
+                comparison in comparisons,
+                measure in measures,
+                measure[0] != form,
+                _compared_items(comparison) != items,
+            )
 
-        self.asked.emit(AddEntry(self.row.path, min(_comparisons(self.row.facts.items), key=is_repeated)))
+        self.asked.emit(AddEntry(self.row.path, min(_comparisons(self.row.facts.items), key=repetitions)))
 
-    def _refuse(self, why: str) -> None:
-        if why != self.refusal:
-            self.refusal = why
-            self.came.emit()
+    def _refuse(self, reason: str) -> None:
+        if reason != self.refusal:
+            self.refusal = reason
+            self.focused.emit()
 
     def _remove_hypothesis(self, at: int) -> None:
         path = self.row.path
@@ -728,18 +745,18 @@ class _HypothesesField(Field):
         if not isinstance(before, Mapping):
             self.asked.emit(SetValue(path, value))
             return
-        asked: list[Request] = [
+        requests: list[Request] = [
             SetValue((*path, key), entry)
             for key, entry in value.items()
             if (tuple(entry) if isinstance(entry, list) else entry) != before.get(key)
         ]
-        asked += [RemoveKey((*path, key)) for key in before if key not in value]
-        if asked:
-            self.asked.emit(Several("Change hypothesis", tuple(asked)))
+        requests += [RemoveKey((*path, key)) for key in before if key not in value]
+        if requests:
+            self.asked.emit(Several("Change hypothesis", tuple(requests)))
 
 
 def _hypothesis_count(row: FormRow) -> int:
-    """Return the number of a row's hypotheses; 0 if the file has a value of another kind."""
+    """Return the number of hypotheses; 0 if the value in the file is not an array."""
     return len(row.value) if isinstance(row.value, tuple) else 0
 
 

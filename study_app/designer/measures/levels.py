@@ -18,7 +18,7 @@ _STEPS: Final = (1, 2, 2.5, 5, 10)
 
 
 @dataclass(frozen=True, slots=True)
-class LevelWords:
+class LevelFormat:
     """How the levels of a stimulus are written: Weber fractions in percent, all others in their unit."""
 
     stimulus: Stimulus
@@ -45,7 +45,7 @@ class LevelWords:
     def number(self, level: float, digits: int = 3) -> str:
         return rounded(level * self.factor, digits)
 
-    def words(self, level: float, digits: int = 3) -> str:
+    def text(self, level: float, digits: int = 3) -> str:
         return f"{self.number(level, digits)} {self.unit}".rstrip()
 
 

@@ -7,11 +7,11 @@ from dataclasses import dataclass, field, replace
 from functools import cache, lru_cache
 from typing import Any, Final
 
-from study_app.designer.document.additions import texts_of
+from study_app.designer.document.additions import localised_texts
 from study_app.designer.document.elements import title_of
-from study_app.designer.document.fields import alternatives, initial_value, is_localised, label_of, named_at
+from study_app.designer.document.fields import alternatives, initial_value, is_localised, label_of, referenced_element
 from study_app.designer.document.study import Study
-from study_app.designer.document.toml_edits import Set, Unset, meant_document
+from study_app.designer.document.toml_edits import Set, Unset, intended_document
 from study_app.designer.document.toml_text import Refused
 from study_app.haptics.model.slope_limits import HAND_MPS, steady_force
 from study_app.protocol.file_format import schema
@@ -48,7 +48,7 @@ def texts_by_language(study: Study) -> dict[str, tuple[int, int]]:
     languages = languages_of(study.document)
     counted = {code: [0, 0] for code in languages}
     lacking = {(fault.path, fault.missing_language) for fault in study.faults if fault.kind == "no text"}
-    for path, value in texts_of(study):
+    for path, value in localised_texts(study):
         is_instrument = value_at(study.document, (*path[:2], "instrument")) is not None
         for place, code in enumerate(languages):
             counted[code][1] += 1
@@ -78,7 +78,7 @@ def revealing_texts(study: Study, protocol: Protocol) -> tuple[Revealing, ...]:
     telltales = Telltales(_telltale_words(protocol))
     debriefs = {name for name, page in protocol.pages.items() if page.kind == "debrief"}
     revealing = []
-    for path, value in texts_of(study):
+    for path, value in localised_texts(study):
         if path[0] not in READ or (path[0] == "pages" and path[1] in debriefs):
             continue
         texts = value.values() if isinstance(value, Mapping) else (value,)
@@ -171,7 +171,7 @@ def restored_part(study: Study, before: Mapping[str, Any]) -> ValidPart:
             forces = forces and (fault.kind == "unknown key" or fault.path[:1] not in _OF_FORCES)
             edit = Unset(place) if value is None else Set(place, value)
             with suppress(Refused):  # its table was removed
-                document = frozen(meant_document(document, edit))
+                document = frozen(intended_document(document, edit))
         protocol, faults = validate_document(document)
         if protocol is not None:
             return ValidPart(protocol, whole, forces)
@@ -190,7 +190,7 @@ def _restoring_change(document: Any, fault: Fault, before: Mapping[str, Any]) ->
         marks = _MARK * (1 + max((step for step in path if isinstance(step, int)), default=0))
         texts = value.items() if isinstance(value, Mapping) else ()
         return path, {code: f"{text}{marks}" for code, text in texts} or f"{value}{marks}"
-    named = named_at(before, path) if fault.kind == "unknown name" and sound == value else None
+    named = referenced_element(before, path) if fault.kind == "unknown name" and sound == value else None
     if named is not None and value_at(document, named[:1]) is not None:
         return named, value_at(before, named)
     return (path, sound) if sound is not None and sound != value else None

@@ -11,7 +11,7 @@ from PySide6.QtCore import QObject, Signal
 
 from study_app.designer.document.document import Document
 from study_app.designer.document.elements import title_of
-from study_app.designer.document.fields import named_places
+from study_app.designer.document.fields import written_references
 from study_app.designer.document.study import Study, read_study
 from study_app.designer.document.toml_edits import Edit, Set, Unset
 from study_app.designer.document.toml_text import Refused
@@ -114,7 +114,7 @@ def first_step(shown: Preview, path: Path) -> int | None:
 def _graph_of(document: Mapping[str, object]) -> _Graph:
     """Return the tables that each table of a study refers to."""
     names: dict[Path, set[Path]] = {}
-    for place, named in named_places(document):
+    for place, named in written_references(document):
         names.setdefault(place[:2], set()).add(named[:2])
     return {table: frozenset(named) for table, named in names.items()}
 

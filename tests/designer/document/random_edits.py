@@ -17,8 +17,8 @@ from study_app.designer.document.toml_edits import (
     Rename,
     Set,
     Unset,
+    intended_document,
     is_same_value,
-    meant_document,
 )
 from study_app.protocol.source.document import Node, Path, scan_nodes
 
@@ -191,7 +191,7 @@ def holds_nothing(edit: Edit) -> bool:
 
 def check_edit(before: str, after: str, edit: Edit) -> None:
     """Check the text after an edit against the one before."""
-    meant = meant_document(tomllib.loads(before), edit)
+    meant = intended_document(tomllib.loads(before), edit)
     assert is_same_value(tomllib.loads(after), meant) or holds_nothing(edit)
     check_comments(before, after, edit)
     assert not unmeant_changes(before, after, edit)

@@ -10,13 +10,13 @@ from study_app.designer.document import steps
 from study_app.designer.document.additions import (
     check_values,
     edits_to_add,
+    edits_to_add_language,
     edits_to_copy_with,
     edits_to_fill_in,
     edits_to_move,
+    localised_texts,
     number_row,
     short_text_edits,
-    texts_of,
-    with_language,
 )
 from study_app.designer.document.document import template
 from study_app.designer.document.fields import (
@@ -25,12 +25,12 @@ from study_app.designer.document.fields import (
     edits_to_delete,
     edits_to_rename,
     initial_value,
-    named_at,
     orphaned_keys,
+    paths_to_delete,
+    referenced_element,
     references_to,
-    with_references,
 )
-from study_app.designer.document.steps import DuplicateElement, MakeSeries, Situation
+from study_app.designer.document.steps import DuplicateElement, MakeSeries, StepContext
 from study_app.designer.document.study import Study, read_study
 from study_app.designer.document.toml_edits import Set, Unset
 from study_app.designer.form.form import form_of
@@ -95,18 +95,18 @@ def _name(document: Any, thing: Path) -> Any:
 def test_what_leaves_the_name_of_the_only_one_out_goes_with_it(thing: Path, place: Path) -> None:
     study = study_of("delayjnd")
     assert orphaned_keys(study.document, [thing]) == (place,)
-    assert place[:2] in with_references(study.document, thing, study.needs)
+    assert place[:2] in paths_to_delete(study.document, thing, study.is_required)
 
 
 def test_the_only_condition_leaves_its_liquid_to_what_leaves_its_name_out() -> None:
     study = study_of("delaydetect")
     condition, liquid = ("conditions", "water"), ("liquids", "water")
     assert orphaned_keys(study.document, [condition]) == ()
-    assert with_references(study.document, condition, study.needs) == (condition,)
+    assert paths_to_delete(study.document, condition, study.is_required) == (condition,)
     changed, _ = study.with_edits(*edits_to_delete([condition]))
     assert not changed.faults
     assert orphaned_keys(study.document, [condition, liquid]) == (("stimuli", "delay", "condition"),)
-    assert {condition, ("stimuli", "delay")} <= {*with_references(study.document, liquid, study.needs)}
+    assert {condition, ("stimuli", "delay")} <= {*paths_to_delete(study.document, liquid, study.is_required)}
 
 
 def test_liquids_are_named_as_conditions_where_a_study_has_none() -> None:
@@ -114,12 +114,12 @@ def test_liquids_are_named_as_conditions_where_a_study_has_none() -> None:
     study = read_study(text.replace('conditions = ["practice"]', 'conditions = ["syrup"]').encode(), FOLDER)
     assert not study.problems
     place = ("blocks", "liquids", "conditions", 1)
-    assert named_at(study.document, place) == ("liquids", "oil")
+    assert referenced_element(study.document, place) == ("liquids", "oil")
     assert references_to(study.document, ("liquids", "oil")) == (place,)
     assert choices_at(study.document, place) == ("water", "oil", "honey", "syrup")
     for edits in (
         edits_to_rename(study.document, ("liquids", "oil"), "butter"),
-        edits_to_delete(with_references(study.document, ("liquids", "oil"), study.needs)),
+        edits_to_delete(paths_to_delete(study.document, ("liquids", "oil"), study.is_required)),
     ):
         changed, _ = study.with_edits(*edits)
         assert not changed.problems
@@ -184,7 +184,7 @@ def test_values_are_refused_in_one_sentence(study: Study, values: tuple[float, .
 
 
 def test_copies_of_a_series_come_in_order_after_their_original_in_each_list(study: Study) -> None:
-    step = MakeSeries(NO_DELAY, (*NO_DELAY, "delay_ms"), (30, 60)).step(Situation(study, NO_DELAY))
+    step = MakeSeries(NO_DELAY, (*NO_DELAY, "delay_ms"), (30, 60)).step(StepContext(study, NO_DELAY))
     after, _ = study.with_edits(*step.edits)
     names = at(after.document, ("blocks", "delays", "conditions"))
     series = [at(after.document, ("conditions", name, "delay_ms")) for name in names]
@@ -234,7 +234,7 @@ DEMO = read_study((PROTOCOLS / "demo.toml").read_bytes(), PROTOCOLS)
 
 def test_a_point_is_duplicated_with_its_numbers() -> None:
     place = ("tasks", "reach", "targets_mm")
-    step = DuplicateElement((*place, 0)).step(Situation(DEMO))
+    step = DuplicateElement((*place, 0)).step(StepContext(DEMO))
     after, _ = DEMO.with_edits(*step.edits)
     assert at(after.document, place) == ((-30, 0, 0), (-30, 0, 0), (30, 0, 0))
 
@@ -244,7 +244,7 @@ def translated() -> Study:
     """The demo with two languages that are copies of the first one, as one step."""
     study = DEMO
     for code in ("nl", "de"):
-        study, _ = study.with_edits(*with_language(study, code))
+        study, _ = study.with_edits(*edits_to_add_language(study, code))
     for code in ("nl", "de"):
         study, _ = study.with_edits(*edits_to_fill_in(study, code))
     return study
@@ -255,7 +255,7 @@ def words(study: Study) -> list[str]:
 
 
 def test_copies_in_two_languages_are_counted_until_each_is_edited_and_a_missing_text_is_none(translated: Study) -> None:
-    count = sum(any(map(str.isalpha, str(text["en"]))) for _, text in texts_of(translated))
+    count = sum(any(map(str.isalpha, str(text["en"]))) for _, text in localised_texts(translated))
     dutch = count - 1  # "baseline" is Dutch, too
     assert (translated.faults, copied_texts(translated)) == ((), {"nl": dutch, "de": count})
     assert words(translated) == [
@@ -385,8 +385,8 @@ def test_a_request_is_one_step_with_its_words_its_selection_and_no_other_change(
     request_: steps.Request, words: str, select: Path | None, said: str, changes: dict[str, Any]
 ) -> None:
     study = study_of("demo")
-    step = request_.step(Situation(study, ("liquids", "thin")))
-    assert (step.words, step.select, step.said) == (words, select, said)
+    step = request_.step(StepContext(study, ("liquids", "thin")))
+    assert (step.title, step.select, step.announcement) == (words, select, said)
     before, after = (dict(leaves(each.document)) for each in (study, study.with_edits(*step.edits)[0]))
     assert {key: after.get(key) for key in {**before, **after} if before.get(key) != after.get(key)} == changes
 
@@ -410,7 +410,7 @@ def test_a_language_is_added_filled_in_or_removed(how: Any, words: str, title: A
     languages = '["en", "nl"]' if how == "remove" else '["en"]' if how == "add" else '["en", "nl"]'
     held = '{ en = "T", nl = "U" }' if how == "remove" else '{ en = "T" }' if how == "copy" else '"T"'
     study = read_study(f"format = 2\n[study]\nname = 'a'\nlanguages = {languages}\ntitle = {held}\n".encode())
-    step = steps.ChangeLanguage(how, "fr" if how == "add" else "nl").step(Situation(study))
+    step = steps.ChangeLanguage(how, "fr" if how == "add" else "nl").step(StepContext(study))
     changed = study.with_edits(*step.edits)[0].document["study"]
-    assert (step.words, changed["title"]) == (words, title)
+    assert (step.title, changed["title"]) == (words, title)
     assert changed["languages"] == {"add": ("en", "fr"), "copy": ("en", "nl"), "remove": ("en",)}[how]

@@ -27,8 +27,8 @@ from study_app.designer.document.steps import (
     Request,
     SetText,
     SetValue,
-    Situation,
     Step,
+    StepContext,
     SwitchKey,
     SwitchKind,
 )
@@ -225,14 +225,14 @@ def check_element(before: Study, request: Request, after: Study) -> None:
 def outcome(study: Study, selected: Path, request: Request) -> Iterator[str]:
     """Check a request; yield the words of its step and the problems that it makes, or why it is refused."""
     try:
-        step = request.step(Situation(study, selected))
+        step = request.step(StepContext(study, selected))
         after = edited(study, *step.edits, text=step.text)
     except StudyError as refusal:
         yield f"refused: {refusal}"
         return
     assert step.select is None or existing_path(after.document, step.select) == step.select, step.select
     check(study, request, step, after)
-    yield f"{step.words}{step.fresh and f' ({step.fresh})'}{step.said and f': {step.said}'}"
+    yield f"{step.title}{step.fresh and f' ({step.fresh})'}{step.announcement and f': {step.announcement}'}"
     known = {fault.message for fault in study.faults}
     yield from (f"problem: {fault.message}" for fault in after.faults if fault.message not in known)
 

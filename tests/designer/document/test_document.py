@@ -243,14 +243,21 @@ def test_standing_says_when_saving_asks_and_which_version_is_free() -> None:
         Run(hash="def", version="1.1", sessions=1),
         Run(hash="pil", version="1.2", pilots=3),
     )
-    assert not version_standing("new", "old", "0.1", [Run(hash="pil", version="0.1", pilots=1, rehearsals=2)]).asks
+    assert not version_standing(
+        "new", "old", "0.1", [Run(hash="pil", version="0.1", pilots=1, rehearsals=2)]
+    ).needs_confirmation
     same = version_standing("abc", "abc", "1.0", ran)
-    assert (same.asks, same.version, same.sessions) == (False, "1.0", 2)
+    assert (same.needs_confirmation, same.version, same.sessions) == (False, "1.0", 2)
     changed = version_standing("new", "abc", "1.0", ran)
-    assert (changed.asks, changed.version, changed.was, changed.others) == (True, "1.2", "1.1", 2)
+    assert (changed.needs_confirmation, changed.version, changed.last_version, changed.conflicts) == (
+        True,
+        "1.2",
+        "1.1",
+        2,
+    )
     raised = version_standing("new", "def", "2.0", ran)
-    assert (raised.asks, raised.version, raised.others) == (True, "2.0", 0)
-    assert not version_standing("newer", "new", "2.0", ran).asks
+    assert (raised.needs_confirmation, raised.version, raised.conflicts) == (True, "2.0", 0)
+    assert not version_standing("newer", "new", "2.0", ran).needs_confirmation
 
 
 @pytest.mark.parametrize("version", ["", "1 2", "1,2", "é"])

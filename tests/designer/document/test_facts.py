@@ -11,7 +11,7 @@ from study_app.analysis.planning import threshold_studies
 from study_app.designer.document.additions import repairs
 from study_app.designer.document.document import template
 from study_app.designer.document.elements import outline
-from study_app.designer.document.steps import AddElement, AddInstrument, AddKey, ChangeLanguage, Situation
+from study_app.designer.document.steps import AddElement, AddInstrument, AddKey, ChangeLanguage, StepContext
 from study_app.designer.document.study import Study, read_study
 from study_app.designer.document.toml_edits import Set, Unset
 from study_app.designer.measures.study_facts import facts, revealing_texts, text_keys, texts_by_language, valid_part
@@ -49,7 +49,7 @@ def test_what_does_not_belong_there_is_removed_by_a_repair_and_not_by_its_reader
     assert len({fault.message for _, fault, _ in surplus}) > 15
     for study, fault, case in surplus:
         assert not re.search(r"\bomit|\bremove\b", f"{fault.message} {fault.hint}"), case.name
-        assert "Remove" in [repair.words for repair in repairs(study, fault)], (case.name, fault)
+        assert "Remove" in [repair.label for repair in repairs(study, fault)], (case.name, fault)
         assert str(fault.located(Places.of(study.text))).endswith("remove it)")
     for case, study in studies:
         assert not [fault for fault in study.faults if "omit" in f"{fault.message} {fault.hint}"], case.name
@@ -79,7 +79,7 @@ def test_the_highest_level_is_that_of_fixed_levels_too(
     (fault,) = study.faults  # one for both blocks
     assert limit in fault.message
     (repair,) = repairs(study, fault)
-    assert repair.words == f"Highest level {most:g}"
+    assert repair.label == f"Highest level {most:g}"
     after, _ = study.with_edits(*repair.edits)
     assert after.document["stimuli"]["damping"]["levels"] == (0.02, most)
     assert after.document["methods"]["easy"]["levels"] == (most,)
@@ -195,12 +195,12 @@ def test_a_viscosity_beside_another_law_is_a_problem_of_its_field_and_can_be_rem
     liquid = ("liquids", "thin")
     study = template("two-liquids-abx")
     assert value_at(study.document, (*liquid, "viscosity_pa_s")) == 0.2
-    study, _ = study.with_edits(*AddKey((*liquid, "non_newtonian")).step(Situation(study)).edits)
+    study, _ = study.with_edits(*AddKey((*liquid, "non_newtonian")).step(StepContext(study)).edits)
     (fault,) = study.faults
     message = "describes a Newtonian liquid, but the non-Newtonian table specifies another law"
     assert (fault.path, fault.message) == ((*liquid, "viscosity_pa_s"), message)
     (repair,) = repairs(study, fault)
-    assert repair.words == "Remove"
+    assert repair.label == "Remove"
     assert study.with_edits(*repair.edits)[0].faults == ()
     without, _ = study.with_edits(*repair.edits, Unset((*liquid, "non_newtonian", "kind")))
     kinds = '"herschel-bulkley", "carreau", "maxwell", "shear-thickening"'
@@ -211,22 +211,22 @@ def test_a_study_gets_two_groups_at_once() -> None:
     study, _ = template("two-liquids-abx").with_edits(Set(("study", "group_assignment"), "pre-existing"))
     (fault,) = study.faults
     add, remove = repairs(study, fault)
-    assert (add.words, remove.words) == ("Add two groups", "Remove")
+    assert (add.label, remove.label) == ("Add two groups", "Remove")
     grouped, _ = study.with_edits(*add.edits)
     assert (grouped.faults, len(grouped.document["groups"])) == ((), 2)
     single, _ = grouped.with_edits(Unset(("groups", "group")))
     (fault,) = single.faults
     again = repairs(single, fault)[0]
-    assert again.words == "Add another group"
+    assert again.label == "Add another group"
     assert single.with_edits(*again.edits)[0].document["groups"].keys() == {"group", "group_2"}
-    step = AddElement(("groups",)).step(Situation(template("two-liquids-abx")))
+    step = AddElement(("groups",)).step(StepContext(template("two-liquids-abx")))
     assert (step.select, template("two-liquids-abx").with_edits(*step.edits)[0].faults) == (("groups", "group"), ())
 
 
 def test_texts_that_the_program_lacks_in_a_language_are_missing_and_each_is_a_problem() -> None:
     study = template("two-liquids-abx")
     for request in (ChangeLanguage("add", "fr"), ChangeLanguage("copy", "fr"), AddInstrument("nasa-tlx")):
-        study, _ = study.with_edits(*request.step(Situation(study)).edits)
+        study, _ = study.with_edits(*request.step(StepContext(study)).edits)
     assert facts(study).missing == {"fr": 1 + 6 * 3}, "the introduction, and of each item its text and two ends"
     assert [fault.kind for fault in study.faults] == ["no text"] * 19
 

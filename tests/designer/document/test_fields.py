@@ -9,7 +9,7 @@ import pytest
 
 from study_app.designer.document.elements import element_of
 from study_app.designer.document.fields import Row, label_of, row_at, rows, unit_of
-from study_app.designer.document.steps import AddKey, Situation
+from study_app.designer.document.steps import AddKey, StepContext
 from study_app.designer.document.study import Study, read_study
 from study_app.designer.form.form import form_of
 from study_app.number_text import exact_text
@@ -125,7 +125,7 @@ def test_an_added_table_has_what_it_needs_and_no_required_choice_is_called_a_def
     liquid = ("liquids", next(iter(study.document["liquids"])))
     kinds = {"region": "everywhere", "current": "uniform", "non_newtonian": "herschel-bulkley"}
     for path in (*((*liquid, key) for key in kinds), (*item, "show_if")):
-        step = AddKey(path).step(Situation(study))
+        step = AddKey(path).step(StepContext(study))
         after, _ = study.with_edits(*step.edits)
         assert [fault for fault in after.faults if fault.path[:-1] == path and fault not in study.faults] == []
         kind = row_at(after.document, (*path, "kind"))

@@ -2,7 +2,7 @@
 
 import pytest
 
-from study_app.designer.document.fields import choices_at, named_at, references_to
+from study_app.designer.document.fields import choices_at, referenced_element, references_to
 from study_app.protocol.source.document import frozen
 
 DOCUMENT = frozen(
@@ -43,7 +43,7 @@ DOCUMENT = frozen(
     ],
 )
 def test_a_text_names_an_element(place: tuple[str | int, ...], named: tuple[str | int, ...] | None) -> None:
-    assert named_at(DOCUMENT, place) == named
+    assert referenced_element(DOCUMENT, place) == named
 
 
 def test_an_element_is_referred_to_by_each_text_that_names_it() -> None:

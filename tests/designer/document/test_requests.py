@@ -11,7 +11,7 @@ import pytest
 
 from study_app.designer.document import steps
 from study_app.designer.document.document import template
-from study_app.designer.document.steps import Situation, Step
+from study_app.designer.document.steps import Step, StepContext
 from study_app.designer.document.study import read_study
 from tests.designer.support.designer import DEMO
 from tests.transcripts import value_of
@@ -34,19 +34,19 @@ def told(line: str) -> list[str]:
     name, _, call = line.partition(": ")
     study = STUDIES[name]
     try:
-        step = value_of(call, REQUESTS).step(Situation(study, ("questionnaires", "liquid", "items", 0)))
+        step = value_of(call, REQUESTS).step(StepContext(study, ("questionnaires", "liquid", "items", 0)))
     except steps.Refused as refusal:
         return [f"refused: {refusal}"]
     facts = {
         field.name: getattr(step, field.name)
         for field in fields(Step)
-        if field.name not in {"words", "edits", "text"} and getattr(step, field.name) != getattr(PLAIN, field.name)
+        if field.name not in {"title", "edits", "text"} and getattr(step, field.name) != getattr(PLAIN, field.name)
     }
     after = study.with_edits(*step.edits)[0].text if step.text is None else step.text
     changes = difflib.unified_diff(study.text.split("\n"), after.split("\n"), n=0, lineterm="")
     lines = [line[:WIDE].rstrip() for line in changes if line[:1] in "+-" and line.strip("+- ")]
     more = [f"and {len(lines) - MOST} more"] * (len(lines) > MOST)
-    return [step.words, *(f"{key}: {value}" for key, value in facts.items()), *lines[:MOST], *more]
+    return [step.title, *(f"{key}: {value}" for key, value in facts.items()), *lines[:MOST], *more]
 
 
 @pytest.mark.parametrize(

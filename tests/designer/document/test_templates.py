@@ -9,7 +9,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from study_app.cli import commands
-from study_app.designer.document.additions import texts_of
+from study_app.designer.document.additions import localised_texts
 from study_app.designer.document.document import Answers, copy_of, template, with_answers
 from study_app.designer.document.fields import row_at
 from study_app.designer.document.study import read_study
@@ -57,7 +57,9 @@ def test_each_template_is_rehearsed(name: str, tmp_path: Path) -> None:
 def test_no_page_of_a_template_names_a_liquid_or_a_number_that_is_easily_replaced(name: str) -> None:
     study = template(name)
     replaced = {*study.document["liquids"], "three", "four"}
-    texts = {path[1]: str(text).lower() for path, text in texts_of(study) if path[0] == "pages" and path[2] == "body"}
+    texts = {
+        path[1]: str(text).lower() for path, text in localised_texts(study) if path[0] == "pages" and path[2] == "body"
+    }
     later = {page: words for page, words in texts.items() if page != "welcome"}
     assert not {page: word for page, words in later.items() for word in replaced if re.search(rf"\b{word}\b", words)}
 
@@ -75,7 +77,7 @@ def test_each_template_asks_at_most_five_questions_about_keys_that_it_has(name: 
 @pytest.mark.parametrize("name", templates())
 def test_the_texts_of_a_template_break_only_between_paragraphs(name: str) -> None:
     study = template(name)
-    texts = [text for _, text in texts_of(study) if isinstance(text, str)]
+    texts = [text for _, text in localised_texts(study) if isinstance(text, str)]
     assert any("\n\n" in text for text in texts)
     assert [text for text in texts if "\n" in text.rstrip().replace("\n\n", "")] == []
 

@@ -15,7 +15,7 @@ from study_app.designer.document.steps import (
     RemoveKey,
     Request,
     SetValue,
-    Situation,
+    StepContext,
     shipped_liquids,
 )
 from study_app.designer.document.study import Study, read_study
@@ -64,7 +64,7 @@ DESIGN = ("blocks", "feel", "design")
 
 def after(study: Study, *requests: Request) -> Study:
     for request in requests:
-        study, _ = study.with_edits(*request.step(Situation(study)).edits)
+        study, _ = study.with_edits(*request.step(StepContext(study)).edits)
     return study
 
 
@@ -133,7 +133,7 @@ def test_another_standard_is_not_chosen_for_one_that_is_removed(study: Study) ->
         assert two.document["blocks"]["feel"]["conditions"] == ("slime", "late")
         assert two.document["blocks"]["feel"]["standard"] == "water"
         (fault,) = two.faults
-        assert (fault.path[-1], [repair.words for repair in repairs(two, fault)]) == ("standard", ['Use "slime"'])
+        assert (fault.path[-1], [repair.label for repair in repairs(two, fault)]) == ("standard", ['Use "slime"'])
 
 
 def test_a_repeated_form_is_counted_each_time_with_and_without_groups() -> None:

@@ -4,7 +4,12 @@ from pathlib import Path
 
 import pytest
 
-from study_app.designer.document.additions import edits_to_fill_in, texts_of, with_language, without_language
+from study_app.designer.document.additions import (
+    edits_to_add_language,
+    edits_to_fill_in,
+    edits_to_remove_language,
+    localised_texts,
+)
 from study_app.designer.document.document import Answers, copy_of, template, with_answers
 from study_app.designer.document.study import Study, read_study
 from study_app.designer.document.toml_edits import Set
@@ -37,7 +42,7 @@ def study_named(name: str) -> Study:
 
 def translated(study: Study, code: str) -> Study:
     """Return the study with every text of a language replaced, as a person does it: all of it in that language."""
-    for number, (path, value) in enumerate(texts_of(study)):
+    for number, (path, value) in enumerate(localised_texts(study)):
         place = (*path, code) if not isinstance(value, str) else path
         text = value if isinstance(value, str) else value[code]
         several = isinstance(text, tuple)
@@ -51,7 +56,7 @@ def translated(study: Study, code: str) -> Study:
 @pytest.mark.parametrize("name", [*templates(), "demo", "thickness", "delayjnd", "forcedelay"])
 def test_every_english_text_of_a_study_in_another_language_alone_is_to_be_translated(name: str, code: str) -> None:
     english = study_named(name)
-    texts = [text for _, text in texts_of(english) if words_in(text)]
+    texts = [text for _, text in localised_texts(english) if words_in(text)]
     same = sum(isinstance(text, str) and text.casefold() in SAME_WORDS.get(code, ()) for text in texts)
     study = with_answers(english, Answers(languages=(code,)))
     assert (study.faults, copied_texts(study)) == ((), {code: len(texts) - same})
@@ -146,9 +151,9 @@ def test_a_copy_of_an_own_study_is_recognised_and_warned_of(tmp_path: Path) -> N
 
 
 def test_a_language_that_was_added_and_then_left_alone_keeps_its_copies() -> None:
-    study, _ = template("empty").with_edits(*with_language(template("empty"), "ar"))
+    study, _ = template("empty").with_edits(*edits_to_add_language(template("empty"), "ar"))
     study, _ = study.with_edits(*edits_to_fill_in(study, "ar"))
-    study, _ = study.with_edits(*without_language(study, "en"))
+    study, _ = study.with_edits(*edits_to_remove_language(study, "en"))
     assert copied_texts(study) == {"ar": 10}
 
 

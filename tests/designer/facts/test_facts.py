@@ -11,7 +11,7 @@ from study_app.designer.document.additions import repairs
 from study_app.designer.document.document import template
 from study_app.designer.document.elements import outline, usage_text
 from study_app.designer.document.fields import all_references
-from study_app.designer.document.steps import RetypeFile, Situation
+from study_app.designer.document.steps import RetypeFile, StepContext
 from study_app.designer.document.study import Study, read_study
 from study_app.designer.document.toml_edits import Edit, Set, Unset
 from study_app.designer.file import file_text
@@ -129,7 +129,7 @@ def test_typing_changes_no_end_of_line_elsewhere(lines: list[tuple[str, str]], d
     first = data.draw(st.integers(0, len(pane)))
     last = data.draw(st.integers(first, len(pane)))
     typed = pane[:first] + data.draw(st.sampled_from(["", "x", "new\nline", "\n"])) + pane[last:]
-    after = RetypeFile(typed).step(Situation(Study(text), ())).text
+    after = RetypeFile(typed).step(StepContext(Study(text), ())).text
     assert shown(after) == typed
     if typed == pane:
         assert after == text

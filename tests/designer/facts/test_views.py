@@ -9,9 +9,9 @@ from typing import Any
 
 import pytest
 
-from study_app.designer.document.additions import additions_for, repairs
+from study_app.designer.document.additions import addition_repairs, repairs
 from study_app.designer.document.document import template
-from study_app.designer.document.elements import CHOSEN, LABEL, OTHER, found_fields
+from study_app.designer.document.elements import CHOSEN, LABEL, OTHER, find_fields
 from study_app.designer.document.study import read_study
 from study_app.designer.document.toml_edits import Set
 from study_app.designer.form.form import form_of
@@ -71,7 +71,7 @@ def test_what_is_found_has_the_words(words: str) -> None:
     assert {row.path for row in found} <= {row.path for row in everything}
     assert outline_rows(study, facts(study).steps_s, f"  {words} ") == found
     assert outline_rows(study, facts(study).steps_s, "  ") == everything
-    fields = found_fields(study, words)
+    fields = find_fields(study, words)
     assert found or fields
     for row in (*found, *fields):
         assert words in one_line(row).lower() or any(words in one_line(other).lower() for other in found), row
@@ -80,7 +80,7 @@ def test_what_is_found_has_the_words(words: str) -> None:
 @pytest.mark.parametrize(("words", "rank"), [("repetitions", LABEL), ("double", CHOSEN), ("ewma", OTHER)])
 def test_other_choices_are_found_only_where_no_label_and_no_chosen_one_is(words: str, rank: int) -> None:
     ((_, study),) = studies(("slime",))
-    found = found_fields(study, words)
+    found = find_fields(study, words)
     assert found[0].rank == rank
     assert all(field.rank <= max(rank, CHOSEN) for field in found)
 
@@ -132,12 +132,12 @@ def test_each_repair_removes_its_problem_and_undo_gives_the_text_back(name: str,
         assert Counter(row.fault for row in rows) == Counter(study.faults)
         assert all(row.line is None or row.line <= study.text.count("\n") + 1 for row in rows)
         for fault in study.faults:
-            for repair in (*repairs(study, fault), *additions_for(study, fault)):
+            for repair in (*repairs(study, fault), *addition_repairs(study, fault)):
                 after = edited(study, *repair.edits)
                 known, left = ({(fault.path, fault.message) for fault in one.faults} for one in (study, after))
-                assert (fault.path, fault.message) not in left, (case.name, repair.words)
-                assert len(left) <= len(known), (case.name, repair.words)
-                words.append(repair.words)
+                assert (fault.path, fault.message) not in left, (case.name, repair.label)
+                assert len(left) <= len(known), (case.name, repair.label)
+                words.append(repair.label)
     assert words
     compare(GOLDEN / f"repairs_in_{name}.txt", each_once(words), pytestconfig)
 

@@ -99,7 +99,7 @@ class Designer(KeyUser):
     def steps(self) -> list[str]:
         """What was done, in words."""
         assert self.editing.opened is not None
-        return [step.words for step in self.editing.opened.done]
+        return [step.title for step in self.editing.opened.done]
 
     def undo_all(self) -> str:
         """Undo every step; return the text then."""
