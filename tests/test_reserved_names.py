@@ -8,7 +8,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from study_app.cli import commands
-from study_app.designer.document.document import new_study_file
+from study_app.designer.document.document import check_free_name
 from study_app.errors import ProtocolError, StoreError, StudyError
 from study_app.ids import file_name_fault, free_short_name
 from study_app.protocol.load import load, source_bytes
@@ -31,7 +31,7 @@ def test_a_study_has_no_reserved_name(tmp_path: Path, monkeypatch: pytest.Monkey
     assert free_short_name((), "con") == "con2"
     assert free_short_name((), "com1") not in RESERVED
     with pytest.raises(StudyError, match='"nul" is reserved for a device on Windows; "nul2" is free'):
-        new_study_file("nul")
+        check_free_name("nul")
     file = tmp_path / "control.toml"
     file.write_bytes(source_bytes("demo").replace(b'name = "demo"', b'name = "con"', 1))
     with pytest.raises(ProtocolError, match='"con" is reserved for a device on Windows'):

@@ -1,7 +1,7 @@
-"""The study designer: one open study, its document, and the rooms that edit and show it.
+"""The study designer: one open study, its document, and the panels that edit and show it.
 
-``document.document`` holds the text and the list of undos (without Qt), ``form.card`` shows the form of an element, and
-``controller`` connects the rooms; read these first. The text is authoritative: an edit changes only its bytes.
+``document.document`` holds the text and the undo history (without Qt), ``form.card`` shows the form of an element, and
+``controller`` connects the panels; read these first. The text is authoritative: an edit changes only its own bytes.
 
 Reading order: parts, templates; document; editing, outline, prompts, version_rows; problems; measures; form; file;
 header; new_study_page; window; measures_controller, participant, versions; saving; controller.

@@ -1,6 +1,6 @@
-"""The study designer: its place, and one controller for each of its subjects.
+"""The study designer: its page in the main window, and one controller for each task.
 
-Each edit is shown in the form at once; the outline, the warnings and the repairs follow when the keyboard rests.
+Each edit is shown in the form at once; the outline, the warnings and the repairs follow after a pause in typing.
 """
 
 from collections.abc import Callable
@@ -35,7 +35,7 @@ from study_app.designer.outline import addable_elements, outline_rows
 from study_app.designer.participant.playable import Feeling
 from study_app.designer.participant.preview import ParticipantPreview
 from study_app.designer.problems import ProblemRow, RepairSearch, problem_rows, warning_rows
-from study_app.designer.prompts import DeleteCard, SeriesCard, naming_places
+from study_app.designer.prompts import DeleteCard, SeriesCard, places_of_references
 from study_app.designer.saving import Saving
 from study_app.designer.versions import Changes, KnownRuns, Renaming
 from study_app.designer.window import DesignerPlace
@@ -44,11 +44,11 @@ from study_app.protocol.source import Path as Place
 from study_app.protocol.source import protocol_file
 from study_app.store.versions import draft_of, keep_original
 
-_REST_MS: Final = 200
+_PAUSE_MS: Final = 200
 
 
 class DesignerController(QObject):
-    """Provides the content of the designer's view, and opens studies."""
+    """Opens studies, carries out the requests of the page, and provides its content."""
 
     def __init__(self, results: Path) -> None:
         place = DesignerPlace()
@@ -60,29 +60,29 @@ class DesignerController(QObject):
         self.changes = Changes(editing, place, self.runs)
         self.feeling = Feeling(editing, place)
         Renaming(editing, place, self.runs)
-        self._others: dict[Path, Document] = {}
+        self._other_documents: dict[Path, Document] = {}
         self._warnings: tuple[str, ...] = ()
-        self._find = ""
+        self._search_text = ""
         self._choices: tuple[StudyChoice, ...] = ()
         self._repairs = RepairSearch(self)
-        self._resting = QTimer(self)
-        self._resting.setInterval(_REST_MS)
-        self._resting.setSingleShot(True)
-        self._resting.timeout.connect(self.show_outline)
+        self._pause_timer = QTimer(self)
+        self._pause_timer.setInterval(_PAUSE_MS)
+        self._pause_timer.setSingleShot(True)
+        self._pause_timer.timeout.connect(self.show_outline)
         place.entered.connect(self.enter)
-        self._does: dict[Task, Callable[..., object]] = {
+        self._tasks: dict[Task, Callable[..., object]] = {
             "select": editing.select, "back": editing.go_back, "undo": editing.undo, "redo": editing.redo,
             "save": self.saving.save, "banner": self.saving.answer_banner, "open": self.open, "new": self.show_new_page,
             "begin": self.begin_study, "find": self.find_elements, "add": self._show_addable,
             "delete": self.ask_to_delete, "duplicate": self.ask_to_duplicate, "series": self.show_series_card,
-            "judge id": self._judge_id,
+            "judge id": self._check_id,
             "repair": self.make_repair, "leave entries": editing.leave_entries, "repairs": self._repairs.show_repairs,
         }  # fmt: skip
         place.asked.connect(self.handle_request)
         place.new_page.copy_asked.connect(self.show_new_page)
         editing.changed.connect(self.show_study)
         self.preview = ParticipantPreview(editing, place)
-        editing.edited.connect(self._resting.start)
+        editing.edited.connect(self._pause_timer.start)
         editing.refused.connect(self._show_refusal)
         editing.made.connect(self._show_step)
         self.saving.kept.connect(self._show_header)
@@ -96,19 +96,19 @@ class DesignerController(QObject):
         self.measures.warned.connect(self._show_header)
         self.measures.warned.connect(self._show_warnings)
 
-    def handle_request(self, asked: Request | Do) -> None:
-        """Carry out a request or task of the designer's page."""
-        if isinstance(asked, Do):
-            self._does[asked.what](*asked.arguments)
+    def handle_request(self, request: Request | Do) -> None:
+        """Carry out a request or task that the page emits."""
+        if isinstance(request, Do):
+            self._tasks[request.what](*request.arguments)
         else:
-            self.editing.handle_request(asked)
+            self.editing.handle_request(request)
 
     # opening
 
     def enter(self) -> None:
         """Reload the list of studies; reload a file that another program changed if it was not edited here."""
         self._choices = study_choices(self.editing.opened)
-        self.saving.look_again()
+        self.saving.check_file()
         self.runs.read_in_background()
         self.show_study()
 
@@ -124,7 +124,7 @@ class DesignerController(QObject):
                     self.saving.offer_to_discard()
                 self.enter()
                 return
-            opened = self._others.get(file.resolve())
+            opened = self._other_documents.get(file.resolve())
             if opened is None or not opened.edited:
                 draft = None if file.exists() else draft_of(file)
                 opened = open_file(file, self.editing.results) if draft is None else open_unsaved(file, draft)
@@ -162,38 +162,38 @@ class DesignerController(QObject):
         self.place.show_new(choices, source)
 
     def _show_document(self, opened: Document) -> None:
-        if (before := self.editing.opened) is not None:
-            self._others[before.file.resolve()] = before
+        if (previous := self.editing.opened) is not None:
+            self._other_documents[previous.file.resolve()] = previous
         self._choices = study_choices(opened)
         self._warnings = ()
         self.editing.open(opened)
-        self.place.begin_study()
+        self.place.reset_view()
         self.place.close_new()
         self.show_study()
         self.show_outline()
         if opened.study.is_unreadable:
-            self.place.show_tab("file")  # also where the fault has no line
+            self.place.show_tab("file")  # needed if the problem has no line
             self.place.open_next_problem()
         else:
             self.place.parts.focus_element()
 
     def _close_document(self) -> None:
         if (closed := self.editing.opened) is not None:
-            self._others.pop(closed.file.resolve(), None)
+            self._other_documents.pop(closed.file.resolve(), None)
         self.editing.open(None)
         self._choices = study_choices(None)
-        self.place.begin_study()
+        self.place.reset_view()
         self.show_study()
         self.place.nothing.new.setFocus()
 
     # steps that ask first
 
     def ask_to_delete(self, path: Place) -> None:
-        """Delete an element; if others refer to it, ask how to treat them."""
+        """Delete an element; if others refer to it, first ask what to do with them."""
         opened = self.editing.writable
         if opened is None or len(path) < 2:
             return
-        if places := naming_places(opened.study, path):
+        if places := places_of_references(opened.study, path):
             card = DeleteCard(opened.study, path, places)
             card.answered.connect(self.editing.handle_request)
             self.place.show_prompt(card, card.first)
@@ -201,7 +201,7 @@ class DesignerController(QObject):
             self.editing.handle_request(DeleteElement(path))
 
     def ask_to_duplicate(self, path: Place) -> None:
-        """Copy an element; for a block that compares conditions by a design, ask how those of the copy differ."""
+        """Copy an element; if it compares conditions by a design, first ask how those of the copy differ."""
         opened = self.editing.writable
         if opened is None:
             return
@@ -218,8 +218,8 @@ class DesignerController(QObject):
             return
         numbers = number_rows(opened.study.document, path)
         if not numbers or opened.read_only:
-            why = opened.read_only or "This element does not have any numeric fields."
-            self.place.message.emit("This element cannot be copied as a series", why)
+            reason = opened.read_only or "This element does not have any numeric fields."
+            self.place.message.emit("This element cannot be copied as a series", reason)
             return
         self.editing.select(path)
         card = SeriesCard(opened.study, path, numbers)
@@ -227,17 +227,17 @@ class DesignerController(QObject):
         self.place.show_prompt(card, card.first)
 
     def make_repair(self, row: ProblemRow, sentence: str) -> None:
-        offered = self._repairs.find_repair(row, sentence)
-        if offered is None:
+        repair = self._repairs.find_repair(row, sentence)
+        if repair is None:
             return
         try:
-            self.editing.make_step(sentence, *offered.edits, select=row.element or None)
+            self.editing.make_step(sentence, *repair.edits, select=row.element or None)
         except Refused as refusal:
             self.place.message.emit("This correction cannot be applied", f"{refusal}.")
 
-    def _show_refusal(self, path: Place, sentence: str, asked: Request) -> None:
-        if isinstance(asked, RenameElement):
-            self._judge_id(path, asked.name)
+    def _show_refusal(self, path: Place, sentence: str, request: Request) -> None:
+        if isinstance(request, RenameElement):
+            self._check_id(path, request.name)
         else:
             self.place.form.refuse(path, sentence)
 
@@ -245,16 +245,16 @@ class DesignerController(QObject):
         if (opened := self.editing.writable) is not None:
             self.place.show_addable(addable_elements(opened.study, opened.selected))
 
-    def _judge_id(self, path: Place, name: str) -> None:
-        opened, why = self.editing.writable, ""
+    def _check_id(self, path: Place, name: str) -> None:
+        opened, sentence = self.editing.writable, ""
         if opened is None:
             return
         try:
             if name != str(path[-1]):
                 edits_to_rename(opened.study.document, path, name, self.editing.recorded(path))
         except Refused as refusal:
-            why = f"{refusal}."
-        self.place.form.head.refuse(why)
+            sentence = f"{refusal}."
+        self.place.form.head.refuse(sentence)
 
     def _show_step(self, step: Step) -> None:
         if step.fresh or step.announcement or step.removed:
@@ -283,36 +283,38 @@ class DesignerController(QObject):
         self._repairs.begin_search(study, () if opened.read_only else problems)
 
     def find_elements(self, text: str) -> None:
-        self._find = text
+        self._search_text = text
         self.show_outline()
 
     def show_outline(self) -> None:
         if self.editing.opened is None:
             return
         study = self.editing.opened.study
-        known = facts(study)
-        rows = outline_rows(study, known.steps_s, self._find, session_s=known.expected_s)
+        study_facts = facts(study)
+        rows = outline_rows(study, study_facts.steps_s, self._search_text, session_s=study_facts.expected_s)
         self.place.outline.show_outline(rows, self.editing.selected)
-        warned = known.warnings
-        if study.unfinished:  # what is new is shown when the entry is left
-            warned = tuple(warning for warning in warned if warning in self._warnings)
-        if warned != self._warnings:
-            self._warnings = warned
+        warnings = study_facts.warnings
+        if study.unfinished:  # new warnings are shown when the entry is finished
+            warnings = tuple(warning for warning in warnings if warning in self._warnings)
+        if warnings != self._warnings:
+            self._warnings = warnings
             self._show_header()
         self._show_warnings()
 
     def _show_warnings(self) -> None:
         if (opened := self.editing.opened) is not None:
-            warned = (*self._warnings, *self.measures.warnings)
-            self.place.problems.show_warnings(warning_rows(opened.study, warned))
+            warnings = (*self._warnings, *self.measures.warnings)
+            self.place.problems.show_warnings(warning_rows(opened.study, warnings))
 
     def _header_state(self) -> HeaderState:
         warnings = len({*self._warnings, *self.measures.warnings})
         opened = self.editing.opened
         if opened is not None:
             source = source_of(opened.file)
-            known = next((choice.title for choice in self._choices if choice.source == source), None)
-            if known != (opened.title or opened.file.stem):  # another title, or a file saved for the first time
+            listed_title = next((choice.title for choice in self._choices if choice.source == source), None)
+            if listed_title != (
+                opened.title or opened.file.stem
+            ):  # the title has changed, or the file was saved for the first time
                 self._choices = study_choices(opened)
         return header_state(opened, self._choices, warnings, self.runs.chip)
 

@@ -1,4 +1,4 @@
-"""The header (study, problems, draft, version, undo, redo, save), lines with what is said and asked, and *Play*."""
+"""The header (study, problems, draft, version, undo, redo, save), notices with their buttons, and *Play*."""
 
 from __future__ import annotations
 
@@ -36,20 +36,20 @@ from study_app.gui.widgets import (
 )
 from study_app.number_text import counted
 
-_MOST_PROBLEMS = 6
-_KEEP = (("keep", "Keep as pilot"), ("delete", "Delete"))
+_MAX_PROBLEMS = 6
+_KEEP_ACTIONS = (("keep", "Keep as pilot"), ("delete", "Delete"))
 _ROLES = {"play": "primary", "copy": "primary", "stop": "danger", "delete": "danger"}
 _ICONS = {"play": "play", "stop": "stop", "keep": "save", "delete": "trash"}
 
 
 @dataclass(frozen=True, slots=True)
 class Notice:
-    """A line with buttons: the action and text of each; ``listed`` are lines below it.
+    """A notice with buttons, each with its action and text; ``listed`` are the lines below it.
 
     With ``closes`` it needs no answer and can be closed.
     """
 
-    words: str
+    text: str
     actions: tuple[tuple[str, str], ...] = ()
     tone: Tone = "accent"
     icon: str = "info"
@@ -58,10 +58,10 @@ class Notice:
 
 
 class NoticeCard(Card):
-    """Draws a `Notice`; that of the study is tinted, and that of playing focuses its first button.
+    """Shows a `Notice`; a notice about the study is tinted, one about playing focuses its first button.
 
-    Signals: ``asked`` (the action of a button, "close" for the one that closes it), ``left`` before it is hidden while
-    focused.
+    Signals: ``asked`` (the action of a button, or "close"); ``left``, emitted before it is hidden while it has the
+    focus.
     """
 
     asked = Signal(str)
@@ -93,26 +93,26 @@ class NoticeCard(Card):
             remove_widget(part)
         self.buttons, self._lines = {}, []
         self.close_button.setVisible(notice is not None and notice.closes)
-        self.sentence.setText("" if notice is None else notice.words)
+        self.sentence.setText("" if notice is None else notice.text)
         if notice is None:
             return
-        self.setAccessibleDescription(notice.words)
-        announce(self, notice.words)
+        self.setAccessibleDescription(notice.text)
+        announce(self, notice.text)
         self.icon.show_icon(notice.icon, INKS[notice.tone])
         self._lines = [label(line, "label", "text2", wraps=True) for line in notice.listed]
         add_parts(self._listed, *self._lines)
         for action, text in notice.actions:
             icon, cap = _ICONS.get(action, "") if self._of_playing else "", key_cap("stop") if action == "stop" else ""
-            made = ActionButton(icon, text, cap=cap, role=_ROLES.get(action, ""), height=36)
-            made.clicked.connect(lambda _checked=False, action=action: self.asked.emit(action))
-            self._buttons.addWidget(made)
-            made.show()  # a hidden widget cannot take the focus
-            self.buttons[action] = made
+            button = ActionButton(icon, text, cap=cap, role=_ROLES.get(action, ""), height=36)
+            button.clicked.connect(lambda _checked=False, action=action: self.asked.emit(action))
+            self._buttons.addWidget(button)
+            button.show()  # a hidden widget cannot take the focus
+            self.buttons[action] = button
         if self._of_playing and self.buttons:
             next(iter(self.buttons.values())).setFocus()  # takes effect when the window is active again
 
     def close_by_key(self) -> bool:
-        """Close the notice if it can be closed; return whether it was."""
+        """Close the notice if possible; return whether it was closed."""
         closes = self.isVisible() and self.notice is not None and (self.notice.closes or "close" in self.buttons)
         if closes:
             self.asked.emit("close")
@@ -135,7 +135,7 @@ class NoticeCard(Card):
 
 @dataclass(frozen=True, slots=True)
 class PlayDevices:
-    """The devices for playing: name and label of each, and the chosen one."""
+    """The devices for playing: their names and labels, and the name of the chosen one."""
 
     choices: tuple[tuple[str, str], ...] = ()
     chosen: str = ""
@@ -154,10 +154,10 @@ def device_question(title: str, step: str, *, has_force: bool) -> Notice:
 
 def refusal_notice(problems: tuple[str, ...]) -> Notice:
     """Return the notice with the problems that prevent playing."""
-    more = (f"and {len(problems) - _MOST_PROBLEMS} more",) if len(problems) > _MOST_PROBLEMS else ()
+    more = (f"and {len(problems) - _MAX_PROBLEMS} more",) if len(problems) > _MAX_PROBLEMS else ()
     sentence = "The study cannot be played from here: correct these problems first"
     actions = (("problems", "Show problems"), ("close", "Close"))
-    return Notice(sentence, actions, "bad", "warning", (*problems[:_MOST_PROBLEMS], *more))
+    return Notice(sentence, actions, "bad", "warning", (*problems[:_MAX_PROBLEMS], *more))
 
 
 def playing_notice(step: str, title: str) -> Notice:
@@ -169,7 +169,10 @@ def playing_notice(step: str, title: str) -> Notice:
 def ended_notice(step: str, how: str) -> Notice:
     """Return the question whether to keep the data of a played pilot."""
     return Notice(
-        f"Played from {step}: {how}. The recorded data will be deleted unless you save them.", _KEEP, "neutral", "flag"
+        f"Played from {step}: {how}. The recorded data will be deleted unless you save them.",
+        _KEEP_ACTIONS,
+        "neutral",
+        "flag",
     )
 
 
@@ -182,7 +185,7 @@ PLAY, PLAY_NARROW = "Play from here", "Play"
 
 
 class _PlayControls(QWidget):
-    """Signals: ``asked``, ``device_chosen`` (name)."""
+    """The button that plays the study, and its device menu. Signals: ``asked``, ``device_chosen`` (name)."""
 
     asked = Signal()
     device_chosen = Signal(str)
@@ -226,15 +229,14 @@ _NO_VERSION: Final = VersionChip()
 class StudyChoice:
     """A study that can be opened."""
 
-    # what it is called, the name of its file, and what it is opened by
     title: str
-    file: str
-    source: str
+    file: str  # the name of its file
+    source: str  # the name or path by which it is opened
     shipped: bool = False  # whether it ships with the program
     original: str = ""  # the name of the study that it copies; "" if none is known
 
     @property
-    def words(self) -> str:
+    def label(self) -> str:
         origin = "shipped" if self.shipped else self.original and f"copy of {self.original}"
         return f"{self.title}  ·  {self.file}" + (f"  ({origin})" if origin else "")
 
@@ -243,16 +245,16 @@ class StudyChoice:
 class HeaderState:
     """The content of the header."""
 
-    studies: tuple[StudyChoice, ...] = ()  # what can be opened
+    studies: tuple[StudyChoice, ...] = ()  # the studies that can be opened
     chosen: str = ""  # the source of the open study; "" if none
-    problems: tuple[Tone, str, str] = ("ok", "check", "No problems")  # tone, icon and words of the chip
+    problems: tuple[Tone, str, str] = ("ok", "check", "No problems")  # tone, icon and text of the chip
     draft: str = ""  # the note on the draft, "" without one
-    # the names of the steps to undo and redo; "" without one
+    # the titles of the steps to undo and redo; "" without one
     undo: str = ""
     redo: str = ""
-    can_save: bool = False  # whether the file differs and may be written
+    can_save: bool = False  # whether the study differs from its file, which can be written
     read_only: bool = False  # whether the study cannot be changed
-    version: VersionChip = _NO_VERSION  # the chip of the version, and what the button that saves says
+    version: VersionChip = _NO_VERSION  # the version chip, and the text of the save button
 
 
 @dataclass(frozen=True, slots=True)
@@ -279,24 +281,24 @@ class _StudyList(KeysOpenList):
     """The studies that can be opened."""
 
     def add_study(self, study: StudyChoice, *, opened: bool) -> None:
-        self.addItem(study.words, study.source)
+        self.addItem(study.label, study.source)
         if opened:
-            self.setItemData(self.count() - 1, f"{study.words}, open", Qt.ItemDataRole.AccessibleTextRole)
+            self.setItemData(self.count() - 1, f"{study.label}, open", Qt.ItemDataRole.AccessibleTextRole)
 
 
 NEW, OPEN = "\0new", "\0open"
-_WIDE_FROM = 1180
-NAME_MOST_PX, NAME_EDGES_PX = 300, 60
+_WIDE_MIN_PX = 1180
+NAME_MAX_PX, NAME_EDGES_PX = 300, 60
 WIDEST_PROBLEMS, WIDEST_DRAFT, WIDEST_VERSION = "88 problems", "Draft kept 88:88", "1.8, was 1.8"
-"""What there is room for in each chip, so that nothing moves where it says other words."""
+"""The widest text of each chip, for which there is always room, so that other texts do not move the header."""
 
 
 class _ChipButton(Themed, PressedByEnter):
-    """A chip that can be pressed; ``does`` describes the effect."""
+    """A chip that can be pressed; ``effect`` describes what that does."""
 
-    def __init__(self, does: str) -> None:
+    def __init__(self, effect: str) -> None:
         super().__init__()
-        self._does = does
+        self._effect = effect
         self.setProperty("role", "plain")
         self.setProperty("dense", "true")
         self._state: tuple[Tone, str, str] = ("ok", "check", "")
@@ -305,18 +307,18 @@ class _ChipButton(Themed, PressedByEnter):
 
     def show_state(self, tone: Tone, icon: str, text: str) -> None:
         self._state = (tone, icon, text)
-        self.setAccessibleName(f"{text}: {self._does}")
+        self.setAccessibleName(f"{text}: {self._effect}")
         self.updateGeometry()
         self.update()
 
     def sizeHint(self) -> QSize:
-        return QSize(chip_size(self.words, small=False).width(), 32)
+        return QSize(chip_size(self.chip_text, small=False).width(), 32)
 
     def minimumSizeHint(self) -> QSize:
         return self.sizeHint()
 
     @property
-    def words(self) -> str:
+    def chip_text(self) -> str:
         return self._state[2]
 
     def paintEvent(self, _event: QPaintEvent) -> None:
@@ -366,7 +368,7 @@ class DesignerHeader(QWidget):
         self._row = hbox(spacing=10, margins=(SHADOW, 0, SHADOW, 0))
         vbox(self._row, self.strip, margins=0, parent=self)
         self.title = label("Study designer", "title")
-        self.title.setContentsMargins(0, 0, 6, 0)  # room that goes with it where it is hidden
+        self.title.setContentsMargins(0, 0, 6, 0)  # a margin that is hidden together with the title
         left = self.title, self.study, self.problems, self.draft, self.version
         add_parts(self._row, *left, STRETCH, self.keys, self.undo, self.redo, self.play, self.save)
         self.study.activated.connect(self._choose_study)
@@ -388,40 +390,40 @@ class DesignerHeader(QWidget):
             part.setVisible(is_open)
         self.problems.show_state(*state.problems)
         self.draft.show_state("neutral", "save", state.draft)
-        self.version.show_state(state.version.tone, state.version.icon, state.version.words)
+        self.version.show_state(state.version.tone, state.version.icon, state.version.text)
         self.version.setToolTip(state.version.tip)
-        for button, action, what in ((self.undo, "undo", state.undo), (self.redo, "redo", state.redo)):
-            text = ": ".join(filter(None, (action.capitalize(), what)))
-            self._set_enabled(button, on=bool(what) and not state.read_only)
+        for button, action, step_title in ((self.undo, "undo", state.undo), (self.redo, "redo", state.redo)):
+            text = ": ".join(filter(None, (action.capitalize(), step_title)))
+            self._set_enabled(button, on=bool(step_title) and not state.read_only)
             button.setAccessibleName(text)
             button.setToolTip(with_key(text, action))
         self.save.show_action("save", state.version.save)
         self._set_enabled(self.save, on=state.can_save)
-        self._make_room()
+        self._fit_parts()
 
     def _set_enabled(self, button: QWidget, *, on: bool) -> None:
-        """Enable or disable a button without moving the keyboard focus, as Qt would."""
+        """Enable or disable a button; Qt would move the focus from a disabled button to the next widget."""
         if not on and self.window().focusWidget() is button:
             self.keyboard_left.emit()
         button.setEnabled(on)
 
-    def _make_room(self) -> None:
+    def _fit_parts(self) -> None:
         """Hide the title, then the version, if the name of the study is too long; the draft is always shown."""
         state = self.state
-        named = min(NAME_MOST_PX, self.study.fontMetrics().horizontalAdvance(self.study.currentText()) + NAME_EDGES_PX)
-        more = max(0, named - self.study.minimumWidth())
+        name_px = min(NAME_MAX_PX, self.study.fontMetrics().horizontalAdvance(self.study.currentText()) + NAME_EDGES_PX)
+        missing_px = max(0, name_px - self.study.minimumWidth())
         widest = ((self.problems, WIDEST_PROBLEMS), (self.draft, WIDEST_DRAFT), (self.version, WIDEST_VERSION))
         for chip, text in widest:
             chip.setMinimumWidth(chip_size(text, small=False).width())
         self.title.show()
         self.draft.setVisible(bool(state.chosen and state.draft))
-        self.version.setVisible(bool(state.chosen and state.version.words))
+        self.version.setVisible(bool(state.chosen and state.version.text))
         for part in (self.title, self.version):
             self._row.invalidate()
-            part.setVisible(part.isVisibleTo(self) and self._row.minimumSize().width() + more <= self.width())
+            part.setVisible(part.isVisibleTo(self) and self._row.minimumSize().width() + missing_px <= self.width())
 
     def _announce_changes(self, before: HeaderState, state: HeaderState) -> None:
-        """Announce changes that happen by themselves once: problems, and a stored draft."""
+        """Announce changes that the user did not request: other problems, and a stored draft."""
         if not state.chosen or state.chosen != before.chosen:
             return
         if state.problems != before.problems:
@@ -434,8 +436,8 @@ class DesignerHeader(QWidget):
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
-        self.play.play.show_action("play", PLAY if self.width() >= _WIDE_FROM else PLAY_NARROW)
-        self._make_room()
+        self.play.play.show_action("play", PLAY if self.width() >= _WIDE_MIN_PX else PLAY_NARROW)
+        self._fit_parts()
 
     def _choose_study(self, at: int) -> None:
         source = self.study.itemData(at)

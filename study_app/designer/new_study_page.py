@@ -1,4 +1,4 @@
-"""A new study: what it can begin as at the left, the chosen one with its questions at the right; and known studies."""
+"""The page of new studies: templates and studies to copy, with a card of the chosen one; and the list of studies."""
 
 import json
 import math
@@ -90,14 +90,14 @@ from study_app.protocol.wording import LANGUAGES, languages_of
 from study_app.store.versions import draft_of, drafted_files, kept_original, unsaved_files
 from study_app.workspace import workspace
 
-FILE: Final = FOLDER / "known_answers.json"
+KNOWN_ANSWERS_FILE: Final = FOLDER / "known_answers.json"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class KnownAnswer:
-    """A planted threshold (mean of ``people``), and the estimates of simulated studies, in ``unit``.
+    """The true threshold of simulated studies (mean of ``people`` observers), and their estimates, in ``unit``.
 
-    ``found`` is the mean of the studies' thresholds, ``low`` and ``high`` are the ends of the middle 90 % of them.
+    ``found`` is the mean of the estimates; ``low`` and ``high`` are the ends of their central 90 %.
     """
 
     planted: float
@@ -110,7 +110,7 @@ class KnownAnswer:
 
     @property
     def recovered(self) -> bool:
-        """Whether the mean is within 10 % of the planted threshold, which is among the middle 90 %."""
+        """Whether the mean estimate is within 10 % of the true threshold, and the central 90 % contain that."""
         return abs(self.found / self.planted - 1) <= 0.1 and self.low <= self.planted <= self.high
 
     @property
@@ -129,8 +129,8 @@ class KnownAnswer:
 
 @cache
 def known_answers() -> dict[str, KnownAnswer]:
-    """Return the known answers of templates, which were computed when the templates were made."""
-    answers: dict[str, Any] = json.loads(FILE.read_text(encoding="utf-8"))
+    """Return the known answers by template, as computed when the templates were made."""
+    answers: dict[str, Any] = json.loads(KNOWN_ANSWERS_FILE.read_text(encoding="utf-8"))
     return {name: KnownAnswer(**values) for name, values in answers.items()}
 
 
@@ -160,22 +160,22 @@ TEMPLATES: Final[Mapping[str, tuple[str, str]]] = {
     "questionnaire-only": ("Questionnaire only", "Questions of every type, before, during and after a single trial."),
     "empty": ("Empty study", "One liquid, one block, a welcome page and a thank-you page; ready to run."),
 }
-"""Title and question of each template, in the order in which they are shown."""
+"""Title and question of each template, in the order of the page."""
 
 
-_SHIPPED: Final = "shipped study"
-_PLANNED: Final = " planned"
-"""Follows a number of participants; a picture of people says the same."""
+_SHIPPED_NOTE: Final = "shipped study"
+_PLANNED_SUFFIX: Final = " planned"
+"""Suffix of the number of participants; in the card, an icon of people replaces it."""
 _STEPS: Final = ("pages", "blocks", "questionnaires")
 """Sections whose tables are steps of a session."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class OwnQuestion:
-    """A question of a template: its key, text, unit, permitted values, and the template's value."""
+class TemplateQuestion:
+    """A question of a template: path of the value, text, unit, permitted values, and the template's value."""
 
     path: Place
-    words: str
+    text: str
     unit: str
     bounds: str
     value: str
@@ -186,23 +186,23 @@ class OwnQuestion:
 class TemplateChoice:
     """A possible starting point for a new study."""
 
-    source: str  # what it is opened by
+    source: str  # the name or path by which it is opened
     title: str
     description: str
-    copy: bool = False  # whether it is another study
-    note: str = ""  # of a copy: where the study is from
-    figures: tuple[tuple[str, str], ...] = ()  # icon and words of its length, people and trials
-    tags: tuple[tuple[str, str], ...] = ()  # icon and words of what it needs
-    session: tuple[tuple[str, str, str], ...] = ()  # icon, title and time of each step
+    copy: bool = False  # whether it is a study to copy
+    note: str = ""  # the origin of a study to copy
+    figures: tuple[tuple[str, str], ...] = ()  # icon and text of duration, participants and trials
+    tags: tuple[tuple[str, str], ...] = ()  # icon and text of force and blinding
+    session: tuple[tuple[str, str, str], ...] = ()  # icon, title and duration of each step
     recovery: KnownAnswer | None = None
-    name: str = ""  # short name that a copy gets where none is given
-    study_title: str = ""  # title that it gets where none is given
+    name: str = ""  # default short name of a copy
+    study_title: str = ""  # default title
     languages: tuple[str, ...] = ()
-    questions: tuple[OwnQuestion, ...] = ()  # beyond title, name and languages
+    questions: tuple[TemplateQuestion, ...] = ()  # beyond title, name and languages
 
 
-def _languages_offered() -> tuple[tuple[str, str], ...]:
-    """Return code and name of each language of the participant's pages."""
+def _available_languages() -> tuple[tuple[str, str], ...]:
+    """Return code and name of each language that the participant's pages support."""
     return tuple((code, language.english_name) for code, language in LANGUAGES.items())
 
 
@@ -213,7 +213,7 @@ def template_choice(name: str, study: Study) -> TemplateChoice:
     protocol = study.protocol
     choice = TemplateChoice(
         source=f"template:{name}", title=shown, description=question, recovery=known_answers().get(name),
-        study_title=title, languages=languages_of(study.document), questions=tuple(_own_questions(name, study)),
+        study_title=title, languages=languages_of(study.document), questions=tuple(_template_questions(name, study)),
     )  # fmt: skip
     if protocol is None:
         return choice
@@ -253,11 +253,11 @@ def _figure_texts(protocol: Protocol) -> Iterator[tuple[str, str]]:
     yield "clock", duration(expected_duration_s(protocol))
     people = None if protocol.analysis is None else protocol.analysis.participants
     if people is not None:
-        yield "people", f"{people}{_PLANNED}"
+        yield "people", f"{people}{_PLANNED_SUFFIX}"
     yield "layers", counted(trials, "trial")
 
 
-def _own_questions(name: str, study: Study) -> Iterator[OwnQuestion]:
+def _template_questions(name: str, study: Study) -> Iterator[TemplateQuestion]:
     for question, path in QUESTIONS.get(name, ()):
         row = row_at(study.document, path)
         if row is not None:
@@ -266,13 +266,13 @@ def _own_questions(name: str, study: Study) -> Iterator[OwnQuestion]:
             parts = current if isinstance(current, tuple) else (current,)
             value = ", ".join(f"{part:g}" for part in parts if isinstance(part, int | float))
             unit = row.unit or _unit_of(study, path)
-            yield OwnQuestion(
-                path=path, words=question, unit=unit, bounds=", ".join(row.bounds), value=value, several=several
+            yield TemplateQuestion(
+                path=path, text=question, unit=unit, bounds=", ".join(row.bounds), value=value, several=several
             )
 
 
 def _unit_of(study: Study, path: Place) -> str:
-    """Return the unit of a stimulus' numbers, that of the varied key; "" for other numbers."""
+    """Return the unit of a stimulus' numbers, which is that of the varied quantity; "" for other numbers."""
     varied = study.document.get(path[0], {}).get(path[1], {}).get("vary") if path[0] == "stimuli" else None
     return unit_of(varied) if isinstance(varied, str) else ""
 
@@ -282,27 +282,31 @@ def study_choices(opened: Document | None) -> tuple[StudyChoice, ...]:
 
     They are sorted by title; shipped studies come last.
     """
-    known = dict.fromkeys([*map(str, unsaved_files(workspace().protocols)), *known_sources()])
-    own = "" if opened is None else source_of(opened.file)
+    sources = dict.fromkeys([*map(str, unsaved_files(workspace().protocols)), *known_sources()])
+    own_source = "" if opened is None else source_of(opened.file)
     if opened is not None:
-        known[own] = None
+        sources[own_source] = None
     drafted = {file.resolve() for file in drafted_files()}
     choices = []
-    for source in known:
+    for source in sources:
         file = _resolved_file(source)
         if Path(source).suffix == ".toml" and Path(source).exists() and holds_liquids_alone(source):
             continue
-        title = _listed_title(file, drafted=file in drafted) if opened is None or source != own else opened.title
+        title = (
+            _current_title(file, drafted=file in drafted) if opened is None or source != own_source else opened.title
+        )
         stem = Path(source).stem
-        ships, original = is_shipped(source), "" if file is None else kept_original(file)
+        is_shipped_study, original = is_shipped(source), "" if file is None else kept_original(file)
         choices.append(
-            StudyChoice(title=title or stem, file=f"{stem}.toml", source=source, shipped=ships, original=original)
+            StudyChoice(
+                title=title or stem, file=f"{stem}.toml", source=source, shipped=is_shipped_study, original=original
+            )
         )
     return tuple(sorted(choices, key=lambda choice: (choice.shipped, choice.title.casefold(), choice.source)))
 
 
-def _listed_title(file: Path | None, *, drafted: bool) -> str:
-    """Return the title of a study, or of its draft; "" if it has none or cannot be read."""
+def _current_title(file: Path | None, *, drafted: bool) -> str:
+    """Return the title of a study, or of its draft if there is one; "" without a title, or if it cannot be read."""
     if file is not None and drafted and (draft := draft_of(file)) is not None:
         return study_title(read_study(draft.text.encode(), file.parent).document)
     try:
@@ -324,7 +328,7 @@ def _title_of_file(file: Path, _changed_ns: int, _size: int) -> str:
 def header_state(
     opened: Document | None, choices: tuple[StudyChoice, ...], warnings: int, version: VersionChip
 ) -> HeaderState:
-    """Return the header's state for the open study with this number of ``warnings``."""
+    """Return the state of the header for the open study, if any; ``warnings`` is their number."""
     if opened is None:
         return HeaderState(studies=choices)
     draft = "Saved" if not opened.edited and opened.base else "Not saved yet"
@@ -344,9 +348,9 @@ def header_state(
 
 
 def source_of(file: Path) -> str:
-    """Return the name by which a study's file can be opened, else its path."""
-    found_file = _protocol_file(file.stem)
-    return file.stem if found_file is not None and found_file.resolve() == file.resolve() else str(file)
+    """Return the name by which a study's file can be opened, or its path if it has none."""
+    named_file = _protocol_file(file.stem)
+    return file.stem if named_file is not None and named_file.resolve() == file.resolve() else str(file)
 
 
 def new_choices(source: str = "") -> tuple[TemplateChoice, ...]:
@@ -354,16 +358,16 @@ def new_choices(source: str = "") -> tuple[TemplateChoice, ...]:
 
     Raises StudyError if the study ``source`` cannot be read.
     """
-    in_order = [name for name in TEMPLATES if name in templates()]
-    choices = [_template_choice(name) for name in dict.fromkeys((*in_order, *templates()))]
-    taken = taken_names()
+    listed = [name for name in TEMPLATES if name in templates()]
+    choices = [_template_choice(name) for name in dict.fromkeys((*listed, *templates()))]
+    used_names = taken_names()
     copied = dict.fromkeys([source, *shipped()] if source and not source.startswith("template:") else shipped())
     for name in copied:
         file = shipped().get(name) or protocol_file(name)
-        note = _SHIPPED if name in shipped() else str(file.name)
+        note = _SHIPPED_NOTE if name in shipped() else str(file.name)
         document, _places = read_document(file.read_bytes(), name)
         stem = re.sub(f"{_COPY}[0-9]*$", "", short_name_of(file.stem)) or "study"
-        free = free_short_name(taken, f"{stem[: MAX_SHORT_NAME - len(_COPY)]}{_COPY}")
+        free = free_short_name(used_names, f"{stem[: MAX_SHORT_NAME - len(_COPY)]}{_COPY}")
         choices.append(_copy_choice(name, document, note, free))
     return tuple(choices)
 
@@ -385,11 +389,11 @@ def _protocol_file(source: str) -> Path | None:
         return None
 
 
-_DEEP: Final = "#142E40"
+_DEEP_WATER: Final = "#142E40"
 
 
 def _paint_picture(painter: QPainter, name: str, body: QRectF) -> None:
-    """Paint the picture of a template into the upper part of its card: the participant's task."""
+    """Paint the picture of a template, which shows the participant's task, into the upper part of its card."""
     ground = QPainterPath()
     ground.addRoundedRect(body.adjusted(0, 0, 0, RADIUS_CARD), RADIUS_CARD, RADIUS_CARD)
     painter.save()
@@ -399,7 +403,7 @@ def _paint_picture(painter: QPainter, name: str, body: QRectF) -> None:
     else:
         water = QLinearGradient(body.topLeft(), body.bottomLeft())
         water.setColorAt(0, QColor(TANK.water_light))
-        water.setColorAt(1, QColor(_DEEP))
+        water.setColorAt(1, QColor(_DEEP_WATER))
         painter.fillPath(ground, water)
         glass = QColor(TANK.glass)
         glass.setAlpha(70)
@@ -416,8 +420,8 @@ def _paint_picture(painter: QPainter, name: str, body: QRectF) -> None:
 
 
 PICTURE_PX, CARD_WORDS_PX, COPY_PX = 150, 132, 76
-_RING = 4
-"""The room around a card for the ring [px]."""
+_RING_PX = 4
+"""Margin of a card, for the focus ring [px]."""
 
 
 class Picture(QWidget):
@@ -435,7 +439,7 @@ class Picture(QWidget):
 class _TemplateButton(Themed, QAbstractButton):
     """A starting point for a study: its picture or icon, title, description and figures.
 
-    ``focused`` is emitted when it gets the focus, with whether this was by a click.
+    ``focused`` is emitted when it gets the focus, and carries whether a click caused that.
     """
 
     focused = Signal(bool)
@@ -451,62 +455,64 @@ class _TemplateButton(Themed, QAbstractButton):
         self.setCursor(Qt.CursorShape.PointingHandCursor)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
-        self.setFixedHeight(2 * _RING + (COPY_PX if choice.copy else PICTURE_PX + CARD_WORDS_PX))
+        self.setFixedHeight(2 * _RING_PX + (COPY_PX if choice.copy else PICTURE_PX + CARD_WORDS_PX))
         picture = choice.source.removeprefix("template:")
         self._empty = not choice.copy and not FOLDER.joinpath(f"{picture}.svg").exists()
         if choice.copy:
             self._lay_out_copy()
         else:
             above = Picture(picture) if not self._empty else Icon("plus", "text", 24)
-            described = label(choice.description, "label", "text2", wraps=True)
+            description_label = label(choice.description, "label", "text2", wraps=True)
             title, aligned = cut_text(choice.title, "strong", "text"), Qt.AlignmentFlag.AlignHCenter
             if self._empty:
-                described.setAlignment(aligned)
+                description_label.setAlignment(aligned)
                 title.setAlignment(aligned)
             counts = hbox(
                 *(part for figure in choice.figures for part in self._figure_parts(*figure)), STRETCH, spacing=6
             )
-            below = vbox(title, described, STRETCH, counts, spacing=4, margins=(16, 10, 16, 10))
+            below = vbox(title, description_label, STRETCH, counts, spacing=4, margins=(16, 10, 16, 10))
             picture_row = (hbox(STRETCH, above, STRETCH, margins=(0, 70, 0, 8)),) if self._empty else (above,)
-            vbox(*picture_row, (below, 1), spacing=0, margins=_RING + 1, parent=self)
+            vbox(*picture_row, (below, 1), spacing=0, margins=_RING_PX + 1, parent=self)
         for part in self.findChildren(QWidget):
             part.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
 
     @staticmethod
-    def _figure_parts(icon: str, spoken: str) -> tuple[QWidget | int, ...]:
-        return Icon(icon, "text2", 16), label(spoken.removesuffix(_PLANNED), "small", "text2", weight=500), 8
+    def _figure_parts(icon: str, text: str) -> tuple[QWidget | int, ...]:
+        return Icon(icon, "text2", 16), label(text.removesuffix(_PLANNED_SUFFIX), "small", "text2", weight=500), 8
 
     def _lay_out_copy(self) -> None:
-        sign = Icon("lock" if self.choice.note == _SHIPPED else "layers", "text2", 18)
+        note_icon = Icon("lock" if self.choice.note == _SHIPPED_NOTE else "layers", "text2", 18)
         title = Clamped(self.choice.title, 2, "label", steady=False)
         texts = vbox(STRETCH, title, cut_text(self.choice.note), STRETCH, spacing=0)
-        hbox(sign, (texts, 1), spacing=14, margins=(_RING + 22, _RING, _RING + 12, _RING), parent=self)
+        hbox(note_icon, (texts, 1), spacing=14, margins=(_RING_PX + 22, _RING_PX, _RING_PX + 12, _RING_PX), parent=self)
 
     def focusInEvent(self, event: QFocusEvent) -> None:
         super().focusInEvent(event)
         self.focused.emit(event.reason() == Qt.FocusReason.MouseFocusReason)
 
     def paintEvent(self, _event: QPaintEvent) -> None:
-        t, painter = self.theme, smooth_painter(self)
+        theme, painter = self.theme, smooth_painter(self)
         if self.hasFocus():
-            painter.setPen(QPen(QColor(t.accent), 2))
+            painter.setPen(QPen(QColor(theme.accent), 2))
             painter.drawRoundedRect(
-                QRectF(self.rect()).adjusted(1, 1, -1, -1), RADIUS_CARD + _RING, RADIUS_CARD + _RING
+                QRectF(self.rect()).adjusted(1, 1, -1, -1), RADIUS_CARD + _RING_PX, RADIUS_CARD + _RING_PX
             )
-        body = QRectF(self.rect()).adjusted(_RING + 1, _RING + 1, -_RING - 1, -_RING - 1)
-        marked, empty = self.isChecked(), self._empty
-        fill_rounded(painter, body, RADIUS_CARD, t.hover if self.underMouse() or (empty and not marked) else t.surface)
-        style = Qt.PenStyle.DashLine if empty and not marked else Qt.PenStyle.SolidLine
-        edge = t.accent if marked else t.ctl if empty else t.border
-        painter.setPen(QPen(QColor(edge), 2 if marked else 1, style))
+        body = QRectF(self.rect()).adjusted(_RING_PX + 1, _RING_PX + 1, -_RING_PX - 1, -_RING_PX - 1)
+        is_chosen, empty = self.isChecked(), self._empty
+        fill_rounded(
+            painter, body, RADIUS_CARD, theme.hover if self.underMouse() or (empty and not is_chosen) else theme.surface
+        )
+        style = Qt.PenStyle.DashLine if empty and not is_chosen else Qt.PenStyle.SolidLine
+        edge_colour = theme.accent if is_chosen else theme.ctl if empty else theme.border
+        painter.setPen(QPen(QColor(edge_colour), 2 if is_chosen else 1, style))
         painter.drawRoundedRect(body, RADIUS_CARD, RADIUS_CARD)
 
 
-_TICKS = 4
+_TICK_COUNT = 4
 
 
 class _RecoveryBar(Themed, QWidget):
-    """An axis from 0 with a bar for the middle 90 % of the estimates, and a line at the planted value."""
+    """An axis from 0 with a bar for the central 90 % of the estimates, and a line at the true value."""
 
     def __init__(self, shown: KnownAnswer) -> None:
         super().__init__()
@@ -516,27 +522,27 @@ class _RecoveryBar(Themed, QWidget):
         self.setAccessibleDescription(shown.sentence)
 
     def paintEvent(self, _event: QPaintEvent) -> None:
-        t, painter, shown = self.theme, smooth_painter(self), self.shown
-        left, wide = 12.0, self.width() - 44.0
+        theme, painter, answer = self.theme, smooth_painter(self), self.shown
+        left, width_px = 12.0, self.width() - 44.0
 
-        def place(value: float) -> float:
-            return left + wide * value / shown.most
+        def x_of(value: float) -> float:
+            return left + width_px * value / answer.most
 
-        painter.setPen(QPen(QColor(t.border), 1))
-        painter.drawLine(QPointF(left, 28), QPointF(left + wide, 28))
+        painter.setPen(QPen(QColor(theme.border), 1))
+        painter.drawLine(QPointF(left, 28), QPointF(left + width_px, 28))
         painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(QColor(t.accent))
+        painter.setBrush(QColor(theme.accent))
         painter.setOpacity(0.45)
-        painter.drawRoundedRect(QRectF(place(shown.low), 9, max(4.0, place(shown.high) - place(shown.low)), 12), 6, 6)
+        painter.drawRoundedRect(QRectF(x_of(answer.low), 9, max(4.0, x_of(answer.high) - x_of(answer.low)), 12), 6, 6)
         painter.setOpacity(1)
-        painter.setPen(QPen(QColor(t.text), 2, Qt.PenStyle.DashLine))
-        painter.drawLine(QPointF(place(shown.planted), 3), QPointF(place(shown.planted), 28))
+        painter.setPen(QPen(QColor(theme.text), 2, Qt.PenStyle.DashLine))
+        painter.drawLine(QPointF(x_of(answer.planted), 3), QPointF(x_of(answer.planted), 28))
         painter.setFont(font("small", tabular=True))
-        painter.setPen(QColor(t.text2))
-        for tick in range(_TICKS + 1):
-            value = shown.most * tick / _TICKS
-            label = f"{value:g} {shown.unit}" if tick == _TICKS else f"{value:g}"
-            painter.drawText(QRectF(place(value) - 30, 30, 60, 16), Qt.AlignmentFlag.AlignCenter, label)
+        painter.setPen(QColor(theme.text2))
+        for tick in range(_TICK_COUNT + 1):
+            value = answer.most * tick / _TICK_COUNT
+            label = f"{value:g} {answer.unit}" if tick == _TICK_COUNT else f"{value:g}"
+            painter.drawText(QRectF(x_of(value) - 30, 30, 60, 16), Qt.AlignmentFlag.AlignCenter, label)
 
 
 FIELD_PX, WORDS_PX = 36, 112
@@ -544,7 +550,7 @@ _NAME_HINT: Final = "lowercase letters and digits"
 
 
 class Questions(Themed, QWidget):
-    """Fields for the answers; ``entered`` is emitted when Enter is pressed in one."""
+    """Fields for the settings of a new study; ``entered`` is emitted at Enter."""
 
     entered = Signal()
 
@@ -555,39 +561,39 @@ class Questions(Themed, QWidget):
         self._show_proposed_name()
         self.title.textChanged.connect(self._show_proposed_name)
         self.languages: dict[str, Check] = {}
-        self.own: dict[OwnQuestion, QLineEdit] = {}
+        self.template_fields: dict[TemplateQuestion, QLineEdit] = {}
         self._grid = grid_of(8, 8, margins=0, parent=self)
         self._grid.setColumnStretch(1, 1)
         self._grid.addWidget(label("Title", "label"), 0, 0, 1, 2)
-        self._grid.addWidget(self.title, 1, 0, 1, 2)  # a title is long
+        self._grid.addWidget(self.title, 1, 0, 1, 2)  # the whole width, since titles are long
         self._add_field(2, "Short name", self.name)
-        box = QWidget()
-        checks = grid_of(2, 2, margins=0, parent=box)
-        for at, (code, name) in enumerate(_languages_offered()):
-            made = Check(name)
-            made.setFont(font("label", weight=400))
-            made.setAccessibleName(f"Language {name}")
-            made.toggled.connect(self._show_first_texts)
-            self.languages[code] = made
-            checks.addWidget(made, at // 2, at % 2)
+        languages_box = QWidget()
+        checks = grid_of(2, 2, margins=0, parent=languages_box)
+        for at, (code, name) in enumerate(_available_languages()):
+            check = Check(name)
+            check.setFont(font("label", weight=400))
+            check.setAccessibleName(f"Language {name}")
+            check.toggled.connect(self._show_first_texts)
+            self.languages[code] = check
+            checks.addWidget(check, at // 2, at % 2)
         self.first_texts = label("", "label", "text2", wraps=True)
         checks.addWidget(self.first_texts, checks.rowCount(), 0, 1, 2)
         self._show_first_texts()
         self._grid.addWidget(label("Languages", "label"), 3, 0, 1, 2)
-        self._grid.addWidget(box, 4, 0, 1, 2)
-        self._own: list[QWidget] = []
+        self._grid.addWidget(languages_box, 4, 0, 1, 2)
+        self._question_widgets: list[QWidget] = []
 
     def _make_field(self, name: str) -> QLineEdit:
-        made = make_dense(QLineEdit(), name, FIELD_PX)
-        made.returnPressed.connect(self.entered)
-        return made
+        field = make_dense(QLineEdit(), name, FIELD_PX)
+        field.returnPressed.connect(self.entered)
+        return field
 
     def _add_field(self, row: int, title: str, field: QWidget) -> QWidget:
-        shown = label(title, "label", wraps=True)
-        shown.setFixedWidth(WORDS_PX)
-        self._grid.addWidget(shown, row, 0)
+        title_label = label(title, "label", wraps=True)
+        title_label.setFixedWidth(WORDS_PX)
+        self._grid.addWidget(title_label, row, 0)
         self._grid.addWidget(field, row, 1)
-        return shown
+        return title_label
 
     def clear(self) -> None:
         self._choice = None
@@ -595,7 +601,7 @@ class Questions(Themed, QWidget):
         self.name.clear()
 
     def show_choice(self, choice: TemplateChoice) -> None:
-        """Show the questions of a template or copy; a typed name is kept."""
+        """Show the questions of a template or of a study to copy; a typed title and name are kept."""
         before, self._choice = self._choice, choice
         if before is not None and before.source == choice.source:
             return
@@ -603,70 +609,70 @@ class Questions(Themed, QWidget):
         self._show_proposed_name()
         for code, check in self.languages.items():
             check.setChecked(code in choice.languages)
-        for part in self._own:
+        for part in self._question_widgets:
             remove_widget(part)
-        self._own, self.own = [], {}
+        self._question_widgets, self.template_fields = [], {}
         for row, question in enumerate(choice.questions, start=5):
-            field = self._make_field(question.words)
+            field = self._make_field(question.text)
             field.setText(question.value)
             field.setToolTip(question.bounds)
             field.setAccessibleDescription(question.bounds)
-            beside = QWidget()
-            across = hbox((field, 1), spacing=8, margins=0, parent=beside)
+            field_box = QWidget()
+            across = hbox((field, 1), spacing=8, margins=0, parent=field_box)
             if question.unit:
                 across.addWidget(label(question.unit, "label", "text2"))
-            self._own += [self._add_field(row, question.words, beside), beside]
-            self.own[question] = field
-            name_scroll_bars(beside)
+            self._question_widgets += [self._add_field(row, question.text, field_box), field_box]
+            self.template_fields[question] = field
+            name_scroll_bars(field_box)
 
     def _show_proposed_name(self) -> None:
         self.name.setPlaceholderText(self._proposed or _NAME_HINT)
 
     def _show_first_texts(self) -> None:
-        """Show the language of the template's texts if none of the template's languages is chosen."""
+        """Show in which language the texts still are if none of the template's languages is chosen."""
         languages = () if self._choice is None else self._choice.languages
         chosen = [code for code, check in self.languages.items() if check.isChecked()]
-        without = bool(languages and chosen) and set(languages).isdisjoint(chosen)
-        if without:
+        untranslated = bool(languages and chosen) and set(languages).isdisjoint(chosen)
+        if untranslated:
             self.first_texts.setText(
-                f"The texts are still in {dict(_languages_offered())[languages[0]]}: please translate them."
+                f"The texts are still in {dict(_available_languages())[languages[0]]}: please translate them."
             )
-        self.first_texts.setVisible(without)
+        self.first_texts.setVisible(untranslated)
 
     @property
     def _proposed(self) -> str:
         return short_name_of(self.title.text()) or ("" if self._choice is None else self._choice.name)
 
     def short_name(self) -> str:
-        """Return the typed short name, else one made from the title, else that of the copied study."""
+        """Return the typed short name, or one made from the title, or the default one."""
         return self.name.text().strip() or self._proposed
 
     def answers(self) -> Answers | str:
-        """Return the answers, or a sentence about an invalid one."""
+        """Return the answers, or a sentence on an invalid one."""
         chosen = tuple(code for code, check in self.languages.items() if check.isChecked())
         if not chosen:
             return "choose at least one language"
         values: list[tuple[Any, Any]] = []
-        for question, field in self.own.items():
+        for question, field in self.template_fields.items():
             text = field.text().strip()
             if not text or text == question.value:
                 continue
             if not question.several:
                 number = number_of(text)
                 if number is None:
-                    return f"{question.words}: {unclear_number(text)}"
+                    return f"{question.text}: {unclear_number(text)}"
                 values.append((question.path, number))
                 continue
             try:
                 values.append((question.path, [number for _, number in typed_numbers(text)]))
             except ValueError as unclear:
-                return f"{question.words}: {unclear}"
+                return f"{question.text}: {unclear}"
         return Answers(self.title.text().strip(), chosen, tuple(values))
 
 
-SIDE_PX, SIDE_NARROW_PX, NARROW_BELOW = 400, 330, 1200
-_LOW_BELOW = 880
-ACROSS, COPIES_ACROSS = 3, 4
+CARD_PX, NARROW_CARD_PX, NARROW_BELOW = 400, 330, 1200
+_LOW_CARD_PX = 880
+TEMPLATE_COLUMNS, COPY_COLUMNS = 3, 4
 
 
 class NoStudyCard(Card):
@@ -688,7 +694,7 @@ class NoStudyCard(Card):
 
 
 class _ChosenCard(Card):
-    """The chosen template: description, session, known answer and questions."""
+    """The card of the chosen template: description, session, known answer and questions."""
 
     def __init__(self) -> None:
         super().__init__(padding=20, gap=10)
@@ -712,8 +718,8 @@ class _ChosenCard(Card):
         before = (self.about, self.details)
         self.about, self.details = QWidget(), QWidget()
         tags = (Chip("neutral", icon, text, small=True) for icon, text in choice.tags)
-        described = label(choice.description, "label", "text2", wraps=True)
-        _column(self.about, described, hbox(*tags, STRETCH, spacing=8), Rule())
+        description_label = label(choice.description, "label", "text2", wraps=True)
+        _column(self.about, description_label, hbox(*tags, STRETCH, spacing=8), Rule())
         column = _column(self.details)
         if choice.session:
             column.addWidget(label("The session", "strong"))
@@ -722,9 +728,9 @@ class _ChosenCard(Card):
         if choice.session:
             column.addWidget(Rule())
         if choice.recovery is not None:
-            good = choice.recovery.recovered
+            is_recovered = choice.recovery.recovered
             recovered = Chip("ok", "check", "recovered", small=True)
-            chip = recovered if good else Chip("warn", "warning", "not recovered", small=True)
+            chip = recovered if is_recovered else Chip("warn", "warning", "not recovered", small=True)
             head = hbox(label("Known answer", "strong"), STRETCH, chip)
             add_parts(
                 column,
@@ -742,20 +748,23 @@ class _ChosenCard(Card):
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         self.inside.removeWidget(self.begin)
-        self.inside.insertWidget(1 if self.height() < _LOW_BELOW else 2, self.begin)
+        self.inside.insertWidget(1 if self.height() < _LOW_CARD_PX else 2, self.begin)
 
 
-def _column(of: QWidget, *parts: QWidget | QLayout) -> QVBoxLayout:
-    return vbox(*parts, spacing=8, margins=0, parent=of)
+def _column(parent: QWidget, *parts: QWidget | QLayout) -> QVBoxLayout:
+    return vbox(*parts, spacing=8, margins=0, parent=parent)
 
 
 def _step_line(icon: str, title: str, time: str) -> QHBoxLayout:
-    shown = cut_text(title, "label")
-    return hbox(Icon(icon, "text2", 16), (shown, 1), figures(time, "label", "text2"), spacing=10)
+    title_line = cut_text(title, "label")
+    return hbox(Icon(icon, "text2", 16), (title_line, 1), figures(time, "label", "text2"), spacing=10)
 
 
 class NewStudyPage(Themed, QWidget):
-    """Signals: ``begin_asked`` (source, name, answers), ``copy_asked`` (a file to copy), ``given_up``."""
+    """The page of new studies.
+
+    Signals: ``begin_asked`` (source, name, answers), ``copy_asked`` (a file to copy), ``given_up``.
+    """
 
     begin_asked = Signal(str, str, object)
     copy_asked = Signal(str)
@@ -784,20 +793,20 @@ class NewStudyPage(Themed, QWidget):
     def show_choices(self, choices: tuple[TemplateChoice, ...], chosen: str) -> None:
         self._choices = choices
         inside = QWidget()
-        column = vbox(spacing=12, margins=(0, 0, 12 - _RING, 0), parent=inside)
+        column = vbox(spacing=12, margins=(0, 0, 12 - _RING_PX, 0), parent=inside)
         self.buttons = []
         for heading, aside, copies, across in (
-            ("Templates", "", False, ACROSS),
+            ("Templates", "", False, TEMPLATE_COLUMNS),
             (
                 "Or copy an existing study",
                 "The copy includes the comments; the original is not changed.",
                 True,
-                COPIES_ACROSS,
+                COPY_COLUMNS,
             ),
         ):
             labels = label(heading, "card"), label(aside, "small", "text2")
-            add_layout(column, hbox(*labels, STRETCH, spacing=10, margins=(_RING, 0, 0, 0)))
-            grid = grid_of(14 - 2 * _RING, 14 - 2 * _RING)
+            add_layout(column, hbox(*labels, STRETCH, spacing=10, margins=(_RING_PX, 0, 0, 0)))
+            grid = grid_of(14 - 2 * _RING_PX, 14 - 2 * _RING_PX)
             columns = across if self.width() >= NARROW_BELOW else 2
             for at, choice in enumerate(choice for choice in choices if choice.copy == copies):
                 made = _TemplateButton(choice)
@@ -813,10 +822,10 @@ class NewStudyPage(Themed, QWidget):
         replace_inside(self.area, inside)
         self.refuse("")
         first = next((button for button in self.buttons if button.choice.source == chosen), self.buttons[0])
-        for button in self.buttons:  # Tab goes to the chosen one, and arrows to the others
+        for button in self.buttons:  # Tab focuses the chosen one, arrow keys the others
             button.setFocusPolicy(Qt.FocusPolicy.StrongFocus if button is first else Qt.FocusPolicy.ClickFocus)
         first.setChecked(True)
-        QTimer.singleShot(0, first, lambda: self.area.ensureWidgetVisible(first))  # once it has its place
+        QTimer.singleShot(0, first, lambda: self.area.ensureWidgetVisible(first))  # after it was laid out
 
     def _show_focused_card(self, button: _TemplateButton, by_mouse: bool) -> None:
         """Show the card that has keyboard focus. A mouse click leaves the focus in the form."""
@@ -850,8 +859,8 @@ class NewStudyPage(Themed, QWidget):
             self.begin_asked.emit(chosen.source, self.card.questions.short_name(), answers)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        begins = isinstance(self.focusWidget(), Check | _TemplateButton)
-        if event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter} and begins:
+        can_begin = isinstance(self.focusWidget(), Check | _TemplateButton)
+        if event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter} and can_begin:
             self._ask_to_begin()
         elif event.key() == Qt.Key.Key_Escape:
             self.given_up.emit()
@@ -861,7 +870,7 @@ class NewStudyPage(Themed, QWidget):
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         narrow = self.width() < NARROW_BELOW
-        self.card.setFixedWidth(SIDE_NARROW_PX if narrow else SIDE_PX)
+        self.card.setFixedWidth(NARROW_CARD_PX if narrow else CARD_PX)
         if self._choices and (event.oldSize().width() < NARROW_BELOW) != narrow:
             chosen = self._chosen_template()
             self.show_choices(self._choices, "" if chosen is None else chosen.source)

@@ -1,4 +1,4 @@
-"""The outline: what the study is made of, as a tree with a field to find; and what can be added to it."""
+"""The outline: the elements of a study as a tree with a search field, and the elements that can be added."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -78,15 +78,15 @@ _ICONS: Final = {
 }  # fmt: skip
 """The icon of each section; a section that is not listed has a ring."""
 _PAGES: Final[Mapping[Any, str]] = {"consent": "pen", "break": "pause", "debrief": "flag"}
-"""The icon of a page by its kind, where it is not that of every page."""
+"""The icon of a kind of page, if it is not that of other pages."""
 _SECTIONS: Final = ("Session, in order", "Elements", "Settings")
-"""The headings; above them is the study itself, with its title, description and languages."""
+"""The headings; the study itself, with its title, description and languages, is above the first one."""
 SESSION, PARTS, SETTINGS = _SECTIONS
 _QUESTIONNAIRES: Final = "questionnaires"
 _FORCE_LIMIT: Final = ("device", "force_limit_n")
 
 ElementPath: TypeAlias = Path
-"""The path of an element, as windows hand it on."""
+"""The path of an element, as signals carry it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -96,9 +96,9 @@ class OutlineRow:
     path: Path  # () for the heading of a section
     title: str
     icon: str = ""
-    note: str = ""  # at its right: a time, a count, or its `short_note` fact
-    depth: int = 0  # below the heading of its section
-    faults: int = 0  # within it
+    note: str = ""  # the text at its right: a duration, a count, or its `short_note`
+    depth: int = 0  # level below the heading of its section
+    faults: int = 0  # number of faults in it
     name: str = ""  # the text for screen readers
     step: Path = ()  # its entry in the list that orders it; () if it cannot be moved
     field: Path = ()  # the matching field; () without a search
@@ -106,47 +106,55 @@ class OutlineRow:
 
 
 def outline_rows(
-    study: Study, times_s: Mapping[str, float], find: str = "", *, session_s: float | None = None
+    study: Study, times_s: Mapping[str, float], search_text: str = "", *, session_s: float | None = None
 ) -> tuple[OutlineRow, ...]:
-    """Return the outline of a study; with a search text only the matching elements.
+    """Return the outline of a study; with a search text, only the matching elements.
 
-    ``times_s`` are the durations of steps [s] by id, empty while the study has faults, and ``session_s`` is that of the
-    session; ``find`` is searched for in an element's title, id and texts, and in the labels and choices of its fields.
+    ``times_s`` are the durations of steps [s] by ID, empty while the study has faults, and ``session_s`` is that of the
+    session. An element matches if its title, ID or texts, or the labels or choices of its fields contain the text.
     """
     if study.is_unreadable:
         only = Element(FIRST, title_of({}, FIRST), FIRST[0], faults=len(study.faults))
         return (_outline_row(study, only, {}, in_session=False),)
-    shown, document, text = outline(study), study.document, find.strip()
+    shown, document, text = outline(study), study.document, search_text.strip()
     fields = first_match_by_element(study, text)
     rows: list[OutlineRow] = []
-    titles = _titles((*shown.parts, *shown.session, *shown.study))
+    titles = _distinct_titles((*shown.parts, *shown.session, *shown.study))
     settings = [element for element in shown.study if element.path != FIRST]
-    own = [element for element in shown.study if element.path == FIRST]
-    for heading, elements in (("", own), (SESSION, shown.session), (PARTS, shown.parts), (SETTINGS, settings)):
-        named = [replace(element, title=titles[element.path]) for element in elements]
-        inner = [_outline_row(study, element, times_s, in_session=heading == SESSION) for element in named]
+    study_row = [element for element in shown.study if element.path == FIRST]
+    for heading, elements in (("", study_row), (SESSION, shown.session), (PARTS, shown.parts), (SETTINGS, settings)):
+        titled = [replace(element, title=titles[element.path]) for element in elements]
+        rows_of_section = [_outline_row(study, element, times_s, in_session=heading == SESSION) for element in titled]
         if text:
-            whole = {row.path for row in inner if heading == PARTS and len(row.path) == 1}
-            inner = [
-                row for row in inner if row.path not in whole or has_text(document, row.path, text, titles_only=True)
+            section_paths = {row.path for row in rows_of_section if heading == PARTS and len(row.path) == 1}
+            rows_of_section = [
+                row
+                for row in rows_of_section
+                if row.path not in section_paths or has_text(document, row.path, text, titles_only=True)
             ]
-            inner = [
-                kept for row in inner if (kept := _matching_row(study, row, text, fields.get(row.path))) is not None
+            rows_of_section = [
+                matching
+                for row in rows_of_section
+                if (matching := _matching_row(study, row, text, fields.get(row.path))) is not None
             ]
         total = "" if session_s is None or heading != SESSION else duration(session_s)
-        if inner:
-            rows += [*([OutlineRow(path=(), title=heading, note=total, name=heading)] if heading else []), *inner]
+        if rows_of_section:
+            rows += [
+                *([OutlineRow(path=(), title=heading, note=total, name=heading)] if heading else []),
+                *rows_of_section,
+            ]
     return tuple(rows)
 
 
-def _titles(elements: Sequence[Element]) -> dict[Path, str]:
-    """Return the label of each element: its title, with its id if an earlier element has the same title."""
+def _distinct_titles(elements: Sequence[Element]) -> dict[Path, str]:
+    """Return the title of each element, followed by its ID if an earlier element has the same title."""
     first: dict[tuple[Path, str], Path] = {}
     for element in elements:
         first.setdefault((element.path[:-1], element.title), element.path)
-    mine = {element.path: first[element.path[:-1], element.title] == element.path for element in elements}
+    is_first = {element.path: first[element.path[:-1], element.title] == element.path for element in elements}
     return {
-        element.path: element.title if mine[element.path] else f"{element.title} ({element.id})" for element in elements
+        element.path: element.title if is_first[element.path] else f"{element.title} ({element.id})"
+        for element in elements
     }
 
 
@@ -176,7 +184,7 @@ def _outline_row(study: Study, element: Element, times_s: Mapping[str, float], *
         note = duration(times_s[element.id]) if element.id in times_s else ""
     elif in_session:
         note = short_note(study.document, path)
-    elif element.depth == 0 and kind in _SECTIONS_OF_TABLES:
+    elif element.depth == 0 and kind in _TABLE_SECTIONS:
         count = len(names(study.document, kind))
         note = str(count) if count else "none"
     elif path == FIRST:
@@ -184,13 +192,13 @@ def _outline_row(study: Study, element: Element, times_s: Mapping[str, float], *
     elif path == ("device",) and isinstance(limit := value_at(study.document, _FORCE_LIMIT), int | float):
         note = f"{limit:g} N"
     faults = counted(element.faults, "problem") if element.faults else ""
-    sort = element_noun(kind) if len(path) == 2 else "question" if "items" in path else ""
-    at = ""
+    noun = element_noun(kind) if len(path) == 2 else "question" if "items" in path else ""
+    position = ""
     if element.step and isinstance(element.step[-1], int):
         count = len(value_at(study.document, element.step[:-1]))
-        at = f"{'question' if 'items' in path else 'step'} {element.step[-1] + 1} of {count}"
-        sort = "" if "items" in path else sort
-    name = ", ".join(filter(None, (element.title, sort, note, at, faults)))
+        position = f"{'question' if 'items' in path else 'step'} {element.step[-1] + 1} of {count}"
+        noun = "" if "items" in path else noun
+    name = ", ".join(filter(None, (element.title, noun, note, position, faults)))
     title, step = element.title, element.step
     return OutlineRow(
         path=path,
@@ -204,31 +212,31 @@ def _outline_row(study: Study, element: Element, times_s: Mapping[str, float], *
     )
 
 
-_SECTIONS_OF_TABLES: Final = frozenset(_ICONS) - {
+_TABLE_SECTIONS: Final = frozenset(_ICONS) - {
     *OWN, "study", "device", "scene", "limits", "analysis", "simulated_participants"
 }  # fmt: skip
 
 
-_HELP: Final = {
+_SECTION_HELP: Final = {
     "designs": "2IFC and other trial designs",
     "groups": "Groups of participants. A study has at least two, so the first one comes with a second one.",
     "liquids": "A new liquid; you enter its values. To copy a shipped liquid, such as water or slime, type its name.",
 }
-"""What a section is for, where its name does not say it."""
+"""The help of sections whose names do not say enough."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Addable:
-    """A thing that can be added: its text and icon, the request, and a line of help."""
+    """An entry of the list of additions: label, icon, request, and a line of help."""
 
-    words: str
+    label: str
     icon: str
     asks: AddElement | AddInstrument | AddLiquid
     help: str = ""
 
 
 _EXCLUSION: Final = Addable(
-    words="Exclusion rule",
+    label="Exclusion rule",
     icon="bars",
     asks=AddElement(EXCLUSIONS),
     help="Proposes to exclude sessions with constant or fast answers, answers below chance, or thresholds beyond the "
@@ -237,26 +245,26 @@ _EXCLUSION: Final = Addable(
 
 
 def addable_elements(study: Study, selected: Path) -> tuple[Addable, ...]:
-    """Return what can be added: for lists of the selected element, its section, then the other sections.
+    """Return the possible additions: to lists of the selected element, to its section, then to other sections.
 
     Shipped liquids come right after a new liquid if a liquid is selected, otherwise after the sections.
     """
     document = study.document
-    around = selected[:2] if len(selected) > 1 else ()
-    lists = [row.path for row in rows(document, around) if row.kind == "list"] if around else []
+    element = selected[:2] if len(selected) > 1 else ()
+    list_paths = [row.path for row in rows(document, element) if row.kind == "list"] if element else []
     sections = [row.path for row in rows(document, ()) if row.kind == "tables"]
     sections.sort(key=lambda path: path[:1] != selected[:1])
-    entries = [_addable_entry(study, path) for path in lists]
+    entries = [_addable_entry(study, path) for path in list_paths]
     entries += [
         Addable(
-            words="Two groups" if path == ("groups",) and path[0] not in document else label_of(element_noun(path[0])),
+            label="Two groups" if path == ("groups",) and path[0] not in document else label_of(element_noun(path[0])),
             icon=icon_of(path, study.document),
             asks=AddElement(path),
-            help=_HELP.get(str(path[0]), ""),
+            help=_SECTION_HELP.get(str(path[0]), ""),
         )
         for path in sections
     ]
-    entries += _addable_questions(study, around) if not any(path[0] == _QUESTIONNAIRES for path in lists) else ()
+    entries += _addable_questions(study, element) if not any(path[0] == _QUESTIONNAIRES for path in list_paths) else ()
     entries.append(_EXCLUSION)
     first = 1 if selected[:1] == ("liquids",) else len(entries)
     return (*entries[:first], *_addable_liquids(study), *entries[first:], *_addable_instruments(languages_of(document)))
@@ -264,55 +272,65 @@ def addable_elements(study: Study, selected: Path) -> tuple[Addable, ...]:
 
 def _addable_liquids(study: Study) -> tuple[Addable, ...]:
     """Return the liquids of the shipped studies."""
-    sign, every = icon_of(("liquids", ""), {}), shipped_liquids_to_add(study)
-    return tuple(Addable(words=asked.words, icon=sign, asks=asked, help=asked.help(study)) for asked in every)
+    icon_name, requests = icon_of(("liquids", ""), {}), shipped_liquids_to_add(study)
+    return tuple(
+        Addable(label=request.label, icon=icon_name, asks=request, help=request.help(study)) for request in requests
+    )
 
 
-def _addable_questions(study: Study, around: Path) -> Iterator[Addable]:
-    """Yield a question for each questionnaire that can get one, or only for that of the element.
+def _addable_questions(study: Study, element: Path) -> Iterator[Addable]:
+    """Yield an added question for each questionnaire that permits it, or only for that of the element ``element``.
 
-    If there are several, each names its questionnaire.
+    If there are several, the label contains the title of the questionnaire.
     """
-    named = value_at(study.document, (*around, "questionnaire")) if around else None
+    own_name = value_at(study.document, (*element, "questionnaire")) if element else None
     tables = names(study.document, _QUESTIONNAIRES)
-    every = [name for name in tables if value_at(study.document, (_QUESTIONNAIRES, name, "instrument")) is None]
-    for name in (named,) if named in every else every:
-        first = _addable_entry(study, (_QUESTIONNAIRES, str(name), "items"))
+    editable_names = [
+        name for name in tables if value_at(study.document, (_QUESTIONNAIRES, name, "instrument")) is None
+    ]
+    for name in (own_name,) if own_name in editable_names else editable_names:
+        addition = _addable_entry(study, (_QUESTIONNAIRES, str(name), "items"))
         title = title_of(study.document, (_QUESTIONNAIRES, str(name)))
-        yield first if len(every) == 1 else replace(first, words=f"{first.words} of {title}")
+        yield addition if len(editable_names) == 1 else replace(addition, label=f"{addition.label} of {title}")
 
 
 @cache
 def _addable_instruments(languages: tuple[str, ...]) -> tuple[Addable, ...]:
-    """Return the standard questionnaires, with publisher and licence of their texts, and the languages they lack."""
+    """Return the standard questionnaires, with source, licence, and missing languages of their texts."""
     entries = []
     for name in Instrument.names():
-        source = Instrument(name).table
-        lacking = " or ".join(language_name(code) for code in languages if code not in source["languages"])
-        texts = f". The program does not include its {lacking} texts, so you must write them" if lacking else ""
-        help_ = f"{source['source']}. Licence: {source['licence']}{texts}"
-        title = f"Instrument: {name.upper()}, {len(source['items'])} questions"
-        entries.append(Addable(words=title, icon="list", asks=AddInstrument(name), help=help_))
+        instrument = Instrument(name).table
+        missing_languages = " or ".join(
+            language_name(code) for code in languages if code not in instrument["languages"]
+        )
+        texts = (
+            f". The program does not include its {missing_languages} texts, so you must write them"
+            if missing_languages
+            else ""
+        )
+        help_ = f"{instrument['source']}. Licence: {instrument['licence']}{texts}"
+        title = f"Instrument: {name.upper()}, {len(instrument['items'])} questions"
+        entries.append(Addable(label=title, icon="list", asks=AddInstrument(name), help=help_))
     return tuple(entries)
 
 
 def _addable_entry(study: Study, path: Path) -> Addable:
-    """Return the entry that adds to a list; a search finds it by each of its kinds."""
-    known = distinguishing_key(node_at(study.document, (*path, 0)))[1]
-    kinds = ", ".join(label_of(kind or STATEMENT).lower() for kind in known)
-    to = f"To {title_of(study.document, path[:2])}{kinds and f'; kinds: {kinds}'}"
+    """Return the addition to a list; its help contains each kind of entry, so that a search finds it."""
+    tables = distinguishing_key(node_at(study.document, (*path, 0)))[1]
+    kinds = ", ".join(label_of(kind or STATEMENT).lower() for kind in tables)
+    target = f"To {title_of(study.document, path[:2])}{kinds and f'; kinds: {kinds}'}"
     return Addable(
-        words=label_of(element_noun(path[-1])), icon=icon_of(path, study.document), asks=AddElement(path), help=to
+        label=label_of(element_noun(path[-1])), icon=icon_of(path, study.document), asks=AddElement(path), help=target
     )
 
 
-WIDTH, BESIDE_PX, HIGHEST, ADD_ROW_PX, HELP_PX = 360, 84, 520, 34, 78
-"""The least width of the list, what an entry needs beside its text, and heights [px]."""
-_MOVES = (Qt.Key.Key_Up, Qt.Key.Key_Down, Qt.Key.Key_PageUp, Qt.Key.Key_PageDown)
+WIDTH, BESIDE_PX, MAX_LIST_PX, ADD_ROW_PX, HELP_PX = 360, 84, 520, 34, 78
+"""Minimum width of the list, width of an entry without its text, maximum height, and heights of parts [px]."""
+_ARROW_KEYS = (Qt.Key.Key_Up, Qt.Key.Key_Down, Qt.Key.Key_PageUp, Qt.Key.Key_PageDown)
 
 
 class AddList(Themed, QFrame):
-    """A list over the page; ``chosen`` carries an `Addable`."""
+    """A popup list of additions with a filter; ``chosen`` carries an `Addable`."""
 
     chosen = Signal(object)
 
@@ -320,9 +338,9 @@ class AddList(Themed, QFrame):
         super().__init__(parent, Qt.WindowType.Popup)
         self.setAccessibleName("Add")
         self.setProperty("role", "card")
-        self._every: tuple[Addable, ...] = ()
-        self.words = make_dense(QLineEdit(), "Filter the elements that can be added", 36)
-        self.words.setPlaceholderText("Type to filter")
+        self._additions: tuple[Addable, ...] = ()
+        self.filter_field = make_dense(QLineEdit(), "Filter the elements that can be added", 36)
+        self.filter_field.setPlaceholderText("Type to filter")
         self.list = QListWidget()
         self.list.setAccessibleName("Elements that can be added")
         self.list.setProperty("role", "links")
@@ -333,37 +351,39 @@ class AddList(Themed, QFrame):
         self.help = label("", "small", "text2", wraps=True)
         self.help.setMinimumHeight(HELP_PX)
         self.help.setAlignment(Qt.AlignmentFlag.AlignTop)
-        vbox(self.words, (self.list, 1), self.help, spacing=8, margins=10, parent=self)
-        self.words.textChanged.connect(self._filter)
-        self.words.installEventFilter(self)
+        vbox(self.filter_field, (self.list, 1), self.help, spacing=8, margins=10, parent=self)
+        self.filter_field.textChanged.connect(self._filter)
+        self.filter_field.installEventFilter(self)
         self.list.currentItemChanged.connect(lambda item: self.help.setText(item.toolTip() if item else ""))
         self.list.itemClicked.connect(lambda _item: self._choose())
         self.list.itemActivated.connect(lambda _item: self._choose())
 
-    def open(self, every: tuple[Addable, ...], above: QPoint) -> None:
-        """Show the addable elements with the lower left corner at a screen position."""
-        self._every = every
-        self.words.clear()
+    def open(self, additions: tuple[Addable, ...], above: QPoint) -> None:
+        """Show the additions, with the lower left corner of the list at a screen position."""
+        self._additions = additions
+        self.filter_field.clear()
         self._filter("")
-        height = min(HIGHEST, 82 + HELP_PX + ADD_ROW_PX * len(every))
+        height = min(MAX_LIST_PX, 82 + HELP_PX + ADD_ROW_PX * len(additions))
         screen = self.screen().availableGeometry()
-        words = (self.list.fontMetrics().horizontalAdvance(entry.words) for entry in every)
-        width = max(WIDTH, max(words, default=0) + BESIDE_PX)
-        at = QPoint(min(above.x(), screen.right() - width), max(screen.top(), above.y() - height))
-        self.setGeometry(at.x(), at.y(), width, height)
+        label_widths = (self.list.fontMetrics().horizontalAdvance(entry.label) for entry in additions)
+        width = max(WIDTH, max(label_widths, default=0) + BESIDE_PX)
+        position = QPoint(min(above.x(), screen.right() - width), max(screen.top(), above.y() - height))
+        self.setGeometry(position.x(), position.y(), width, height)
         self.show()
-        self.words.setFocus(Qt.FocusReason.PopupFocusReason)
+        self.filter_field.setFocus(Qt.FocusReason.PopupFocusReason)
 
     def _filter(self, text: str) -> None:
-        wanted = search_words(text)
+        words = search_words(text)
         self.list.clear()
         fitting = [
-            entry for entry in self._every if all(part in f"{entry.words} {entry.help}".casefold() for part in wanted)
+            entry
+            for entry in self._additions
+            if all(part in f"{entry.label} {entry.help}".casefold() for part in words)
         ]
         typed = text.casefold().strip()
-        fitting.sort(key=lambda entry: not entry.words.casefold().startswith(typed))
+        fitting.sort(key=lambda entry: not entry.label.casefold().startswith(typed))
         for entry in fitting:
-            item = QListWidgetItem(icon(entry.icon, self.theme.text2, 18), entry.words)
+            item = QListWidgetItem(icon(entry.icon, self.theme.text2, 18), entry.label)
             item.setData(Qt.ItemDataRole.UserRole, entry)
             item.setToolTip(plain_tip(entry.help))
             item.setData(Qt.ItemDataRole.AccessibleDescriptionRole, entry.help)
@@ -381,7 +401,7 @@ class AddList(Themed, QFrame):
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         if event.type() == QEvent.Type.KeyPress and isinstance(event, QKeyEvent):
-            if event.key() in _MOVES:
+            if event.key() in _ARROW_KEYS:
                 self.list.keyPressEvent(event)
                 return True
             if event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter}:
@@ -392,13 +412,13 @@ class AddList(Themed, QFrame):
 
 ROW_PX, HEADING_PX = 32, 38
 _INDENT = 20
-"""So wide is the grip at the left of a row that can be dragged."""
+"""The indentation per level, which leaves room for the grip of a row [px]."""
 ROW_ROLE = Qt.ItemDataRole.UserRole + 1
 _Index = QModelIndex | QPersistentModelIndex
 
 
 class _RowPainter(QStyledItemDelegate):
-    """Paints rows; the tree knows the theme and whether rows may be moved."""
+    """Paints the rows of a tree in its theme; ``movable`` says whether rows can be dragged."""
 
     def __init__(self, tree: "Tree") -> None:
         super().__init__(tree)
@@ -433,51 +453,53 @@ class _RowPainter(QStyledItemDelegate):
     def _paint_element(
         self, painter: QPainter, place: QRectF, row: OutlineRow, state: QStyle.StateFlag, index: _Index
     ) -> None:
-        t = self.theme
-        assert t is not None  # noqa: S101 - `paint` saw it
+        theme = self.theme
+        assert theme is not None  # noqa: S101 - painted with a theme
         middle, right = Qt.AlignmentFlag.AlignVCenter, place.right() - 10
-        chosen = bool(state & QStyle.StateFlag.State_Selected)
+        is_selected = bool(state & QStyle.StateFlag.State_Selected)
         current = index == self.tree.currentIndex()
-        pointed = bool(state & QStyle.StateFlag.State_MouseOver)
-        if chosen or pointed:
-            fill_rounded(painter, place.adjusted(0, 1, 0, -1), RADIUS_CONTROL - 2, t.selected if chosen else t.hover)
-        if current and chosen:
-            painter.setBrush(QColor(t.accent))
+        is_hovered = bool(state & QStyle.StateFlag.State_MouseOver)
+        if is_selected or is_hovered:
+            fill_rounded(
+                painter, place.adjusted(0, 1, 0, -1), RADIUS_CONTROL - 2, theme.selected if is_selected else theme.hover
+            )
+        if current and is_selected:
+            painter.setBrush(QColor(theme.accent))
             painter.drawRoundedRect(QRectF(0, place.top() + 5, 3, place.height() - 10), 1.5, 1.5)
             if self.tree.hasFocus():
-                painter.setPen(QPen(QColor(t.accent), 2))
+                painter.setPen(QPen(QColor(theme.accent), 2))
                 painter.setBrush(Qt.BrushStyle.NoBrush)
                 painter.drawRoundedRect(place.adjusted(1, 2, -1, -2), RADIUS_CONTROL - 2, RADIUS_CONTROL - 2)
-        x = _sign_right(row) - _INDENT
-        if row.step and self.movable and (chosen or pointed):
-            _paint_grip(painter, QRectF(x - 8, place.top(), 8, place.height()), t.text2)
+        x = _arrow_right_px(row) - _INDENT
+        if row.step and self.movable and (is_selected or is_hovered):
+            _paint_grip(painter, QRectF(x - 8, place.top(), 8, place.height()), theme.text2)
         if self.tree.model().hasChildren(index):
             chevron = "chevron_down" if self.tree.isExpanded(index) else "chevron"
-            draw_icon(painter, chevron, QRectF(x + 2, place.center().y() - 7, 14, 14), t.text2, 2.0)
-        ink = t.accent if chosen else t.text if row.depth == 1 else t.text2
-        draw_icon(painter, row.icon, QRectF(x + 20, place.center().y() - 9, 18, 18), ink, 1.9)
+            draw_icon(painter, chevron, QRectF(x + 2, place.center().y() - 7, 14, 14), theme.text2, 2.0)
+        colour = theme.accent if is_selected else theme.text if row.depth == 1 else theme.text2
+        draw_icon(painter, row.icon, QRectF(x + 20, place.center().y() - 9, 18, 18), colour, 1.9)
         painter.setFont(font("label", weight=600, tabular=True))
         if row.faults:
             badge = QRectF(right - 22, place.center().y() - 10, 22, 20)
-            fill_rounded(painter, badge, 10, t.bad_bg)
-            painter.setPen(QColor(t.bad))
+            fill_rounded(painter, badge, 10, theme.bad_bg)
+            painter.setPen(QColor(theme.bad))
             painter.drawText(badge, Qt.AlignmentFlag.AlignCenter, str(row.faults))
             right = badge.left() - 6
         if row.note:
             painter.setFont(font("label", weight=400, tabular=True))
-            painter.setPen(QColor(t.text2))
+            painter.setPen(QColor(theme.text2))
             width = painter.fontMetrics().horizontalAdvance(row.note) + 2
             painter.drawText(QRectF(right - width, place.top(), width, place.height()), middle, row.note)
             right -= width + 8
-        painter.setFont(font("label", weight=600 if chosen else 500))
-        painter.setPen(QColor(ink))
+        painter.setFont(font("label", weight=600 if is_selected else 500))
+        painter.setPen(QColor(colour))
         room = QRectF(x + 46, place.top(), right - x - 46, place.height())
         title = painter.fontMetrics().elidedText(row.title, Qt.TextElideMode.ElideRight, int(room.width()))
         painter.drawText(room, middle, title)
 
 
-def _sign_right(row: OutlineRow) -> float:
-    """Return the right edge of the sign that shows whether a row is expanded [px]."""
+def _arrow_right_px(row: OutlineRow) -> float:
+    """Return the right edge of the arrow that expands or collapses a row [px]."""
     return 12.0 + _INDENT * row.depth
 
 
@@ -498,8 +520,8 @@ _EDGE_PX = 24
 class Tree(Themed, QTreeView):
     """The rows of the outline.
 
-    Signals: ``entered_row`` (by Enter), ``dropped`` (a list entry, and the entry before which it was dropped). Its menu
-    shows its actions.
+    Signals: ``entered_row`` (Enter was pressed), ``dropped`` (path of an entry, and that of the entry before which it
+    was dropped). Its context menu shows its actions.
     """
 
     entered_row = Signal()
@@ -540,10 +562,10 @@ class Tree(Themed, QTreeView):
         index = self.indexAt(event.position().toPoint())
         row = index.data(ROW_ROLE) if index.isValid() else None
         self._pressed = None
-        arrow = row is not None and self.model().hasChildren(index) and event.position().x() < _sign_right(row)
-        self.arrow_pressed = arrow
-        plain = event.button() == Qt.MouseButton.LeftButton and not event.modifiers()
-        if plain and row is not None and row.step and self.rows.movable:
+        on_arrow = row is not None and self.model().hasChildren(index) and event.position().x() < _arrow_right_px(row)
+        self.arrow_pressed = on_arrow
+        is_plain_click = event.button() == Qt.MouseButton.LeftButton and not event.modifiers()
+        if is_plain_click and row is not None and row.step and self.rows.movable:
             self._pressed = (event.position().toPoint(), row.step)
         super().mousePressEvent(event)
 
@@ -552,9 +574,9 @@ class Tree(Themed, QTreeView):
         if self._pressed is None or not event.buttons() & Qt.MouseButton.LeftButton:
             super().mouseMoveEvent(event)
             return
-        start, drags = self._pressed
+        start, entry = self._pressed
         if not self.dragged and (at - start).manhattanLength() >= QApplication.startDragDistance():
-            self.dragged = drags
+            self.dragged = entry
             self.viewport().setCursor(Qt.CursorShape.ClosedHandCursor)
         if self.dragged:
             bar, height = self.verticalScrollBar(), self.viewport().height()
@@ -577,27 +599,27 @@ class Tree(Themed, QTreeView):
         self.viewport().update()
 
     def _drop_target(self, at: QPoint) -> tuple[ElementPath, float] | None:
-        """Return the place of the entry after the drop line, and the line's height."""
-        place = self.dragged[:-1]
+        """Return the path of the entry after the drop line, and the vertical position of that line [px]."""
+        array = self.dragged[:-1]
         places: list[tuple[ElementPath, float]] = []
         end: tuple[ElementPath, float] | None = None
         index = self.model().index(0, 0)
         while index.isValid():
             row, box = index.data(ROW_ROLE), QRectF(self.visualRect(index))
-            if row.step and row.step[:-1] == place:
+            if row.step and row.step[:-1] == array:
                 places.append((row.step, box.top()))
-                end = (*place, int(row.step[-1]) + 1), box.bottom()
-            elif end is not None and row.path and self._is_below(index, place):
+                end = (*array, int(row.step[-1]) + 1), box.bottom()
+            elif end is not None and row.path and self._is_below_entry(index, array):
                 end = end[0], box.bottom()
             index = self.indexBelow(index)
-        return min((*places, *([end] if end else ())), key=lambda place: abs(place[1] - at.y()), default=None)
+        return min((*places, *([end] if end else ())), key=lambda array: abs(array[1] - at.y()), default=None)
 
-    def _is_below(self, index: QModelIndex, place: ElementPath) -> bool:
-        """Return whether a row is shown below an entry of a list."""
+    def _is_below_entry(self, index: QModelIndex, array: ElementPath) -> bool:
+        """Return whether a row is inside an entry of a list."""
         above = index.parent()
         while above.isValid():
             row = above.data(ROW_ROLE)
-            if row.step and row.step[:-1] == place:
+            if row.step and row.step[:-1] == array:
                 return True
             above = above.parent()
         return False
@@ -612,10 +634,10 @@ class Tree(Themed, QTreeView):
 
 
 class OutlineCard(Coloured, Card):
-    """Draws outline rows.
+    """The outline with its search field.
 
-    Signals: ``chosen`` (path), ``element_clicked``, ``form_asked`` (Enter), ``field_asked`` (path of a matching field,
-    instead of the other two).
+    Signals: ``chosen`` (path), ``element_clicked``, ``form_asked`` (Enter was pressed), and instead of these two,
+    ``field_asked`` if a field matches the search (its path).
     """
 
     chosen = Signal(object)
@@ -627,12 +649,12 @@ class OutlineCard(Coloured, Card):
         super().__init__(padding=12, gap=8)
         self.setAccessibleName("Outline")
         self.rows: tuple[OutlineRow, ...] = ()
-        self._opened: set[object] = set()
-        self._filling = self._finding = False
-        self.words = make_dense(QLineEdit(), "Find in the study", 36)
-        self.words.setPlaceholderText(command_tip("find"))
-        self.words.setClearButtonEnabled(True)
-        self._sign = self.words.addAction(
+        self._expanded: set[object] = set()
+        self._filling = self._is_searching = False
+        self.search_field = make_dense(QLineEdit(), "Find in the study", 36)
+        self.search_field.setPlaceholderText(command_tip("find"))
+        self.search_field.setClearButtonEnabled(True)
+        self._search_icon = self.search_field.addAction(
             icon("search", self.theme.text2, 16), QLineEdit.ActionPosition.LeadingPosition
         )
         self.nothing = Elided("label", "text2")
@@ -642,35 +664,39 @@ class OutlineCard(Coloured, Card):
         self.tree.setModel(self.items)
         self.add = ActionButton("plus", "Add", cap=key_cap("add"), height=40)
         self.add.setAccessibleName(f"Add an element ({keys_of('add')[0]})")
-        self.duplicate = ActionButton("", "Duplicate", cap=key_cap("duplicate"), height=40)  # no room for an icon, too
+        self.duplicate = ActionButton(
+            "", "Duplicate", cap=key_cap("duplicate"), height=40
+        )  # there is no room for an icon
         self.duplicate.setAccessibleName(with_key("Duplicate the selected element", "duplicate"))
         for button in (self.add, self.duplicate):
             button.setFont(font("label", weight=600))
         self.add.setMaximumWidth(self.add.minimumSizeHint().width())
         foot = hbox(self.add, (self.duplicate, 1), spacing=8)
-        add_parts(self.column, self.words, self.nothing, (self.tree, 1), foot)
-        self.words.returnPressed.connect(self._open_first)
-        self.words.installEventFilter(self)
+        add_parts(self.column, self.search_field, self.nothing, (self.tree, 1), foot)
+        self.search_field.returnPressed.connect(self._open_first_match)
+        self.search_field.installEventFilter(self)
         self.tree.selectionModel().currentChanged.connect(self._choose)
         self.tree.clicked.connect(self._click)
-        self.tree.expanded.connect(lambda index: None if self._finding else self._opened.add(self._row_key(index)))
-        self.tree.collapsed.connect(lambda index: self._opened.discard(self._row_key(index)))
+        self.tree.expanded.connect(
+            lambda index: None if self._is_searching else self._expanded.add(self._row_key(index))
+        )
+        self.tree.collapsed.connect(lambda index: self._expanded.discard(self._row_key(index)))
         self.tree.entered_row.connect(self._enter_row)
 
     def apply_theme(self, theme: Theme) -> None:
-        self._sign.setIcon(icon("search", theme.text2, 16))
+        self._search_icon.setIcon(icon("search", theme.text2, 16))
 
     def begin(self) -> None:
-        """Reset the outline for other rows: scrolled to the top, collapsed, without a search text."""
-        self.rows, self._opened = (), set()
+        """Reset the outline for another study: scrolled to the top, collapsed, without a search text."""
+        self.rows, self._expanded = (), set()
         self._filling = True
         self.items.clear()
         self._filling = False
-        self.words.clear()
+        self.search_field.clear()
 
     def show_outline(self, rows: tuple[OutlineRow, ...], selected: object) -> None:
-        """Show rows; expanded branches stay expanded. If nothing matches, a line says so."""
-        self._show_whether_found(rows)
+        """Show rows; expanded branches stay expanded. If nothing matches the search, a line says so."""
+        self._show_search_result(rows)
         if rows != self.rows:
             current = self.tree.currentIndex()
             before = current.data(ROW_ROLE).path if current.isValid() else None
@@ -683,34 +709,34 @@ class OutlineCard(Coloured, Card):
                 item = QStandardItem(row.title)
                 item.setData(row, ROW_ROLE)
                 item.setData(row.name, Qt.ItemDataRole.AccessibleTextRole)
-                item.setToolTip(plain_tip(row.title))  # it may be cut
+                item.setToolTip(plain_tip(row.title))  # the title may be elided
                 if not row.path:
-                    item.setFlags(Qt.ItemFlag.NoItemFlags)  # the arrow keys skip it
+                    item.setFlags(Qt.ItemFlag.NoItemFlags)  # so that the arrow keys skip it
                 depth = max(row.depth - 1, 0)
                 del above[depth + 1 :]
                 above[-1].appendRow(item)
                 above.append(item)
-            self._finding = bool(self.words.text().strip())
+            self._is_searching = bool(self.search_field.text().strip())
             for index in self.indexes():
-                if self._row_key(index) in self._opened or self._finding:
+                if self._row_key(index) in self._expanded or self._is_searching:
                     self.tree.expand(index)
-            self._finding = False
-            self.tree.doItemsLayout()  # without it there is nothing to scroll
+            self._is_searching = False
+            self.tree.doItemsLayout()  # otherwise the scroll bar has no range yet
             self.tree.verticalScrollBar().setValue(scrolled)
             self._filling = False
             self.mark_row(selected, reveals=selected != before)
         self.mark_row(selected)
 
-    def _show_whether_found(self, rows: tuple[OutlineRow, ...]) -> None:
-        text = self.words.text().strip()
+    def _show_search_result(self, rows: tuple[OutlineRow, ...]) -> None:
+        text = self.search_field.text().strip()
         sentence = f'"{text}" was not found in this study' if text and not rows else ""
         if sentence and sentence != self.nothing.whole:
-            announce(self.words, sentence)
+            announce(self.search_field, sentence)
         self.nothing.show_text(sentence)
         self.nothing.setVisible(bool(sentence))
 
     def mark_row(self, path: object, *, reveals: bool = True) -> None:
-        """Mark the row of an element; with ``reveals`` its branch is expanded and scrolled to."""
+        """Select the row of an element; with ``reveals``, expand its branch and scroll to it."""
         current = self.tree.currentIndex()
         if current.isValid() and current.data(ROW_ROLE).path == path:
             return
@@ -724,13 +750,13 @@ class OutlineCard(Coloured, Card):
                 self.tree.expand(index.parent())
             if reveals and "blocks" in path[:1]:  # type: ignore[index]  # a path
                 self.tree.expand(index)
-            down = self.tree.verticalScrollBar().value()
+            scrolled = self.tree.verticalScrollBar().value()
             flags = QItemSelectionModel.SelectionFlag
             self.tree.selectionModel().setCurrentIndex(index, flags.ClearAndSelect)
             if reveals:
                 self.tree.scrollTo(index)
-            else:  # Qt scrolls to it, too
-                self.tree.verticalScrollBar().setValue(down)
+            else:  # setCurrentIndex scrolled to it
+                self.tree.verticalScrollBar().setValue(scrolled)
         self._filling = False
 
     def indexes(self) -> list[QModelIndex]:
@@ -753,19 +779,19 @@ class OutlineCard(Coloured, Card):
 
     def _click(self, index: QModelIndex) -> None:
         """Expand or collapse the clicked branch, else go to the matching field."""
-        heading = self.items.hasChildren(index) and len(index.data(ROW_ROLE).path) == 1
-        if heading or self.tree.arrow_pressed:
+        is_heading = self.items.hasChildren(index) and len(index.data(ROW_ROLE).path) == 1
+        if is_heading or self.tree.arrow_pressed:
             self.tree.setExpanded(index, not self.tree.isExpanded(index))
         else:
             self.tree.expand(index)
             if not self._open_field():
                 self.element_clicked.emit()
-            self.words.clear()
+            self.search_field.clear()
 
     def _enter_row(self) -> None:
         if not self._open_field():
             self.form_asked.emit()
-        self.words.clear()
+        self.search_field.clear()
 
     def _open_field(self) -> bool:
         """Go to the matching field of the current row; return whether there is one."""
@@ -775,33 +801,35 @@ class OutlineCard(Coloured, Card):
             self.field_asked.emit(field)
         return bool(field)
 
-    def _go_to_first(self) -> bool:
+    def _select_first_match(self) -> bool:
         """Select the first element with a matching title, else with a matching field; return whether there is one."""
         rows = [(index, index.data(ROW_ROLE)) for index in self.indexes() if index.data(ROW_ROLE).path]
-        called = [index for index, row in rows if row.named]
+        with_title = [index for index, row in rows if row.named]
         with_field = [index for index, row in rows if row.field]
-        first = next(iter((*called, *with_field, *(index for index, _ in rows))), None)
+        first = next(iter((*with_title, *with_field, *(index for index, _ in rows))), None)
         if first is not None:
             self.tree.selectionModel().setCurrentIndex(first, QItemSelectionModel.SelectionFlag.ClearAndSelect)
         return first is not None
 
-    def _open_first(self) -> None:
+    def _open_first_match(self) -> None:
         """Select the first matching element, go to its field, and show the whole study again."""
-        if self.words.text().strip() and self._go_to_first():
+        if self.search_field.text().strip() and self._select_first_match():
             if not self._open_field():
                 self.tree.setFocus(Qt.FocusReason.OtherFocusReason)
-            self.words.clear()
+            self.search_field.clear()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Let Esc end a search; without one, the key is the page's."""
-        if event.key() == Qt.Key.Key_Escape and self.words.text():
-            self.words.clear()
+        """End a search at Esc; without a search, the page handles the key."""
+        if event.key() == Qt.Key.Key_Escape and self.search_field.text():
+            self.search_field.clear()
         else:
             super().keyPressEvent(event)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        down = event.type() == QEvent.Type.KeyPress and isinstance(event, QKeyEvent) and event.key() == Qt.Key.Key_Down
-        if down and (not self.words.text().strip() or self._go_to_first()):
+        is_down = (
+            event.type() == QEvent.Type.KeyPress and isinstance(event, QKeyEvent) and event.key() == Qt.Key.Key_Down
+        )
+        if is_down and (not self.search_field.text().strip() or self._select_first_match()):
             self.tree.setFocus(Qt.FocusReason.OtherFocusReason)
             return True
         return super().eventFilter(watched, event)

@@ -1,4 +1,4 @@
-"""Small parts of the designer: a choice between few words side by side, small buttons, texts that are cut."""
+"""Small parts of the designer: segments, small buttons, elided texts, lists that keys open."""
 
 from collections.abc import Mapping, Sequence
 from typing import TypeVar
@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 from study_app.gui.theme import Themed, TypeRole, font, remove_widget
 from study_app.gui.widgets import ActionButton, Choice, Elided, Ink, PressedByEnter, hbox, plain_tip
 
-INSIDE, BETWEEN, SEGMENT_PX = 3, 4, 28
+SEGMENTS_MARGIN_PX, SEGMENT_GAP_PX, SEGMENT_PX = 3, 4, 28
 
 
 class _Segment(PressedByEnter):
@@ -22,20 +22,20 @@ class _Segment(PressedByEnter):
         self.setCursor(Qt.CursorShape.PointingHandCursor)
         self.setSizePolicy(QSizePolicy.Policy.Minimum, QSizePolicy.Policy.Fixed)
 
-    def show_words(self, text: str) -> None:
+    def show_label(self, text: str) -> None:
         if text != self.text():
             self.setText(text)
             self.setAccessibleName(text)
 
     def nextCheckState(self) -> None:
-        """Do nothing: `Segments` decides which one is checked."""
+        """Do nothing: `Segments` decides which segment is checked."""
 
     def sizeHint(self) -> QSize:
         return QSize(round(QFontMetricsF(font("label", weight=600)).horizontalAdvance(self.text())) + 18, SEGMENT_PX)
 
 
 class Segments(Themed, QWidget):
-    """A choice between few values; ``chosen`` carries the value of a press or an arrow key; ``tips`` are by value."""
+    """A choice of one of few values side by side; ``chosen`` carries it; ``tips`` are tool tips by value."""
 
     chosen = Signal(object)
 
@@ -48,7 +48,7 @@ class Segments(Themed, QWidget):
         self._values: tuple[object, ...] = ()
         self.tips: Mapping[object, str] = {}
         self.buttons: list[_Segment] = []
-        self._row = hbox(spacing=BETWEEN, margins=INSIDE, parent=self)
+        self._row = hbox(spacing=SEGMENT_GAP_PX, margins=SEGMENTS_MARGIN_PX, parent=self)
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
         self._add_button()
 
@@ -59,19 +59,19 @@ class Segments(Themed, QWidget):
             self._add_button()
         self._values = tuple(value for value, _ in values)
         for button, (value, text) in zip(self.buttons, values, strict=False):
-            button.show_words(text)
+            button.show_label(text)
             button.setChecked(value == chosen)
             button.setToolTip(plain_tip(self.tips.get(value, "")))
             button.update()
         self.setFocusProxy(next((button for button in self.buttons if button.isChecked()), self.buttons[0]))
 
     def _add_button(self) -> None:
-        made, at = _Segment(), len(self.buttons)
-        made.setAccessibleName(self._name)  # until it has a label
-        made.setAccessibleDescription(self._name)
-        made.clicked.connect(lambda: self.chosen.emit(self._values[at]))
-        self._row.addWidget(made)
-        self.buttons.append(made)
+        button, index = _Segment(), len(self.buttons)
+        button.setAccessibleName(self._name)  # until it has a label
+        button.setAccessibleDescription(self._name)
+        button.clicked.connect(lambda: self.chosen.emit(self._values[index]))
+        self._row.addWidget(button)
+        self.buttons.append(button)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         step = {Qt.Key.Key_Left: -1, Qt.Key.Key_Right: 1}.get(Qt.Key(event.key()), 0)
@@ -89,7 +89,7 @@ _W = TypeVar("_W", bound=QWidget)
 
 
 def make_dense(part: _W, name: str, height: int = FIELD_PX) -> _W:
-    """Give a field or list the designer's low height and an accessible name."""
+    """Give a field or list the designer's small height and an accessible name; return it."""
     part.setAccessibleName(name)
     part.setProperty("dense", "true")
     part.setFont(font("label", weight=400))
@@ -99,29 +99,29 @@ def make_dense(part: _W, name: str, height: int = FIELD_PX) -> _W:
 
 def small_button(icon: str, label: str, *, cap: str = "", role: str = "", height: int = 34) -> ActionButton:
     """Return a button with a small margin around its text."""
-    made = ActionButton(icon, label, cap=cap, role=role, height=height)
-    made.setProperty("dense", "true")
-    made.setFont(font("label"))
-    return made
+    button = ActionButton(icon, label, cap=cap, role=role, height=height)
+    button.setProperty("dense", "true")
+    button.setFont(font("label"))
+    return button
 
 
 def cut_text(text: str, role: TypeRole = "small", ink: Ink = "text2", *, right: bool = False) -> Elided:
     """Return a line of text that is elided if it is too long, aligned left or right."""
-    made = Elided(role, ink)
-    made.show_text(text)
+    line = Elided(role, ink)
+    line.show_text(text)
     if right:
-        made.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
-    return made
+        line.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+    return line
 
 
-_OPENS = {
+_OPENING_KEYS = {
     Qt.Key.Key_Up, Qt.Key.Key_Down, Qt.Key.Key_PageUp, Qt.Key.Key_PageDown, Qt.Key.Key_Home, Qt.Key.Key_End,
     Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_Space, Qt.Key.Key_F4,
 }  # fmt: skip
 
 
 class KeysOpenList(Choice):
-    """A closed list that arrow keys and letters only open; Enter or a click then selects an entry."""
+    """A list that arrow keys and letters open without changing the choice; Enter or a click selects an entry."""
 
     def showPopup(self) -> None:
         super().showPopup()
@@ -131,7 +131,7 @@ class KeysOpenList(Choice):
     def keyPressEvent(self, event: QKeyEvent) -> None:
         shift_or_pad = Qt.KeyboardModifier.KeypadModifier | Qt.KeyboardModifier.ShiftModifier
         letter = event.text().strip() if event.text().isprintable() else ""
-        if (event.key() in _OPENS or letter) and not event.modifiers() & ~shift_or_pad:
+        if (event.key() in _OPENING_KEYS or letter) and not event.modifiers() & ~shift_or_pad:
             self.showPopup()
             if letter:
                 self.view().keyboardSearch(letter)

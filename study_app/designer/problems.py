@@ -1,4 +1,4 @@
-"""The problems of a study, as ``check`` prints them, with their repairs: found, listed, and pressed."""
+"""The problems of a study, as ``check`` prints them: the search for repairs, the list, and the repair buttons."""
 
 import re
 from collections import Counter
@@ -40,45 +40,44 @@ from study_app.protocol.source import Fault, Path, Places, names
 from study_app.protocol.warnings import untranslated_texts
 from study_app.protocol.wording import language_name
 
-_PLACE: Final = re.compile(r"([a-z]\w*(?:\.\w+)+): (.+)", re.DOTALL)
-"""The place in the file that a warning begins with."""
+_STATED_PATH: Final = re.compile(r"([a-z]\w*(?:\.\w+)+): (.+)", re.DOTALL)
+"""The path and the rest of a warning that begins with a path."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ProblemRow:
     """One problem."""
 
-    fault: Fault  # what is wrong, by path
+    fault: Fault
     element: Path  # the element whose form shows it; () if the file cannot be read
     # names of element and field ("Block Liquids, Order"), and the element's icon
     name: str
     icon: str
-    # the sentence of ``check``, and its hint
-    message: str
+    message: str  # the sentence of ``check``
     hint: str
     line: int | None  # the line in the file, from 1
-    warning: bool = False  # whether ``check`` only warns of it
+    warning: bool = False  # whether ``check`` reports it as a warning
 
     @property
     def identity(self) -> tuple[Path, str, bool]:
-        """The part that does not change when lines are inserted above."""
+        """The values that do not change when lines are inserted above: path, message and kind."""
         return self.fault.path, self.message, self.warning
 
     @property
     def place(self) -> str:
-        """Its place in the file, such as ``blocks.liquids.order · line 385``."""
+        """Its path and line in the file, such as ``blocks.liquids.order · line 385``."""
         return place_text(self.fault.path, self.line)
 
 
 def problem_rows(study: Study) -> tuple[ProblemRow, ...]:
     """Return the problems of a study outside unfinished entries, in the order of `fault_rows`.
 
-    The texts that are missing in a language are one problem, which leads to the list of texts to write.
+    Several missing texts in a language are one problem, which opens the list of texts to write.
     """
     rows = [row for row in fault_rows(study) if not study.is_unfinished(row.fault)]
     missing = Counter(row.fault.missing_language for row in rows if row.fault.kind == "no text")
     copied = Counter(text.language for text in untranslated_texts(study.document))
-    shown: dict[object, ProblemRow] = {}
+    rows_shown: dict[object, ProblemRow] = {}
     for row in rows:
         code = row.fault.missing_language
         if row.fault.kind == "no text" and missing[code] > 1:
@@ -86,18 +85,18 @@ def problem_rows(study: Study) -> tuple[ProblemRow, ...]:
             if code in copied:
                 message += f", and {counted(copied[code], 'copied text')} must be translated"
             fault, name = row.fault._replace(message=message, hint=""), f"Texts in {language_name(code)}"
-            listed = replace(
+            text_row = replace(
                 row, element=STUDY_LANGUAGES, name=name, icon="list", message=message, hint="", fault=fault
             )
-            shown.setdefault(code, listed)
+            rows_shown.setdefault(code, text_row)
         else:
-            shown[row] = row
-    return tuple(shown.values())
+            rows_shown[row] = row
+    return tuple(rows_shown.values())
 
 
 @lru_cache(maxsize=2)
 def fault_rows(study: Study) -> tuple[ProblemRow, ...]:
-    """Return a row for each fault of a study: elements in the order of their lines, their fields as in the form."""
+    """Return a row for each fault of a study: elements in the order of the file, their fields in that of the form."""
     if not study.is_toml:
         return tuple(
             ProblemRow(
@@ -123,19 +122,19 @@ def fault_rows(study: Study) -> tuple[ProblemRow, ...]:
 
 
 def warning_rows(study: Study, sentences: Iterable[str]) -> tuple[ProblemRow, ...]:
-    """Return the warnings of ``check`` in order, each with the first element that it names."""
+    """Return a row for each warning of ``check``, in the same order, with the first element that it names."""
     places = Places.of(study.text) if study.is_toml else None
     rows = []
     for sentence in dict.fromkeys(sentences):
-        path, text = _place_and_sentence(study, sentence)
+        path, text = _path_and_sentence(study, sentence)
         line = None if places is None else places.line(path)
         rows.append(replace(_problem_row(study, Fault(path, text), line), warning=True))
     return tuple(rows)
 
 
-def _place_and_sentence(study: Study, sentence: str) -> tuple[Path, str]:
-    """Return the place of a warning and its sentence."""
-    if (stated := _PLACE.match(sentence)) is not None:
+def _path_and_sentence(study: Study, sentence: str) -> tuple[Path, str]:
+    """Return the path of a warning and its sentence: the path stated in it, or that of the first element it names."""
+    if (stated := _STATED_PATH.match(sentence)) is not None:
         return tuple(int(step) - 1 if step.isdecimal() else step for step in stated[1].split(".")), stated[2]
     for word in re.findall(r"\w+", sentence):
         for section in ("liquids", "blocks"):
@@ -160,12 +159,12 @@ def _problem_row(study: Study, fault: Fault, line: int | None) -> ProblemRow:
     )
 
 
-_REST_MS: Final = 500
-"""So long after the last edit the search begins: each repair is tried on the whole study."""
+_PAUSE_MS: Final = 500
+"""Delay of the search after an edit, because each repair is tried on the whole study [ms]."""
 
 
 class RepairSearch(QObject):
-    """Finds the repairs of problems; ``found`` carries a problem and the texts of its repairs."""
+    """Searches for the repairs of problems; ``found`` carries a problem and the labels of its repairs."""
 
     found = Signal(object, object)
 
@@ -185,12 +184,12 @@ class RepairSearch(QObject):
         self._study, self._known, self._problems = study, {}, problems
         self._waiting = list(problems) if study.is_toml else []
         if self._waiting:
-            self._timer.start(_REST_MS)
+            self._timer.start(_PAUSE_MS)
         else:
             self._timer.stop()
 
     def find_repair(self, row: ProblemRow, sentence: str) -> Repair | None:
-        """Return a repair by its sentence; after an edit it is searched for at once."""
+        """Return the repair of a problem with this label; if it is not known yet, it is searched for at once."""
         self._find_repairs(row)
         return next((repair for repair in self._known.get(row, ()) if repair.label == sentence), None)
 
@@ -212,7 +211,7 @@ class RepairSearch(QObject):
 
 
 class RepairButton(ActionButton):
-    """Repairs ``problem``; ``typed`` carries the event of a typed letter, which is meant for the field."""
+    """A button that repairs ``problem``; ``typed`` carries the key event of a letter, which the field should get."""
 
     typed = Signal(object)
 
@@ -234,12 +233,12 @@ class RepairButton(ActionButton):
             super().keyPressEvent(event)
 
 
-HIGHEST, NARROW_BELOW = 290, 1000
+MAX_LIST_PX, NARROW_BELOW = 290, 1000
 HEAD_PX, ROW_PX, NAME_PX, NARROW_NAME_PX, REPAIR_PX, NARROW_REPAIR_PX = 92, 47, 300, 240, 190, 110
 
 
 class ProblemLine(Coloured, QWidget):
-    """One problem; ``opened`` is emitted when it is clicked, ``repair_asked`` with the text of a repair."""
+    """One problem; ``opened`` is emitted when it is clicked, ``repair_asked`` carries the label of a repair."""
 
     opened = Signal()
     repair_asked = Signal(str)
@@ -257,12 +256,12 @@ class ProblemLine(Coloured, QWidget):
         self._place = Elided("small", "text2")
         self._place.setFixedWidth(self.go.width())
         self.setCursor(Qt.CursorShape.PointingHandCursor)
-        signs = Icon("warning", "warn" if row.warning else "bad", 18), Icon(row.icon, "text2", 18)
-        said, hint = Clamped(row.message, 2, "label", steady=False), Elided("small", "text2")
+        icons = Icon("warning", "warn" if row.warning else "bad", 18), Icon(row.icon, "text2", 18)
+        message_label, hint = Clamped(row.message, 2, "label", steady=False), Elided("small", "text2")
         buttons = QWidget()
         buttons.setMinimumWidth(NARROW_REPAIR_PX if narrow else REPAIR_PX)
         self._repairs = hbox(STRETCH, spacing=6, margins=0, parent=buttons)
-        parts = (*signs, _column(self.go, self._place), (_column(said, hint), 1), buttons)
+        parts = (*icons, _column(self.go, self._place), (_column(message_label, hint), 1), buttons)
         hbox(*parts, spacing=10, margins=(10, 2, 6, 2), parent=self)
         self.repairs: list[RepairButton] = []
         self.show_repairs(repairs)
@@ -275,7 +274,7 @@ class ProblemLine(Coloured, QWidget):
         self.setToolTip("\n".join(filter(None, (row.name, row.message, row.hint))))
 
     def show_row(self, row: ProblemRow) -> None:
-        """Show the same problem at another line of the file."""
+        """Show the same problem with its new line in the file."""
         self.row = row
         self._place.show_text(row.place)
 
@@ -283,11 +282,11 @@ class ProblemLine(Coloured, QWidget):
         for button, sentence in zip(self.repairs, repairs, strict=False):
             button.show_repair(sentence)
         for sentence in repairs[len(self.repairs) : 2]:
-            made = RepairButton(self.row, sentence)
-            made.clicked.connect(lambda _checked=False, made=made: self.repair_asked.emit(made.text()))
-            self._repairs.addWidget(made)
-            made.show()  # at once: Tab skips widgets that a layout has not shown yet
-            self.repairs.append(made)
+            new_button = RepairButton(self.row, sentence)
+            new_button.clicked.connect(lambda _checked=False, button=new_button: self.repair_asked.emit(button.text()))
+            self._repairs.addWidget(new_button)
+            new_button.show()  # at once: Tab skips widgets that a layout has not shown yet
+            self.repairs.append(new_button)
 
     def apply_theme(self, theme: Theme) -> None:
         own = f"QPushButton {{ text-align: left; padding: 0; color: {theme.text}; }}"
@@ -308,7 +307,7 @@ def _column(*parts: QWidget) -> QVBoxLayout:
 
 
 class ProblemsCard(Card):
-    """The list of problems. Signals: ``opened`` (a `ProblemRow`), ``repair_asked`` (row, text), ``close_asked``."""
+    """The list of problems. Signals: ``opened`` (a `ProblemRow`), ``repair_asked`` (row, label), ``close_asked``."""
 
     opened = Signal(object)
     repair_asked = Signal(object, str)
@@ -319,13 +318,13 @@ class ProblemsCard(Card):
         self.setAccessibleName("Problems")
         self.problems: tuple[ProblemRow, ...] = ()
         self._warnings: tuple[ProblemRow, ...] = ()
-        self._had = False
+        self._had_rows = False
         self._repairing = False  # whether a pressed repair is being made
         self._repaired = False  # whether the last edit was a repair pressed here
         self.lines: list[ProblemLine] = []
         self._element: object = None
         self._here_only = False
-        self._listed: tuple[ProblemRow, ...] | None = None
+        self._listed_rows: tuple[ProblemRow, ...] | None = None
         self.repairs: dict[ProblemRow, tuple[str, ...]] = {}
         self.at: ProblemRow | None = None
         self._number = 0
@@ -345,7 +344,7 @@ class ProblemsCard(Card):
         self.close_button.clicked.connect(self.close_asked)
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
-        """Show the current lines after a click beside them or on a solved one."""
+        """Update the lines after a click beside them or on a solved problem."""
         self._repaired = False
         self._show_lines()
         super().mousePressEvent(event)
@@ -357,25 +356,29 @@ class ProblemsCard(Card):
             super().keyPressEvent(event)
 
     def begin(self) -> None:
-        """Reset the list for another study; it closes if there are no problems or warnings."""
-        self._had = bool(self.rows)
+        """Reset the list for another study; it closes if that has no problems and warnings."""
+        self._had_rows = bool(self.rows)
         self.problems = self._warnings = ()
-        self.lines, self._listed = [], None
+        self.lines, self._listed_rows = [], None
         self.at, self._number = None, 0
         self.area.verticalScrollBar().setValue(0)
 
     def show_problems(self, rows: tuple[ProblemRow, ...], element: object) -> None:
-        """Show problems; ``element`` is selected. The list closes when the last problem is solved."""
+        """Show problems, of which "Here only" shows those of ``element``; close when the last one is solved."""
         self._repaired = self._repairing or (self._repaired and rows == self.problems)
-        had, self.problems, self._element = bool(self.problems), rows, element
-        now = {row.identity: row for row in rows}
-        self.repairs = {now[row.identity]: sentences for row, sentences in self.repairs.items() if row.identity in now}
-        self._show_lines(closes=had)
+        had_problems, self.problems, self._element = bool(self.problems), rows, element
+        rows_by_identity = {row.identity: row for row in rows}
+        self.repairs = {
+            rows_by_identity[row.identity]: sentences
+            for row, sentences in self.repairs.items()
+            if row.identity in rows_by_identity
+        }
+        self._show_lines(closes=had_problems)
 
     def show_warnings(self, rows: tuple[ProblemRow, ...]) -> None:
-        """Show other warnings; the list closes when the last one is solved."""
-        had, self._had, self._warnings = self._had or bool(self.rows), False, rows
-        self._show_lines(closes=had)
+        """Show warnings; close when the last one is solved."""
+        had_rows, self._had_rows, self._warnings = self._had_rows or bool(self.rows), False, rows
+        self._show_lines(closes=had_rows)
 
     @property
     def rows(self) -> tuple[ProblemRow, ...]:
@@ -383,9 +386,9 @@ class ProblemsCard(Card):
 
     def _show_lines(self, *, closes: bool = False) -> None:
         rows = self.rows
-        if self.at is not None:  # lines above may have moved it
+        if self.at is not None:  # its line number may have changed
             self.at = next((row for row in rows if row.identity == self.at.identity), self.at)
-        if closes and not rows and not self.stays_still:
+        if closes and not rows and not self.keeps_lines_still:
             self.hide()
         counts = ((len(self.problems), "problem"), (len(self._warnings), "warning"))
         counted = [f"{count} {word}{'s' * (count != 1)}" for count, word in counts if count]
@@ -393,19 +396,19 @@ class ProblemsCard(Card):
         self.limit.show_values(((False, "All"), (True, "Here only")), self._here_only)
         self.next.setEnabled(bool(rows))
         listed = tuple(row for row in rows if not self._here_only or row.element == self._element)
-        wanted = min(HIGHEST, HEAD_PX + (ROW_PX + 1) * max(1, len(listed)))
-        self.setFixedHeight(max(wanted, self.height()) if self.stays_still else wanted)
-        if listed == self._listed:
+        needed_px = min(MAX_LIST_PX, HEAD_PX + (ROW_PX + 1) * max(1, len(listed)))
+        self.setFixedHeight(max(needed_px, self.height()) if self.keeps_lines_still else needed_px)
+        if listed == self._listed_rows:
             return
-        if self.stays_still and self.lines:
-            still = {row.identity: row for row in listed}
+        if self.keeps_lines_still and self.lines:
+            remaining = {row.identity: row for row in listed}
             for line in self.lines:
-                row = still.get(line.row.identity)
+                row = remaining.get(line.row.identity)
                 line.setEnabled(row is not None)
                 if row is not None:
                     line.show_row(row)
             return
-        self._listed = listed
+        self._listed_rows = listed
         inside = QWidget()
         self._column = column = vbox(spacing=0, margins=0, parent=inside)
         if rows and not listed:
@@ -420,13 +423,13 @@ class ProblemsCard(Card):
 
     def _add_line(self, row: ProblemRow) -> None:
         narrow = (self.parentWidget() or self).width() < NARROW_BELOW
-        made = ProblemLine(row, self.repairs.get(row, ()), narrow=narrow)
-        made.opened.connect(lambda: self.open_problem(made.row))
-        made.repair_asked.connect(lambda sentence: self._ask_to_repair(made.row, sentence))
-        made.here = row == self.at
-        for part in (made, Rule()):
+        line = ProblemLine(row, self.repairs.get(row, ()), narrow=narrow)
+        line.opened.connect(lambda: self.open_problem(line.row))
+        line.repair_asked.connect(lambda sentence: self._ask_to_repair(line.row, sentence))
+        line.here = row == self.at
+        for part in (line, Rule()):
             self._column.insertWidget(self._column.count() - 1, part)
-        self.lines.append(made)
+        self.lines.append(line)
 
     def _ask_to_repair(self, row: ProblemRow, sentence: str) -> None:
         self._repairing = True
@@ -434,8 +437,8 @@ class ProblemsCard(Card):
         self._repairing = False
 
     @property
-    def stays_still(self) -> bool:
-        """Whether no line moves, so that a click on the next repair does not miss it."""
+    def keeps_lines_still(self) -> bool:
+        """Whether lines keep their positions, so that a click on the next repair does not miss it."""
         return self._repaired and self.isVisible() and self.underMouse()
 
     def leaveEvent(self, event: QEvent) -> None:
@@ -460,7 +463,7 @@ class ProblemsCard(Card):
 
     @property
     def rows_after_current(self) -> tuple[ProblemRow, ...]:
-        """The rows after the current one; if it was solved, from the row that replaced it."""
+        """All rows, beginning after the current one, or at its former position if it was solved."""
         at = self.rows.index(self.at) + 1 if self.at in self.rows else self._number
         at %= max(1, len(self.rows))
         return (*self.rows[at:], *self.rows[:at])
@@ -469,7 +472,7 @@ class ProblemsCard(Card):
         return [button for line in self.lines for button in line.repairs if line.row == problem]
 
     def set_current(self, row: ProblemRow) -> None:
-        """Make a problem the current one; `rows_after_current` begins after it."""
+        """Make a problem the current one, after which `rows_after_current` begins."""
         if row in self.rows:
             self.at, self._number = row, self.rows.index(row)
 
@@ -485,6 +488,6 @@ class ProblemsCard(Card):
         self.opened.emit(row)
 
     def _limit_to_element(self, here_only: object) -> None:
-        self._here_only, self._listed = bool(here_only), None
+        self._here_only, self._listed_rows = bool(here_only), None
         self.lines = []
         self._show_lines()

@@ -1,4 +1,4 @@
-"""Cards over the place: questions before a step."""
+"""Prompts: cards with a question that must be answered before a step."""
 
 from collections.abc import Sequence
 
@@ -16,7 +16,7 @@ from study_app.gui.widgets import STRETCH, ActionButton, Card, Choice, add_layou
 from study_app.number_text import capitalised, typed_numbers
 from study_app.protocol.source import Path, names, value_at
 
-_HIGHEST = 560
+_MAX_PX = 560
 _PLACES_PX = 200
 
 
@@ -29,9 +29,9 @@ class Prompt(Card):
     def __init__(self, title: str, explanation: str) -> None:
         super().__init__(title, padding=20, gap=10)
         self.setAccessibleName(title)
-        self.setMaximumHeight(_HIGHEST)
-        said = label(explanation, "body", "text2", wraps=True)
-        self.column.addWidget(said)
+        self.setMaximumHeight(_MAX_PX)
+        explanation_label = label(explanation, "body", "text2", wraps=True)
+        self.column.addWidget(explanation_label)
         self.cancel = ActionButton("", "Cancel", height=40)
         self.cancel.clicked.connect(self.given_up)
         self.buttons = hbox(self.cancel, STRETCH, spacing=10)
@@ -43,13 +43,13 @@ class Prompt(Card):
             super().keyPressEvent(event)
 
 
-def naming_places(study: Study, path: Path) -> tuple[str, ...]:
-    """Return the places outside an element that refer to it, as text."""
+def places_of_references(study: Study, path: Path) -> tuple[str, ...]:
+    """Return the references to an element from other elements, each as the text "Block Liquids: Order"."""
     document = study.document
     places = (*references_to(document, path), *orphaned_keys(document, [path]))
     outside = [place for place in places if place[: len(path)] != path]
-    named = (f"{kind_and_title(document, element_of(study, place))}: {_field_label(study, place)}" for place in outside)
-    return tuple(dict.fromkeys(named))
+    texts = (f"{kind_and_title(document, element_of(study, place))}: {_field_label(study, place)}" for place in outside)
+    return tuple(dict.fromkeys(texts))
 
 
 def _field_label(study: Study, place: Path) -> str:
@@ -60,7 +60,7 @@ def _field_label(study: Study, place: Path) -> str:
 
 
 class DeleteCard(Prompt):
-    """The references (``places``) to an element that is to be deleted, and what to do with them."""
+    """The references to an element to be deleted, as texts in ``places``, and what to do with them."""
 
     def __init__(self, study: Study, path: Path, places: tuple[str, ...]) -> None:
         document, count = study.document, len(places)
@@ -74,13 +74,13 @@ class DeleteCard(Prompt):
         area.setWidget(inside)
         area.setFixedHeight(min(_PLACES_PX, inside.sizeHint().height()))
         self.column.addWidget(area)
-        gone = (
+        also_deleted = (
             element
             for element in paths_to_delete(document, path, study.is_required)
             if element != path and len(element) == 2
         )
-        if too := ", ".join(kind_and_title(document, path) for path in gone if isinstance(path[1], str)):
-            self.column.addWidget(label(f"“Delete them too” also deletes {too}.", "label", wraps=True))
+        if titles := ", ".join(kind_and_title(document, path) for path in also_deleted if isinstance(path[1], str)):
+            self.column.addWidget(label(f"“Delete them too” also deletes {titles}.", "label", wraps=True))
         self.all = ActionButton("trash", "Delete them too", role="danger", height=40)
         self.all.clicked.connect(lambda: self.answered.emit(DeleteElement(path, "all")))
         self.gaps = ActionButton("", "Leave gaps", height=40)
@@ -102,22 +102,22 @@ class DeleteCard(Prompt):
 
 
 class ConfirmCard(Prompt):
-    """A confirmation of something that breaks or loses data; ``answered`` is emitted if it is confirmed."""
+    """A question before an action with consequences; ``answered`` is emitted if it is confirmed."""
 
     def __init__(self, title: str, explanation: str, action: str, icon: str = "", breaks: Sequence[str] = ()) -> None:
         super().__init__(title, explanation)
         add_parts(self.column, *(label(f"•  {text}", "label", wraps=True) for text in breaks))
-        self.go_on = ActionButton(icon, action, role="danger", height=40)
-        self.go_on.clicked.connect(lambda: self.answered.emit(action))
-        self.buttons.addWidget(self.go_on)
+        self.confirm = ActionButton(icon, action, role="danger", height=40)
+        self.confirm.clicked.connect(lambda: self.answered.emit(action))
+        self.buttons.addWidget(self.confirm)
         add_layout(self.column, self.buttons)
         self.first: QWidget = self.cancel
 
 
 class SeriesCard(Prompt):
-    """The number that varies between copies of an element, and its values, with the titles of the copies.
+    """A card with the number that varies between copies of an element, its values, and the titles of the copies.
 
-    ``duplicates`` offers a copy with the same conditions, too: it is asked of a block whose copy has other conditions.
+    With ``duplicates`` it is shown before a block is duplicated, and also offers a copy with the same conditions.
     """
 
     def __init__(self, study: Study, path: Path, numbers: Sequence[Row], *, duplicates: bool = False) -> None:
@@ -156,14 +156,14 @@ class SeriesCard(Prompt):
         return MakeSeries(self.path, self.numbers[self.number.currentIndex()].path, values)
 
     def _show_titles(self) -> None:
-        """Show the titles of the copies, or why none can be made."""
-        said, why = "", ""
+        """Show the titles of the copies, or the reason why they cannot be made."""
+        titles, reason = "", ""
         try:
             if self.values.text().strip():
-                said = self._request().step(StepContext(self.study)).announcement
+                titles = self._request().step(StepContext(self.study)).announcement
         except (ValueError, Refused) as refusal:
-            why = f"{capitalised(str(refusal))}."
-        set_ink(self.copies, "bad" if why else "text2")
-        self.copies.setText(why or said)
-        self.values.setAccessibleDescription(why or said)
-        self.make.setEnabled(bool(said))
+            reason = f"{capitalised(str(refusal))}."
+        set_ink(self.copies, "bad" if reason else "text2")
+        self.copies.setText(reason or titles)
+        self.values.setAccessibleDescription(reason or titles)
+        self.make.setEnabled(bool(titles))

@@ -1,4 +1,4 @@
-"""Drafts, saving, and the banner of a study that is read-only or was changed by another program."""
+"""Drafts, saving, and the banner of a study that is read-only or changed by another program."""
 
 import time
 from collections.abc import Callable
@@ -23,17 +23,16 @@ from study_app.gui.home import time_text
 from study_app.number_text import counted
 from study_app.store.versions import ChangedOutsideError, draft_of, keep_original, kept_versions
 
-_DRAFT_MS: Final = 50
+_DRAFT_CHECK_MS: Final = 50
 _RETRY_MS: Final = 2_000
 
 
 class Saving(QObject):
     """Keeps the draft of the open study and writes its file.
 
-    ``kept`` is emitted when a draft was written or the banner changed, ``saved`` carries the written file,
-    ``copy_asked`` the study to be copied, ``compare_asked`` the version to compare with (its hash, or "file"),
-    ``continued`` the study under another name that replaces the open one; ``discarded`` is emitted when a study that
-    was never saved was discarded.
+    Signals: ``kept`` (a draft was written), ``saved`` (the written file), ``copy_asked`` (the study to copy),
+    ``compare_asked`` (the version to compare with: its hash, or "file"), ``continued`` (the document under another
+    name that replaces the open one), ``discarded`` (a study that was never saved was discarded).
     """
 
     kept = Signal()
@@ -48,15 +47,17 @@ class Saving(QObject):
         self.editing, self.place, self.runs = editing, place, runs
         self.banner: Notice | None = None
         self._notice: Notice | None = None
-        self._lasts: bool | None = None  # while edited (True), until edited (False), until closed (None)
+        self._shown_while_edited: bool | None = (
+            None  # True: while the study is edited; False: until it is edited; None: until closed
+        )
         self.card: SaveCard | None = None
-        self._others, self._trouble = 0, ""
-        self._drafting = QTimer(self)
-        self._drafting.setInterval(_DRAFT_MS)
-        self._drafting.timeout.connect(self.write_draft)
+        self._other_edits, self._draft_error = 0, ""
+        self._draft_timer = QTimer(self)
+        self._draft_timer.setInterval(_DRAFT_CHECK_MS)
+        self._draft_timer.timeout.connect(self.write_draft)
         application = QGuiApplication.instance()
         assert isinstance(application, QGuiApplication)  # noqa: S101 - a window has one
-        application.applicationStateChanged.connect(self._look_after_return)
+        application.applicationStateChanged.connect(self._check_file_after_return)
         editing.opened_other.connect(self._show_opened)
         editing.edited.connect(self._end_notice)
         place.left.connect(self.leave)
@@ -68,57 +69,63 @@ class Saving(QObject):
         self.banner, opened = None, self.editing.opened
         if opened is None:
             return
-        self._drafting.start(_DRAFT_MS)
-        self._others, self._trouble = opened.keeper.others, ""
+        self._draft_timer.start(_DRAFT_CHECK_MS)
+        self._other_edits, self._draft_error = opened.keeper.others, ""
         self.offer_to_discard()
         self.banner = _banner_notice(opened) or self._notice
 
     def offer_to_discard(self) -> None:
-        """Show the time of the restored draft; for a study that was never saved, whenever it is opened."""
+        """Show the time of the restored draft, with a button that discards it."""
         opened = self.editing.opened
         draft = None if opened is None else opened.draft if opened.base else draft_of(opened.file)
         if opened is not None and draft is not None and opened.edited:
             sentence = f"Draft from {time_text(draft.kept_at)}, {'not' if opened.base else 'never'} saved"
-            self._show_notice(sentence, ("discard", "Discard the draft"), lasts=True)
+            self._show_notice(sentence, ("discard", "Discard the draft"), while_edited=True)
 
-    def _show_notice(self, sentence: str | None, *actions: tuple[str, str], lasts: bool | None = None) -> None:
-        """Show a notice unless another one needs an answer; None removes it, ``lasts`` sets its duration."""
-        self._notice, self._lasts = None if sentence is None else Notice(sentence, actions, closes=True), lasts
+    def _show_notice(self, sentence: str | None, *actions: tuple[str, str], while_edited: bool | None = None) -> None:
+        """Set the notice for the banner, which a banner that needs an answer hides; None removes it.
+
+        ``while_edited`` is that of `_shown_while_edited`.
+        """
+        self._notice, self._shown_while_edited = (
+            None if sentence is None else Notice(sentence, actions, closes=True),
+            while_edited,
+        )
 
     def _end_notice(self) -> None:
-        """Remove a notice that no longer applies: the draft differs from the file, or the file has problems."""
+        """Remove the notice if it does not apply any more after an edit."""
         opened = self.editing.opened
-        if opened is not None and self._notice is not None and self._lasts is (not opened.edited):
+        if opened is not None and self._notice is not None and self._shown_while_edited is (not opened.edited):
             self._close_notice(opened)
 
     def _close_notice(self, opened: Document) -> None:
         self._show_notice(None)
-        opened.draft = None  # it is not announced again
+        opened.draft = None  # so that it is not announced again
         self.banner = _banner_notice(opened)
         self.place.banner.show_notice(self.banner)
 
-    def look_again(self) -> None:
+    def check_file(self) -> None:
         """Check whether the study may be edited, and whether another program changed its file.
 
-        If it was not edited here, the file's content is loaded as a step; otherwise the user is asked which one to
-        keep.
+        If the study was not edited here, the file's content is loaded as a step; otherwise the banner asks which one
+        to keep.
         """
         opened = self.editing.opened
         if opened is None:
             return
-        before = opened.read_only, self.banner
+        previous = opened.read_only, self.banner
         opened.read_only = opened.read_only_reason(self.editing.results)
         if not opened.edited and opened.file.exists() and _is_changed_outside(opened):
             self._try_action(opened, opened.take_file_content)
         self.banner = _banner_notice(opened) or self._notice
-        if before != (opened.read_only, self.banner):
+        if previous != (opened.read_only, self.banner):
             self.editing.announce_edit()
 
-    def _look_after_return(self, state: Qt.ApplicationState) -> None:
+    def _check_file_after_return(self, state: Qt.ApplicationState) -> None:
         """Check the file when the program becomes active, since another program may have written it."""
         if state == Qt.ApplicationState.ApplicationActive and self.place.isVisible():
             self.place.flush()
-            self.look_again()
+            self.check_file()
 
     def answer_banner(self, action: str) -> None:
         opened = self.editing.opened
@@ -138,12 +145,12 @@ class Saving(QObject):
             self._close_notice(opened)
             return
         if action == "discard" and not opened.base:
-            lost = (
+            consequence = (
                 "has never been saved, so if you discard its draft, the whole study will be lost. This cannot be "
                 "undone."
             )
             title = f"Discard “{opened.title or opened.file.stem}”?"
-            card = ConfirmCard(title, f"{opened.file.name} {lost}", "Discard the draft", "trash")
+            card = ConfirmCard(title, f"{opened.file.name} {consequence}", "Discard the draft", "trash")
             card.answered.connect(self.discard_study)
             self.place.show_prompt(card, card.first)
             return
@@ -216,16 +223,16 @@ class Saving(QObject):
         if opened is None:
             return
         try:
-            made = opened.copy_as(name)
+            copy = opened.copy_as(name)
         except StudyError as refusal:
             if self.card is not None:
                 self.card.refuse(f"{refusal}.")
             return
         self.write_draft(at_once=True)
         self.place.close_prompt()
-        keep_original(made.file, opened.file.stem)
-        self.continued.emit(made)
-        self._save_file(made)
+        keep_original(copy.file, opened.file.stem)
+        self.continued.emit(copy)
+        self._save_file(copy)
 
     def _save_file(self, opened: Document) -> None:
         try:
@@ -238,8 +245,8 @@ class Saving(QObject):
             self.editing.announce_edit()
             return
         count = len(problem_rows(opened.study))
-        said = f"Saved, but the study cannot be run yet because of {counted(count, 'problem')}" if count else None
-        self._show_notice(said, ("problems", "Show the list"), lasts=False)
+        sentence = f"Saved, but the study cannot be run yet because of {counted(count, 'problem')}" if count else None
+        self._show_notice(sentence, ("problems", "Show the list"), while_edited=False)
         self._show_banner(opened)
         self.saved.emit(opened.file)
 
@@ -250,34 +257,34 @@ class Saving(QObject):
         self.write_draft(at_once=True)
 
     def write_draft(self, *, at_once: bool = False) -> None:
-        """Write the draft if it is due; a failed write is retried and reported once."""
+        """Write the draft if it is due, or ``at_once``; a failed write is reported once and retried."""
         opened = self.editing.opened
         if opened is None:
             return
         try:
             written = opened.write_draft(None if at_once else time.perf_counter())
         except StudyError as error:
-            self._drafting.setInterval(_RETRY_MS)
-            if self._trouble != str(error):
-                self._trouble = str(error)
+            self._draft_timer.setInterval(_RETRY_MS)
+            if self._draft_error != str(error):
+                self._draft_error = str(error)
                 self.place.message.emit("The draft is not up to date", f"{error}.")
             return
-        if self._trouble:
-            self._trouble = ""
-            self._drafting.setInterval(_DRAFT_MS)
-        if opened.keeper.others > self._others:
-            self._others = opened.keeper.others
-            said = (
+        if self._draft_error:
+            self._draft_error = ""
+            self._draft_timer.setInterval(_DRAFT_CHECK_MS)
+        if opened.keeper.others > self._other_edits:
+            self._other_edits = opened.keeper.others
+            sentence = (
                 "This study is also being edited in another window. The unsaved edits made there are kept as a version"
             )
-            self._show_notice(said, ("compare", "Compare"))
+            self._show_notice(sentence, ("compare", "Compare"))
             self._show_banner(opened)
         if written:
             self.kept.emit()
 
-    def _try_action(self, opened: Document, act: Callable[[], object]) -> None:
+    def _try_action(self, opened: Document, action: Callable[[], object]) -> None:
         try:
-            act()
+            action()
         except StudyError as error:
             self.place.message.emit("The action failed", f"{error}.")
         self._show_banner(opened)
@@ -288,7 +295,7 @@ class Saving(QObject):
 
 
 def _banner_notice(opened: Document) -> Notice | None:
-    """Return why a study is read-only, or that another program changed its file; None if neither applies."""
+    """Return the notice on a study that is read-only, or whose file another program changed; otherwise None."""
     if opened.read_only:
         return Notice(opened.read_only, (("copy", "Make a copy …"),))
     try:
@@ -299,9 +306,9 @@ def _banner_notice(opened: Document) -> Notice | None:
         return None
     if not opened.file.exists():
         return Notice("Another program has deleted or moved this file", (("keep", "Keep mine"),))
-    too = ", and you have edited it here too" if opened.edited else ""
+    edited_too = ", and you have edited it here too" if opened.edited else ""
     return Notice(
-        f"Another program has changed this file{too}",
+        f"Another program has changed this file{edited_too}",
         (("keep", "Keep mine"), ("take", "Use the file's"), ("compare", "Compare")),
     )
 

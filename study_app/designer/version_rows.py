@@ -1,4 +1,4 @@
-"""Versions of a study: which may be saved, what was run, and what is said of them."""
+"""Texts on the versions of a study: the version chip, the versions to compare with, the edits of a draft."""
 
 import re
 import tomllib
@@ -19,9 +19,9 @@ from study_app.protocol.descriptions import document_differences
 from study_app.store.versions import Kept, Run, kept_content
 
 FILE: Final = "file"
-"""The key of what the file holds."""
-_MOST_KEPT: Final = 40
-_STATED: Final = re.compile(r"""^\s*version\s*=\s*["']([^"']+)""", re.MULTILINE)
+"""The key of the file's content among the versions."""
+_MAX_KEPT: Final = 40
+_VERSION_LINE: Final = re.compile(r"""^\s*version\s*=\s*["']([^"']+)""", re.MULTILINE)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -30,7 +30,7 @@ class VersionChip:
 
     tone: Tone = "neutral"
     icon: str = "ring"
-    words: str = ""
+    text: str = ""
     tip: str = ""
     save: str = "Save"
 
@@ -44,25 +44,25 @@ class Comparison:
 
 
 def version_chip(standing: Standing, known: Iterable[Run]) -> VersionChip:
-    """Return the chip of a study with this standing."""
+    """Return the version chip of a study; ``known`` are the versions that were run."""
     known = tuple(known)
     tip = "\n".join(f"Version {run.version}: {run_counts(run)}" for run in known)
     save = f"Save {standing.version} …" if standing.needs_confirmation else "Save"
     if not standing.last_version:
         text = "Piloted" if any(run.pilots for run in known) else "Rehearsed" if known else "Not yet run"
         return VersionChip(
-            tone="neutral", icon="ring", words=text, tip=tip or "No session has been run with this study", save=save
+            tone="neutral", icon="ring", text=text, tip=tip or "No session has been run with this study", save=save
         )
     if standing.sessions:
         text = f"{standing.version}, run by {standing.sessions}"
-        return VersionChip(tone="ok", icon="check", words=text, tip=tip, save=save)
+        return VersionChip(tone="ok", icon="check", text=text, tip=tip, save=save)
     return VersionChip(
-        tone="accent", icon="pen", words=f"{standing.version}, was {standing.last_version}", tip=tip, save=save
+        tone="accent", icon="pen", text=f"{standing.version}, was {standing.last_version}", tip=tip, save=save
     )
 
 
 def run_counts(run: Run) -> str:
-    """Return "12 sessions, 2 pilots, 1 rehearsal", without zero counts."""
+    """Return the counts of a run as text, without zeros: "12 sessions, 2 pilots, 1 rehearsal"."""
     numbers = ((run.sessions, "session"), (run.pilots, "pilot"), (run.rehearsals, "rehearsal"))
     return ", ".join(counted(number, word) for number, word in numbers if number)
 
@@ -75,11 +75,11 @@ def version_choices(
     ``file`` is the label of the file, "" if it equals the study; ``now`` is used for "Today 14:02".
     """
     choices = [(FILE, file)] if file else []
-    ran = {run.hash for run in known}
+    run_hashes = {run.hash for run in known}
     choices += [
         (run.hash, f"{run.version}: {run_counts(run)}, last {_time_text(run.last, now)}") for run in reversed(known)
     ]
-    saved = [version for version in kept if version.hash not in ran][-_MOST_KEPT:]
+    saved = [version for version in kept if version.hash not in run_hashes][-_MAX_KEPT:]
     choices += [(version.hash, _kept_label(version, now)) for version in reversed(saved)]
     return tuple(choices)
 
@@ -88,10 +88,10 @@ def _kept_label(version: Kept, now: datetime) -> str:
     when = _time_text(version.at, now)
     if version.origin == "draft":
         return f"Unsaved edits from another window, {when}"
-    stated = _STATED.search((kept_content(version.hash) or b"").decode("utf-8", "replace"))
-    how = "saved" if version.origin == "saved" else "the file before it was saved"
-    by = f" by {version.by}" if version.by else ""
-    return f"{stated[1] if stated else 'No version'}: {how}{by} {when}"
+    version_line = _VERSION_LINE.search((kept_content(version.hash) or b"").decode("utf-8", "replace"))
+    origin = "saved" if version.origin == "saved" else "the file before it was saved"
+    operator = f" by {version.by}" if version.by else ""
+    return f"{version_line[1] if version_line else 'No version'}: {origin}{operator} {when}"
 
 
 def _time_text(moment: str, now: datetime) -> str:
@@ -102,12 +102,12 @@ def _time_text(moment: str, now: datetime) -> str:
     return f"{text[:1].lower()}{text[1:]}"
 
 
-_NAMED_AT_MOST: Final = 3
-"""So many elements with edits that were not saved are named."""
+_MAX_NAMED: Final = 3
+"""Greatest number of elements named in a list of unsaved edits."""
 
 
 def draft_title(draft: str, folder: Path) -> str:
-    """Return the title of a study, "" if it has none."""
+    """Return the title of the study in a draft's text, "" if it has none."""
     return study_title(Study(draft, folder).document)
 
 
@@ -123,5 +123,6 @@ def edited_elements_text(saved: str, draft: str, folder: Path) -> str:
         label_of(path[1]) if path[0] == "study" else title_of(study.document, element_of(study, path))
         for path in places
     )
-    named, more = list(titles)[:_NAMED_AT_MOST], len(titles) - _NAMED_AT_MOST
-    return f": {', '.join(named) or 'only comments, order or formatting'}{f' and {more} more' if more > 0 else ''}"
+    named_titles, more_count = list(titles)[:_MAX_NAMED], len(titles) - _MAX_NAMED
+    more_text = f" and {more_count} more" if more_count > 0 else ""
+    return f": {', '.join(named_titles) or 'only comments, order or formatting'}{more_text}"

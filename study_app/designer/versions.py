@@ -1,4 +1,4 @@
-"""What the open study was run with: the tab Changes, cards that ask before saving, ids with recorded answers."""
+"""The versions of the open study that were run: the tab Changes, the card for saving, locked question IDs."""
 
 import contextlib
 import json
@@ -55,13 +55,13 @@ from study_app.store.versions import (
     source_of,
 )
 
-_LOOK_MS: Final = 150
+_DELAY_MS: Final = 150
 
 
 class KnownRuns(QObject):
-    """The contents of the open study that were used in sessions; ``changed`` is emitted when they or the chip change.
+    """The versions of the open study that were run; ``changed`` is emitted when they or the version chip change.
 
-    ``items`` counts the sessions of participants by questionnaire and id of the questions asked.
+    ``items`` has the number of participants' sessions by questionnaire and question ID.
     """
 
     changed = Signal()
@@ -73,10 +73,10 @@ class KnownRuns(QObject):
         self.items: Mapping[tuple[str, str], int] = {}
         self.chip = VersionChip()
         self._reader = Background(self)
-        self._reader.done.connect(self._take_runs)
-        self._resting = delayed_call(self, _LOOK_MS, self._show_standing)
+        self._reader.done.connect(self._apply_runs)
+        self._pause_timer = delayed_call(self, _DELAY_MS, self._show_standing)
         editing.opened_other.connect(self._forget_runs)
-        editing.edited.connect(self._resting.start)
+        editing.edited.connect(self._pause_timer.start)
 
     def read_in_background(self) -> None:
         """Read the existing sessions in the background."""
@@ -95,12 +95,12 @@ class KnownRuns(QObject):
         self.known, self.items, self.chip = (), {}, VersionChip()
         self.read_in_background()
 
-    def _take_runs(self, answer: tuple[str, tuple[Run, ...], Mapping[tuple[str, str], int]]) -> None:
+    def _apply_runs(self, answer: tuple[str, tuple[Run, ...], Mapping[tuple[str, str], int]]) -> None:
         if self.editing.opened is not None and self.editing.opened.name == answer[0]:
-            fresh = answer[1:] != (self.known, self.items)
+            is_new = answer[1:] != (self.known, self.items)
             _, self.known, self.items = answer
             self._show_standing()
-            if fresh:
+            if is_new:
                 self.changed.emit()
 
     def _show_standing(self) -> None:
@@ -138,7 +138,9 @@ class _DifferenceText(Coloured, QPlainTextEdit):
         self.setLineWrapMode(QPlainTextEdit.LineWrapMode.NoWrap)
         self.setTabChangesFocus(True)
         inks = ("bad", "bad_bg", 400), ("ok", "ok_bg", 400), ("text2", "sunk", 400)
-        self._colours = Colours(self.document(), r"(^-.*)|(^\+.*)|(^@.*)", *inks)  # gone, new, and lines left out
+        self._colours = Colours(
+            self.document(), r"(^-.*)|(^\+.*)|(^@.*)", *inks
+        )  # removed lines, new lines, and line numbers
 
     def show_lines(self, lines: Sequence[str]) -> None:
         if (text := "\n".join(lines)) != self.toPlainText():
@@ -168,12 +170,14 @@ class SaveCard(Prompt):
         self.difference.show_lines(difference.lines)
         self.column.addWidget(self.difference, 1)
         self.difference.setVisible(bool(difference.lines))
-        are = "it is" if problems == 1 else "they are"
-        wrong = f"{counted(problems, 'problem')}: correct {are} before you start a new session." if problems else ""
-        for icon, ink, text in (("info", "text2", difference.note), ("warning", "warn", wrong)):
+        pronoun = "it is" if problems == 1 else "they are"
+        problem_note = (
+            f"{counted(problems, 'problem')}: correct {pronoun} before you start a new session." if problems else ""
+        )
+        for icon, ink, text in (("info", "text2", difference.note), ("warning", "warn", problem_note)):
             if text:
-                sign = Icon(icon, ink, 18)  # type: ignore[arg-type]  # an ink
-                add_layout(self.column, hbox(sign, (label(text, "label", wraps=True), 1), spacing=8))
+                icon_widget = Icon(icon, ink, 18)  # type: ignore[arg-type]  # an ink
+                add_layout(self.column, hbox(icon_widget, (label(text, "label", wraps=True), 1), spacing=8))
         self.version = _field("Version to save as", standing.version, 110)
         self.name = _field("Short name for the new study", "", 220)
         self.name.setPlaceholderText("lowercase letters and digits")
@@ -183,9 +187,9 @@ class SaveCard(Prompt):
         self.save = ActionButton("save", "", role="primary", height=40)
         self._of_version = label("Version", "label")
         self._of_name = label("Short name", "label")
-        line = hbox(self._of_version, self.version, self._of_name, self.name, (self.refusal, 1), spacing=10)
+        fields = hbox(self._of_version, self.version, self._of_name, self.name, (self.refusal, 1), spacing=10)
         add_parts(self.buttons, self.changes, self.another, self.save)
-        add_parts(self.column, line, self.buttons)
+        add_parts(self.column, fields, self.buttons)
         self._naming = False
         self._show_name(naming=False)
         self.first: QWidget = self.save
@@ -223,27 +227,27 @@ class SaveCard(Prompt):
 
 
 def _field(name: str, text: str, width: int) -> QLineEdit:
-    made = QLineEdit(text)
-    made.setFont(font("body"))
-    made.setAccessibleName(name)
-    made.setFixedWidth(width)
-    return made
+    field = QLineEdit(text)
+    field.setFont(font("body"))
+    field.setAccessibleName(name)
+    field.setFixedWidth(width)
+    return field
 
 
-_TAB: Final = "changes"
-_REST_MS: Final = 200
+_TAB_NAME: Final = "changes"
+_PAUSE_MS: Final = 200
 _NO_COPY: Final = (
     "This computer does not have a copy of this version. The differences are based on a receipt, which does not "
     "contain the conditions."
 )
-_FAULTY: Final = (
+_STUDY_FAULTY: Final = (
     "This computer does not have a copy of this version. To list the differences, correct the study's problems first."
 )
 _EQUAL: Final = "The study is identical to this version."
 
 
 class Version(NamedTuple):
-    """A version to compare with: its source (text and liquid files) if a copy is stored, and a run with a receipt."""
+    """A version to compare with: its source (text and liquid files) if known, and a run with its receipt."""
 
     source: str | None
     run: Run | None = None
@@ -254,7 +258,7 @@ class Version(NamedTuple):
 
 
 def version_of(opened: Document, run: Run) -> Version:
-    """Return a version that was run, from its stored copy or the current file."""
+    """Return a version that was run; its source is a stored copy or the file, if they have this version."""
     source = source_of(run)
     if source is None:
         file = opened.saved_source
@@ -263,7 +267,7 @@ def version_of(opened: Document, run: Run) -> Version:
 
 
 def _kept_version(hash_: str) -> Version:
-    """Return a saved version."""
+    """Return a stored version that was not run."""
     content = kept_content(hash_)
     return Version(None if content is None else content.decode("utf-8", "replace"))
 
@@ -279,21 +283,25 @@ def _file_version(file: Path) -> Version:
 def compare(version: Version, study: Study) -> Comparison:
     """Return the differences between a study and a version: lines, or sentences if only a receipt is known."""
     if version.source is None:
-        held = None if version.run is None else version.run.protocol
-        if held is None or study.protocol is None:
-            return Comparison((), _FAULTY)
-        return Comparison(differences(held, json.loads(json.dumps(without_conditions(study.protocol)))), _NO_COPY)
-    has_liquids = bool(StudySource.split(version.source.encode()).liquids)  # it is kept with its liquid files
-    now = study.source.decode() if has_liquids else study.text
-    before, after = (with_line_feeds(text).split("\n") for text in (version.source, now))
+        run_protocol = None if version.run is None else version.run.protocol
+        if run_protocol is None or study.protocol is None:
+            return Comparison((), _STUDY_FAULTY)
+        return Comparison(
+            differences(run_protocol, json.loads(json.dumps(without_conditions(study.protocol)))), _NO_COPY
+        )
+    has_liquids = bool(
+        StudySource.split(version.source.encode()).liquids
+    )  # the stored source then contains the liquid files
+    current = study.source.decode() if has_liquids else study.text
+    before, after = (with_line_feeds(text).split("\n") for text in (version.source, current))
     _, _, *lines = unified_diff(before, after, lineterm="") if before != after else ("", "")
     return Comparison(tuple(lines), "" if lines else _EQUAL)
 
 
 def latest_run(known: Iterable[Run]) -> Run | None:
-    """Return the version used last with participants, else that of the last pilot or rehearsal."""
-    ran = tuple(known)
-    return next((run for run in reversed(ran) if run.sessions), ran[-1] if ran else None)
+    """Return the last run with participants, else the last pilot or rehearsal, else None."""
+    runs = tuple(known)
+    return next((run for run in reversed(runs) if run.sessions), runs[-1] if runs else None)
 
 
 class Changes(Card):
@@ -303,9 +311,9 @@ class Changes(Card):
         super().__init__(padding=14, gap=8)
         self.editing, self.place, self.runs = editing, place, runs
         self.chosen = ""
-        """The key of the version that is compared with: its hash, or that of the file."""
-        self._wanted = ""
-        self._asked: Run | None = None
+        """The key of the version that is compared with the study: its hash, or `FILE`."""
+        self._preferred = ""
+        self._session_run: Run | None = None
         self._choices: tuple[tuple[str, str], ...] = ()
         self.setAccessibleName("Changes")
         self.version = make_dense(Choice(), "Version to compare with")
@@ -315,52 +323,52 @@ class Changes(Card):
         self.note = label("", "label", "text2", wraps=True)
         self.difference = _DifferenceText()
         self.top = QWidget()
-        of = label("Compare with", "label")
-        hbox(of, (self.version, 1), self.restore, spacing=10, margins=0, parent=self.top)
+        prompt_label = label("Compare with", "label")
+        hbox(prompt_label, (self.version, 1), self.restore, spacing=10, margins=0, parent=self.top)
         self.nothing = label(_NOTHING, "body", "text2", wraps=True)
         add_parts(self.column, self.top, self.nothing, self.note, (self.difference, 1))
         self.setFocusProxy(self.version)
         for part in (self.top, self.note, self.difference):
             part.hide()
-        place.pane.add_page(PanePage(name=_TAB, words="Changes", body=self, with_facts=False))
-        self._resting = delayed_call(self, _REST_MS, self.compare_now)
+        place.pane.add_page(PanePage(name=_TAB_NAME, title="Changes", body=self, with_facts=False))
+        self._pause_timer = delayed_call(self, _PAUSE_MS, self.compare_now)
         place.pane.tab_shown.connect(lambda _tab: self.compare_now())
         place.header.version.clicked.connect(lambda: self.compare_with(""))
         editing.opened_other.connect(self._forget_choice)
-        editing.edited.connect(self._resting.start)
+        editing.edited.connect(self._pause_timer.start)
         runs.changed.connect(self.compare_now)
         self.version.activated.connect(lambda at: self.compare_with(str(self.version.itemData(at))))
         self.restore.clicked.connect(self._restore_version)
 
     def compare_with(self, key: str) -> None:
-        self._wanted = key or self._wanted
-        self.place.show_tab(_TAB)
+        self._preferred = key or self._preferred
+        self.place.show_tab(_TAB_NAME)
         self.compare_now()
 
     def compare_with_session(self, study: str, folder: Path) -> None:
-        """Show the tab with the version of a session, if its study is open."""
+        """Compare the open study with the version of a session, if that is one of this study."""
         opened = self.editing.opened
         run = run_of(SessionFolder(folder, "", 0).receipt)
         if opened is None or run is None or opened.name != study:
             return
-        self._asked = run
+        self._session_run = run
         self.compare_with(run.hash)
 
     def _forget_choice(self) -> None:
-        self._wanted, self._asked = "", None
-        self._resting.start()
+        self._preferred, self._session_run = "", None
+        self._pause_timer.start()
 
     def compare_now(self) -> None:
-        """Compare again if the tab is shown."""
+        """Update the comparison if the tab is shown."""
         opened = self.editing.opened
-        if opened is None or self.place.pane.tab != _TAB:
+        if opened is None or self.place.pane.tab != _TAB_NAME:
             return
-        before, self._choices = (self._choices, self.chosen), self._version_choices(opened)
+        shown_before, self._choices = (self._choices, self.chosen), self._version_choices(opened)
         keys = [key for key, _ in self._choices]
         newest_run = latest_run(self.runs.known)
-        preferred = (self._wanted, "" if newest_run is None else newest_run.hash, *keys)
+        preferred = (self._preferred, "" if newest_run is None else newest_run.hash, *keys)
         self.chosen = next((key for key in preferred if key in keys), "")
-        if (self._choices, self.chosen) != before:
+        if (self._choices, self.chosen) != shown_before:
             with QSignalBlocker(self.version):
                 self.version.clear()
                 for key, title in self._choices:
@@ -388,10 +396,14 @@ class Changes(Card):
         return version_choices(self._known_runs(), kept_versions(opened.file), file, now)
 
     def _known_runs(self) -> tuple[Run, ...]:
-        """Return the run versions, with the requested session's version wherever its results are."""
+        """Return the versions that were run, including that of the requested session in another results folder."""
         known = self.runs.known
-        asked = self._asked
-        return known if asked is None or any(run.hash == asked.hash for run in known) else (asked, *known)
+        session_run = self._session_run
+        return (
+            known
+            if session_run is None or any(run.hash == session_run.hash for run in known)
+            else (session_run, *known)
+        )
 
     def _version(self, opened: Document, key: str) -> Version:
         if key == FILE:
@@ -416,7 +428,7 @@ BREAKS: Final = (
 
 
 class Renaming(QObject):
-    """Locks the ids of questions with recorded answers, until the consequences of a new id are confirmed."""
+    """Locks the IDs of questions with recorded answers until the user confirms the consequences of a change."""
 
     def __init__(self, editing: Editing, place: DesignerPlace, runs: KnownRuns) -> None:
         super().__init__(editing)
@@ -441,7 +453,7 @@ class Renaming(QObject):
         return f"Answers from {counted(sessions, 'session')} have been recorded under this ID." if sessions else ""
 
     def _recorded_ids(self, element: Place) -> frozenset[str]:
-        """Return the ids of a question's questionnaire that have recorded answers."""
+        """Return the IDs with recorded answers in the questionnaire of a question."""
         known = self.runs.items if element[2:3] == ("items",) else ()
         return frozenset(name for form, name in known if form == element[1])
 
@@ -453,8 +465,8 @@ class Renaming(QObject):
 
     def _ask_to_unlock(self) -> None:
         path = self.editing.selected
-        title, why = f"Change the ID “{self._item_id(path)}”?", f"{self._lock_reason(path)} If you change it:"
-        card = ConfirmCard(title, why, "Change the ID", breaks=BREAKS)
+        title, reason = f"Change the ID “{self._item_id(path)}”?", f"{self._lock_reason(path)} If you change it:"
+        card = ConfirmCard(title, reason, "Change the ID", breaks=BREAKS)
         card.answered.connect(lambda _action: self._unlock(path))
         self.place.show_prompt(card, card.first)
 

@@ -1,4 +1,4 @@
-"""The study designer: its parts and their places, their keys, the way from problem to problem."""
+"""The page of the study designer: the layout of its parts, their keys, and the tour of the problems."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -50,8 +50,8 @@ from study_app.gui.widgets import (
     vbox,
 )
 
-FACTS_FROM, FACTS_FROM_OWN, FACTS_LEAST = 740, 560, 110
-"""The height of the window and of the pane from which there is room for facts, and what they need themselves [px]."""
+FACTS_MIN_WINDOW_PX, FACTS_MIN_PANE_PX, FACTS_MIN_PX = 740, 560, 110
+"""Minimum heights of the window, of the pane, and of the facts themselves, with which the facts are shown [px]."""
 _ASIDE_GAP = 24
 
 
@@ -59,19 +59,18 @@ _ASIDE_GAP = 24
 class PanePage:
     """A page of the right pane."""
 
-    # name of the tab, and what it says
     name: str
-    words: str
-    body: QWidget  # what the tab shows; its focus proxy takes the keyboard
-    aside: QWidget | None = None  # controls at the right of the tabs, while the page is shown
-    with_facts: bool = True  # whether the facts stay below the page
+    title: str  # the label of the tab
+    body: QWidget  # the content; its focus proxy takes the keyboard focus
+    aside: QWidget | None = None  # controls to the right of the tabs while the page is shown
+    with_facts: bool = True  # whether the facts are shown below the page
     # returns the maximum height of the body; the facts take the rest [px]
-    most_px: Callable[[], int] = lambda: QWIDGETSIZE_MAX
+    max_body_px: Callable[[], int] = lambda: QWIDGETSIZE_MAX
     tip: str = ""  # the tip of its tab
 
 
 class _RightPane(QWidget):
-    """Tabs, the selected page, and the facts; ``tab_shown`` carries the name of a tab when it is shown."""
+    """Tabs, the selected page, and the facts; ``tab_shown`` carries the name of the page that is shown."""
 
     tab_shown = Signal(str)
 
@@ -90,7 +89,7 @@ class _RightPane(QWidget):
         self.tabs.chosen.connect(lambda name: self.show_tab(str(name)))
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Scroll the page, also while the tabs have keyboard focus."""
+        """Scroll the page with the page keys, even while the tabs have the focus."""
         body, key = self._stack.currentWidget(), event.key()
         if isinstance(body, QAbstractScrollArea) and key in {Qt.Key.Key_PageUp, Qt.Key.Key_PageDown}:
             step = QAbstractSlider.SliderAction
@@ -110,12 +109,12 @@ class _RightPane(QWidget):
         page = next(page for page in self.pages if page.name == name)
         changed, self.tab = name != self.tab, name
         self.tabs.tips = {page.name: page.tip for page in self.pages}
-        self.tabs.show_values([(page.name, page.words) for page in self.pages], name)
+        self.tabs.show_values([(page.name, page.title) for page in self.pages], name)
         self._stack.setCurrentWidget(page.body)
         for tab_page in self.pages:
             if tab_page.aside is not None:
                 tab_page.aside.setVisible(tab_page is page)
-        self.make_room()
+        self.arrange_parts()
         if changed:
             self.tab_shown.emit(name)
 
@@ -130,33 +129,33 @@ class _RightPane(QWidget):
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
-        self.make_room()
+        self.arrange_parts()
 
-    def make_room(self) -> None:
-        """Place the controls; hide the facts if the window is too low or the page needs their room."""
+    def arrange_parts(self) -> None:
+        """Arrange controls and facts; the facts are hidden if the window is too low or the page needs their space."""
         self._place_aside()
         page = next((page for page in self.pages if page.name == self.tab), None)
         height = self.window().height()
-        room = not self.isVisible() or self.height() >= FACTS_FROM_OWN
-        facts = page is not None and page.with_facts and height >= FACTS_FROM and room
-        most = QWIDGETSIZE_MAX if page is None or not facts else page.most_px()
-        left = self.height() - self._stack.y() - most - self._column.spacing()
-        if most < QWIDGETSIZE_MAX and self.isVisible() and left < FACTS_LEAST:
-            facts = False  # the page fills the pane
-        self._stack.setMaximumHeight(most if facts else QWIDGETSIZE_MAX)
-        self.facts.fit_height(height, left)
-        self.facts.setVisible(facts)
+        has_room = not self.isVisible() or self.height() >= FACTS_MIN_PANE_PX
+        shows_facts = page is not None and page.with_facts and height >= FACTS_MIN_WINDOW_PX and has_room
+        max_px = QWIDGETSIZE_MAX if page is None or not shows_facts else page.max_body_px()
+        left_px = self.height() - self._stack.y() - max_px - self._column.spacing()
+        if max_px < QWIDGETSIZE_MAX and self.isVisible() and left_px < FACTS_MIN_PX:
+            shows_facts = False  # the page fills the pane
+        self._stack.setMaximumHeight(max_px if shows_facts else QWIDGETSIZE_MAX)
+        self.facts.fit_height(height, left_px)
+        self.facts.setVisible(shows_facts)
 
 
 OUTLINE_PX, DRAWER_PX = 284, 320
 DRAWER_BELOW, ONE_PANE_BELOW = 1400, 1130
 _GAP = 14 - 2 * SHADOW
 _FORM_SHARE = 44
-"""Percent of the width that the form takes beside the views."""
+"""Share of the width that the form takes beside the pane [%]."""
 
 
-class _Crumb(PressedByEnter):
-    """A step of the path; its text is elided if there is not enough room."""
+class _PathStep(PressedByEnter):
+    """A button of the path bar; its text is elided if there is not enough room."""
 
     def __init__(self, text: str, least_px: int) -> None:
         super().__init__(text)
@@ -182,7 +181,7 @@ class _Crumb(PressedByEnter):
 
 
 class _PathBar(QWidget):
-    """The path to the form's element, shown if the outline is a drawer; ``open_asked`` carries a path."""
+    """The path of the form's element, shown while the outline is a drawer; ``open_asked`` carries a path."""
 
     outline_asked = Signal()
     open_asked = Signal(object)
@@ -194,7 +193,7 @@ class _PathBar(QWidget):
         self.outline.setAccessibleName(command_tip("outline"))
         self.outline.setToolTip(command_tip("outline"))
         self.outline.clicked.connect(self.outline_asked)
-        self.steps: list[_Crumb] = []
+        self.steps: list[_PathStep] = []
         self._parts: list[QWidget] = []
         self._shown: object = None
         self._steps = hbox(spacing=0)
@@ -204,21 +203,21 @@ class _PathBar(QWidget):
         if form.around == self._shown:
             return
         self._shown = form.around
-        held = any(step.hasFocus() for step in self.steps)
-        if held:
+        had_focus = any(step.hasFocus() for step in self.steps)
+        if had_focus:
             self.outline.setFocus(Qt.FocusReason.OtherFocusReason)  # else Qt moves the focus to the rail
         for part in self._parts:
             remove_widget(part)
         self.steps, self._parts = [], []
         for path, title in form.around:
-            sign = Icon("chevron", "text2", 14)
-            made = _Crumb(title, 56 if path == form.path else 104)
-            made.clicked.connect(lambda _checked=False, path=path: self.open_asked.emit(path))
-            for part in (sign, made):
+            separator = Icon("chevron", "text2", 14)
+            button = _PathStep(title, 56 if path == form.path else 104)
+            button.clicked.connect(lambda _checked=False, path=path: self.open_asked.emit(path))
+            for part in (separator, button):
                 self._steps.addWidget(part)
-            self.steps.append(made)
-            self._parts += [sign, made]
-        if held and self.steps:
+            self.steps.append(button)
+            self._parts += [separator, button]
+        if had_focus and self.steps:
             self.steps[-1].show()  # at once: a hidden widget takes no focus
             self.steps[-1].setFocus(Qt.FocusReason.OtherFocusReason)
 
@@ -227,7 +226,7 @@ _SHORTCUT = Qt.FocusReason.ShortcutFocusReason
 
 
 def focus_stops(part: QWidget) -> Iterator[QWidget]:
-    """Yield the focus stops of a part from top to bottom, parts beside each other from left to right."""
+    """Yield the Tab stops of a part in reading order: from top to bottom, side by side from left to right."""
     if part.focusPolicy() & Qt.FocusPolicy.TabFocus and part.focusProxy() is None and part.isEnabled():
         yield part
     inner = (
@@ -244,10 +243,10 @@ def _reading_order(part: QWidget, other: QWidget) -> int:
     return first.left() - second.left()
 
 
-class _Arrangement(QWidget):
-    """Places outline, form, pane and problems; ``used`` is the last focused one of the first three.
+class _Layout(QWidget):
+    """The layout of outline, form, pane and problems; ``used`` is the last focused one of the first three.
 
-    ``entered`` is emitted when a part other than the outline got the focus.
+    ``entered`` is emitted when a part other than the outline gets the focus.
     """
 
     entered = Signal()
@@ -263,7 +262,7 @@ class _Arrangement(QWidget):
         self.side = "form"
         self.used: QWidget = form
         self.drawer = False
-        self._before_drawer: QWidget | None = None
+        self._focus_before_drawer: QWidget | None = None
         self._width = DRAWER_BELOW
         self.path = _PathBar()
         self.path.outline_asked.connect(self.toggle_drawer)
@@ -307,13 +306,17 @@ class _Arrangement(QWidget):
         self.sides.setVisible(single)
         self.sides.show_values((("form", "Form"), ("pane", "Views")), self.side)
         self.form.setVisible(not single or self.side == "form")
-        self._across.setStretch(0, _FORM_SHARE if self.form.isVisibleTo(self) else 0)  # an empty layout would take room
+        self._across.setStretch(
+            0, _FORM_SHARE if self.form.isVisibleTo(self) else 0
+        )  # otherwise the empty layout takes space
         self.pane.setVisible(not single or self.side == "pane")
-        self.pane.make_room()
+        self.pane.arrange_parts()
 
     def focus_outline(self) -> None:
         if self.drawer:
-            self._before_drawer = self.window().focusWidget() if not self.outline.isVisible() else self._before_drawer
+            self._focus_before_drawer = (
+                self.window().focusWidget() if not self.outline.isVisible() else self._focus_before_drawer
+            )
             self._place_drawer()
             self.outline.show()
             self.outline.raise_()
@@ -321,7 +324,7 @@ class _Arrangement(QWidget):
 
     def focus_find(self) -> None:
         self.focus_outline()
-        self.outline.words.setFocus(Qt.FocusReason.ShortcutFocusReason)
+        self.outline.search_field.setFocus(Qt.FocusReason.ShortcutFocusReason)
 
     def toggle_drawer(self) -> None:
         if self.outline.isVisible():
@@ -330,18 +333,18 @@ class _Arrangement(QWidget):
             self.focus_outline()
 
     def close_drawer(self) -> None:
-        """Close the drawer, if there is one; the keyboard returns to where it was, otherwise to the drawer's button."""
+        """Close the drawer, if it is open; the focus returns to its previous place, else to the drawer's button."""
         if self.drawer and self.outline.isVisible():
-            had = self.outline.isAncestorOf(self.window().focusWidget() or self)
+            had_focus = self.outline.isAncestorOf(self.window().focusWidget() or self)
             self._hide_drawer()
-            before = self._before_drawer
-            if had and before is not None and isValid(before) and before.isVisible():
-                before.setFocus(Qt.FocusReason.OtherFocusReason)
-            elif had:
+            previous = self._focus_before_drawer
+            if had_focus and previous is not None and isValid(previous) and previous.isVisible():
+                previous.setFocus(Qt.FocusReason.OtherFocusReason)
+            elif had_focus:
                 self.path.outline.setFocus(Qt.FocusReason.OtherFocusReason)
 
     def _follow_focus(self, _left: QWidget | None, now: QWidget | None) -> None:
-        """Note which part has keyboard focus and show its help; close the drawer when another part takes it."""
+        """Remember the focused part and show its help; close the drawer when another part gets the focus."""
         parts = (self.outline, self.form, self.pane)
         self.form.show_help_of(now)
         if any(part.isAncestorOf(now) for part in (self.form, self.pane, self.problems) if now is not None):
@@ -352,7 +355,7 @@ class _Arrangement(QWidget):
 
     def _hide_drawer(self) -> None:
         self.outline.hide()
-        self.outline.words.clear()
+        self.outline.search_field.clear()
 
     def _place_drawer(self) -> None:
         self.outline.setGeometry(QRect(0, 46, DRAWER_PX, max(200, self.height() - 46)))
@@ -363,7 +366,7 @@ class _Arrangement(QWidget):
             self._place_drawer()
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
-        """Close the drawer on a click next to it, also where nothing takes the keyboard focus."""
+        """Close the drawer at a click next to it, even on a part that does not take the focus."""
         if not self.outline.geometry().contains(event.position().toPoint()):
             self.close_drawer()
         super().mousePressEvent(event)
@@ -391,7 +394,7 @@ class _Arrangement(QWidget):
         self.form.focus_first_field()
 
     def focus_field(self, path: ElementPath) -> None:
-        """Focus a field of the form and select its value; without its row, the first row."""
+        """Focus a field of the form and select its value; if the form does not have it, focus the first row."""
         if not self.focus_row(path):
             self.form.focus_first()
         elif isinstance(field := self.form.focusWidget(), TypedLine | TypedText):
@@ -409,15 +412,15 @@ class _Arrangement(QWidget):
             self.focus_outline()
 
     def return_keyboard(self) -> None:
-        """Restore the last focus in outline, form or pane; from *Find* focus the selected element."""
+        """Restore the last focus in outline, form or pane; instead of the search field, focus the selected element."""
         last = last_focused(self.used)
-        if last is None or last is self.outline.words:
+        if last is None or last is self.outline.search_field:
             self.focus_element()
         else:
             last.setFocus(Qt.FocusReason.OtherFocusReason)
 
     def focus_pane(self) -> None:
-        """Focus the page of the right pane, and from within the pane its tabs."""
+        """Focus the page of the right pane, or its tabs if the focus is already in the pane."""
         pane = self.pane
         if pane.isAncestorOf(pane.window().focusWidget() or self.header):
             pane.tabs.setFocus(_SHORTCUT)
@@ -425,7 +428,7 @@ class _Arrangement(QWidget):
             self._focus_page()
 
     def _focus_tabs(self) -> None:
-        """Focus the tabs of the right pane; Tab then goes to the controls beside them and to the page."""
+        """Focus the tabs of the right pane, from which Tab goes to the controls beside them and to the page."""
         self.show_side("pane")
         self.pane.tabs.setFocus(_SHORTCUT)
 
@@ -445,11 +448,11 @@ class _Arrangement(QWidget):
         (self.problems.next if self.problems.rows else self.problems.close_button).setFocus(_SHORTCUT)
 
     def switch_to_file(self) -> None:
-        """Focus the file, and from there return to the last focus in the form."""
+        """Focus the file editor; if it already has the focus, return to the last focus in the form."""
         if not self.file.editor.hasFocus():
             self.show_tab("file")
             return
-        last = self.form.focusWidget()  # if the file covered the form, Qt returns the focus to the form
+        last = self.form.focusWidget()  # also remembered while the file covers the form
         self.show_side("form")
         if last is not None and last.isVisible() and last.isEnabled():
             last.setFocus(_SHORTCUT)
@@ -466,12 +469,12 @@ class _Arrangement(QWidget):
         if self.problems.isVisible():
             stops.append((self.problems, self.focus_problems))
         focused = self.window().focusWidget()
-        here = next((at for at, (part, _) in enumerate(stops) if focused and part.isAncestorOf(focused)), -by)
-        stops[(here + by) % len(stops)][1]()
+        index = next((at for at, (part, _) in enumerate(stops) if focused and part.isAncestorOf(focused)), -by)
+        stops[(index + by) % len(stops)][1]()
 
 
 class DesignerPlace(Place):
-    """Draws a `DesignerView`; ``asked`` carries a step of the study, or a task (`Do`)."""
+    """Shows a `DesignerView`; ``asked`` carries a request for a step, or a task (`Do`)."""
 
     entered = Signal()
     left = Signal()
@@ -487,11 +490,11 @@ class DesignerPlace(Place):
         self.outline, self.new_page = OutlineCard(), NewStudyPage()
         self.pane = _RightPane()
         self.measures = MeasuresPage()
-        self.pane.add_page(PanePage(name="measures", words="Measures", body=self.measures, with_facts=False))
+        self.pane.add_page(PanePage(name="measures", title="Measures", body=self.measures, with_facts=False))
         self.pane.add_page(
-            PanePage(name="file", words="File", body=self.file, aside=self.file.aside, tip=command_tip("file"))
+            PanePage(name="file", title="File", body=self.file, aside=self.file.aside, tip=command_tip("file"))
         )
-        self.parts = _Arrangement(self.header, self.outline, self.form, self.pane, self.file, self.problems)
+        self.parts = _Layout(self.header, self.outline, self.form, self.pane, self.file, self.problems)
         self.sides = self.parts.sides
         self.adding, self.nothing = AddList(self), NoStudyCard()
         self._lay_out()
@@ -519,13 +522,15 @@ class DesignerPlace(Place):
         self.banner.asked.connect(partial(self.ask, "banner"))
         self.banner.left.connect(self.parts.return_keyboard)
         outline.chosen.connect(partial(self.finish, "select"))
-        outline.words.textChanged.connect(partial(self.ask, "find"))
+        outline.search_field.textChanged.connect(partial(self.ask, "find"))
         outline.field_asked.connect(self.parts.focus_field)
         outline.form_asked.connect(self.parts.focus_first_field)
         outline.element_clicked.connect(lambda: self.parts.focus_first_field() if self.parts.drawer else None)
         outline.tree.dropped.connect(lambda entry, to: self.asked.emit(MoveTo(entry, index_of(to))))
         self.adding.chosen.connect(lambda entry: self._handle_request(entry.asks))
-        self.parts.entered.connect(self._leave_entries, Qt.ConnectionType.QueuedConnection)  # when all is shown
+        self.parts.entered.connect(
+            self._leave_entries, Qt.ConnectionType.QueuedConnection
+        )  # after all parts are updated
         self.parts.path.open_asked.connect(partial(self.finish, "select"))
         form.asked.connect(self._handle_request)
         form.head.id_typed.connect(partial(self.ask, "judge id"))
@@ -534,7 +539,9 @@ class DesignerPlace(Place):
         self.problems.next.clicked.connect(self.open_next_problem)
         for part in (self.problems, form):
             part.repair_asked.connect(self._ask_to_repair)
-        self.problems.close_asked.connect(self.parts.return_keyboard)  # first, else Qt hands it to the page
+        self.problems.close_asked.connect(
+            self.parts.return_keyboard
+        )  # before it is hidden, otherwise Qt moves the focus to the page
         self.problems.close_asked.connect(self.problems.hide)
         self.new_page.begin_asked.connect(partial(self.ask, "begin"))
         self.new_page.given_up.connect(self.close_new)
@@ -544,8 +551,10 @@ class DesignerPlace(Place):
         runs = {
             command.id: (command.within, partial(command.run, self)) for command in COMMANDS if command.run is not None
         }
-        own = add_commands(tree, {name: run for name, (within, run) in runs.items() if within})
-        self.commands = own | add_commands(self, {name: run for name, (within, run) in runs.items() if not within})
+        tree_commands = add_commands(tree, {name: run for name, (within, run) in runs.items() if within})
+        self.commands = tree_commands | add_commands(
+            self, {name: run for name, (within, run) in runs.items() if not within}
+        )
         for name, button in (
             ("keys", self.header.keys), ("undo", self.header.undo), ("redo", self.header.redo),
             ("save", self.header.save), ("up", head.up), ("down", head.down), ("duplicate", head.copy),
@@ -555,7 +564,7 @@ class DesignerPlace(Place):
         head.delete.clicked.connect(self.delete)
         menu = ("add", "duplicate", "up", "down", "rename", "delete")
         tree.addActions([self.commands[name] for name in menu])
-        for action in own.values():  # elsewhere these keys are those of a list or a text
+        for action in tree_commands.values():  # elsewhere, lists and texts have these keys
             action.setShortcutContext(Qt.ShortcutContext.WidgetShortcut)
 
     def duplicate(self) -> None:
@@ -576,11 +585,11 @@ class DesignerPlace(Place):
             self.asked.emit(MoveElement(self.form_path, by))
 
     def write_question(self, by: int) -> None:
-        """Go to the text of the next or previous question, or from a questionnaire to that of its first one."""
+        """Go to the text of the question ``by`` positions away; from a questionnaire, to that of its first question."""
         if (form := self.view.form) is None:
             return
-        listed = [row.facts.lines for row in form.rows if row.path[-1] == "items" and row.facts is not None]
-        paths = [line.path for line in (*form.questions.lines, *(line for lines in listed for line in lines))]
+        question_lists = [row.facts.lines for row in form.rows if row.path[-1] == "items" and row.facts is not None]
+        paths = [line.path for line in (*form.questions.lines, *(line for lines in question_lists for line in lines))]
         at = (paths.index(form.path) if form.path in paths else -1) + by
         if 0 <= at < len(paths):
             self._handle_request(Do("write", (paths[at],)))
@@ -593,21 +602,23 @@ class DesignerPlace(Place):
 
     def show_view(self, view: DesignerView) -> None:
         """Show a study; only changed parts are recreated."""
-        before, self.view = self.view, view
+        previous, self.view = self.view, view
         self.header.show_state(view.header)
         self.nothing.setVisible(view.form is None)
         self.parts.setVisible(view.form is not None)
         self.banner.show_notice(view.banner)
         if view.form is None:
             return
-        elsewhere = before.form is None or before.form.path != view.form.path
+        elsewhere = previous.form is None or previous.form.path != view.form.path
         if elsewhere:
             self.close_prompt(elsewhere=True)
         writable = not view.header.read_only and not view.form.unreadable
         of_element = writable and view.form.id is not None
-        on = dict.fromkeys(("add", "up", "down"), writable)  # "up" and "down" say why an element stays
-        on |= dict.fromkeys(("duplicate", "rename", "delete"), of_element)
-        for name, possible in on.items():
+        enabled_commands = dict.fromkeys(
+            ("add", "up", "down"), writable
+        )  # "up" and "down" always report why an element cannot be moved
+        enabled_commands |= dict.fromkeys(("duplicate", "rename", "delete"), of_element)
+        for name, possible in enabled_commands.items():
             self.commands[name].setEnabled(possible)
         self.parts.path.show_form(view.form)
         self.form.show_form(view.form, read_only=view.header.read_only)
@@ -622,8 +633,8 @@ class DesignerPlace(Place):
         self.problems.show_repairs(row, sentences)
         self.form.show_repairs(self.problems.repairs)
 
-    def begin_study(self) -> None:
-        """Show the next view from the top, since it belongs to another study."""
+    def reset_view(self) -> None:
+        """Reset all parts, so that the next view, which is of another study, is shown from the top."""
         self.view, self.form.form = DesignerView(), None
         self.outline.begin()
         self.problems.begin()
@@ -650,36 +661,36 @@ class DesignerPlace(Place):
         first.setFocus()
 
     def close_prompt(self, *, elsewhere: bool = False) -> None:
-        """Close an open question; ``elsewhere`` means that another element will be selected."""
+        """Close the open prompt, if any; ``elsewhere`` means that another element is selected."""
         if self.prompt is not None:
             closing = self.prompt
             self.prompt = None
-            held = closing.isAncestorOf(self.focusWidget())
+            had_focus = closing.isAncestorOf(self.focusWidget())
             remove_widget(closing)
-            if held:  # else Qt moves the focus to the rail
+            if had_focus:  # else Qt moves the focus to the rail
                 self.parts.focus_element() if elsewhere else self.parts.return_keyboard()
 
     def flush(self) -> None:
         self.form.flush()
         self.file.editor.flush()
 
-    def ask(self, what: Task, *arguments: Any) -> None:
+    def ask(self, task: Task, *arguments: Any) -> None:
         """Request a task that is not a step of the study."""
-        self.asked.emit(Do(what, arguments))
+        self.asked.emit(Do(task, arguments))
 
-    def finish(self, what: Task, *arguments: Any) -> None:
-        """Submit the typed text, then request a task with the element's resulting id."""
-        self.asked.emit(self._with_typed_id(Do(what, arguments)))
+    def finish(self, task: Task, *arguments: Any) -> None:
+        """Submit the typed text, then request a task; its paths have the element's resulting ID."""
+        self.asked.emit(self._with_typed_id(Do(task, arguments)))
 
-    def _with_typed_id(self, asked: Any) -> Any:
-        """Submit the typed text; return a path or request with the element's resulting id."""
+    def _with_typed_id(self, request: Any) -> Any:
+        """Submit the typed text, and return a path or request with the element's resulting ID."""
         before = () if self.form.form is None else self.form.form.path
         self.flush()
         after = () if self.form.form is None else self.form.form.path
-        return asked if before == after else with_path(asked, before, after)
+        return request if before == after else with_path(request, before, after)
 
     def _leave_entries(self) -> None:
-        """Leave the entries that the focus has left for another row of the form or for another part."""
+        """Request to finish the entries that do not contain the focused row."""
         focused = self.window().focusWidget()
         if self.form.isAncestorOf(focused):
             self.ask("leave entries", self.form_path, self.form.row_path_of(focused))
@@ -698,15 +709,15 @@ class DesignerPlace(Place):
         if self.view.form is not None and self.outline.add.isEnabled() and not self.stack.currentIndex():
             self.finish("add")
 
-    def show_addable(self, every: tuple[Addable, ...]) -> None:
+    def show_addable(self, additions: tuple[Addable, ...]) -> None:
         button = self.outline.add if self.outline.add.isVisible() else self.header
-        self.adding.open(every, button.mapToGlobal(button.rect().topLeft()))
+        self.adding.open(additions, button.mapToGlobal(button.rect().topLeft()))
 
-    def _handle_request(self, asked: object) -> None:
-        """Forward a request after the typed text; the page carries out its own tasks."""
-        if not (isinstance(asked, SetText | LeaveText) or (isinstance(asked, SetValue) and asked.typing)):
-            asked = self._with_typed_id(asked)
-        match asked:
+    def _handle_request(self, request: object) -> None:
+        """Submit the typed text, then forward a request, or carry it out if it only moves the focus."""
+        if not (isinstance(request, SetText | LeaveText) or (isinstance(request, SetValue) and request.typing)):
+            request = self._with_typed_id(request)
+        match request:
             case Do("write", (path,)):
                 self.ask("select", path)
                 self.parts.focus_field((*path, "text"))
@@ -714,30 +725,32 @@ class DesignerPlace(Place):
                 self.ask("select", element)
                 self.parts.focus_field(field)
             case _:
-                self.asked.emit(asked)
+                self.asked.emit(request)
 
     def show_step(self, step: Step) -> None:
-        """Announce a step, say how to undo a deletion, and focus the first text of a new element."""
-        said = f"Deleted {step.removed}. {keys_of('undo')[0]} restores it." if step.removed else step.announcement
-        if said:
-            announce(self, said)
-        beside = not self.parts.drawer and self.outline.isAncestorOf(self.focusWidget())
+        """Announce a step, including how to undo a deletion, and focus the first text of a new element."""
+        sentence = f"Deleted {step.removed}. {keys_of('undo')[0]} restores it." if step.removed else step.announcement
+        if sentence:
+            announce(self, sentence)
+        in_outline = not self.parts.drawer and self.outline.isAncestorOf(self.focusWidget())
         if step.fresh:
-            self.outline.words.clear()  # a search would hide it
-        if step.fresh and not (step.fresh == "copy" and beside):  # after a copy in an open outline, the focus stays
+            self.outline.search_field.clear()  # a search would hide the new element
+        if step.fresh and not (
+            step.fresh == "copy" and in_outline
+        ):  # a copy made in the visible outline leaves the focus there
             self.parts.show_side("form")
             self.form.focus_first_text(filled=step.fresh == "copy")  # a copy has its texts
-        if said and (step.removed or step.entry):
-            self.form.show_note(said)
+        if sentence and (step.removed or step.entry):
+            self.form.show_note(sentence)
 
     def open_next_problem(self) -> None:
         """Open the next problem and focus its field, or its repair if there is no field to focus."""
         if self.view.form is not None:
             self.flush()
             self.ask("leave entries")
-        if not (coming := self.problems.rows_after_current):
+        if not (next_rows := self.problems.rows_after_current):
             return
-        row = coming[0]
+        row = next_rows[0]
         self.problems.open_problem(row)
         self.finish("repairs", row)
         field = self.window().focusWidget()
@@ -760,7 +773,7 @@ class DesignerPlace(Place):
             self.file.editor.go_to(row.line - 1)
 
     def _ask_to_repair(self, row: ProblemRow, sentence: str) -> None:
-        """Make a repair and go to its field."""
+        """Request a repair, and focus its field when the problem is solved."""
         self.problems.set_current(row)
         self.finish("repair", row, sentence)
         if row not in self.problems.problems:
@@ -781,25 +794,25 @@ class DesignerPlace(Place):
         self.left.emit()
 
     def focusNextPrevChild(self, forward: bool) -> bool:
-        """Let Tab follow the reading order of visible parts and then wrap around; Shift+Tab goes back."""
+        """Let Tab follow the reading order of visible parts and then wrap around; Shift+Tab reverses the order."""
         self.flush()
-        QApplication.sendPostedEvents(None, QEvent.Type.LayoutRequest.value)  # new parts are laid out
-        in_order, here = list(focus_stops(self)), self.window().focusWidget()
-        if here not in in_order:
-            if not (forward and in_order and here is not None and here.isAncestorOf(self.stack)):  # the place itself
+        QApplication.sendPostedEvents(None, QEvent.Type.LayoutRequest.value)  # lays out new parts
+        stops, focused = list(focus_stops(self)), self.window().focusWidget()
+        if focused not in stops:
+            if not (forward and stops and focused is not None and focused.isAncestorOf(self.stack)):  # the page itself
                 return super().focusNextPrevChild(forward)
             at = -1
         else:
-            at = in_order.index(here)
+            at = stops.index(focused)
         if not forward and at == 0:
             return super().focusNextPrevChild(forward)
         reason = Qt.FocusReason.TabFocusReason if forward else Qt.FocusReason.BacktabFocusReason
-        to = (
-            in_order[at + (1 if forward else -1)]
-            if at + 1 < len(in_order) or not forward
+        target = (
+            stops[at + (1 if forward else -1)]
+            if at + 1 < len(stops) or not forward
             else next(focus_stops(self.window()))
         )
-        to.setFocus(reason)
+        target.setFocus(reason)
         return True
 
     def keyPressEvent(self, event: QKeyEvent) -> None:

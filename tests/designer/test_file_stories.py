@@ -105,7 +105,7 @@ def never_saved(story: Story) -> None:
     story.play("[Discard the draft] [Cancel]")
     assert draft_of(mine) is not None
     story.play("[Discard the draft]")
-    story.act("confirm", designer.place.prompt.go_on.click)
+    story.act("confirm", designer.place.prompt.confirm.click)
     story.act("write the draft", lambda: designer.saving.write_draft(at_once=True))
     assert designer.editing.opened is None
     assert draft_of(mine) is None
@@ -182,7 +182,7 @@ def refusing(name: str, words: str) -> Iterator[None]:
 def failing(story: Story) -> None:
     """What cannot be deleted, kept, read or written is said once, and nothing is lost."""
     designer, saving = story.designer, story.designer.saving
-    write, look = (partial(story.act, "write", saving.write_draft), partial(story.act, "look", saving.look_again))
+    write, look = (partial(story.act, "write", saving.write_draft), partial(story.act, "look", saving.check_file))
     denied, not_up_to_date = "the draft cannot be deleted: Permission denied", "The draft is not up to date: the draft"
     story.ask(SetValue(VERSION, "0.7"))
     with refusing("store.versions.drafts.delete_draft", denied):
@@ -230,7 +230,7 @@ def failing(story: Story) -> None:
     story.act("open it again", lambda: designer.open(str(designer.file.with_name("mine.toml"))))
     with refusing("store.versions.drafts.delete_draft", denied):
         story.play("[Discard the draft]")
-        story.act("confirm", designer.place.prompt.go_on.click)
+        story.act("confirm", designer.place.prompt.confirm.click)
         story.expect("The draft was not discarded: the draft cannot be deleted: Permission denied.", kept="not saved")
 
 
@@ -292,7 +292,7 @@ def versions(story: Story) -> None:
     story.play("@questionnaires.delay.items.0")
     assert not designer.place.form.head.id.isEnabled() or designer.place.form.head.id.isReadOnly()
     story.act("unlock", designer.place.form.head.unlock.click)
-    story.act("confirm", prompt().go_on.click)
+    story.act("confirm", prompt().confirm.click)
     story.expect(at="ID")
     story.play("'difficult' Return")
     story.expect(undo="Rename to difficult")

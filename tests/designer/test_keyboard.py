@@ -182,7 +182,7 @@ def test_a_copy_of_an_abx_block_can_have_the_same_conditions(designer: Any) -> N
 def test_add_finds_exclusion_rules_and_adds_one_with_its_usual_limit(designer: Any, words: str) -> None:
     designer.controller.begin_study("template:compare-liquids", "rules")
     designer.hit("Insert")
-    QTest.keyClicks(designer.place.adding.words, words)
+    QTest.keyClicks(designer.place.adding.filter_field, words)
     designer.hit("Return")
     assert designer.value("analysis", "exclusions") == ({"rule": "constant_answers", "limit": 95},)
     assert (designer.study.faults, designer.editing.selected) == ((), ("analysis", "exclusions", 0))

@@ -11,7 +11,7 @@ from shiboken6 import isValid
 
 from study_app.designer.document.toml_edits import Insert, Set
 from study_app.designer.measures.study_facts import facts
-from study_app.designer.new_study_page import _listed_title
+from study_app.designer.new_study_page import _current_title
 from study_app.designer.outline import ROW_ROLE
 from study_app.number_text import duration
 from study_app.protocol.source.files import shipped
@@ -107,7 +107,7 @@ def type_id(qtbot: Any, designer: Any, path: tuple[str, str], name: str) -> None
 def test_down_leads_from_an_empty_search_to_the_outline(designer: Any) -> None:
     designer.open("kitchen", "blocks", "liquids")
     outline = designer.place.outline
-    outline.words.setFocus()
+    outline.search_field.setFocus()
     assert designer.hit("Down") is outline.tree
     assert designer.place.form_path == ("blocks", "liquids")
 
@@ -122,11 +122,11 @@ def test_a_search_ends_with_its_result_esc_or_a_new_element(designer: Any, keys:
     outline = designer.place.outline
     whole = len(outline.rows)
     designer.hit("ctrl+f")
-    QTest.keyClicks(outline.words, "welcome")
+    QTest.keyClicks(outline.search_field, "welcome")
     assert 0 < len(outline.rows) < whole
     for key in keys.split():
         designer.hit(key)
-    assert (outline.words.text(), len(outline.rows)) == ("", whole + 2 * (selected == "welcome_2"))
+    assert (outline.search_field.text(), len(outline.rows)) == ("", whole + 2 * (selected == "welcome_2"))
     assert designer.editing.selected == (("pages", selected) if selected else ("study",))
 
 
@@ -216,7 +216,7 @@ def test_studies_are_listed_by_title_with_their_files_whatever_was_opened_last(d
     kept = Keeper(file, base=content_hash(file.read_bytes()))
     kept.note_edit(file.read_text("utf-8").replace("apples", "pears"), (), 0.0)
     kept.write()
-    assert [_listed_title(file, drafted=drafted) for drafted in (False, True)] == ["apples", "pears"]
+    assert [_current_title(file, drafted=drafted) for drafted in (False, True)] == ["apples", "pears"]
     box = designer.place.header.study
     assert box.currentText() == "Melons  ·  beta.toml  (copy of alpha)"
     assert (

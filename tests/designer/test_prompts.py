@@ -13,7 +13,7 @@ from study_app.designer.document.study import read_study
 from study_app.designer.document.toml_edits import Set, Unset
 from study_app.designer.header import Notice, NoticeCard
 from study_app.designer.problems import ProblemLine, ProblemsCard, problem_rows, warning_rows
-from study_app.designer.prompts import ConfirmCard, DeleteCard, SeriesCard, naming_places
+from study_app.designer.prompts import ConfirmCard, DeleteCard, SeriesCard, places_of_references
 from study_app.gui.widgets.cards import Icon
 from tests.designer.support.designer import DEMO
 
@@ -27,7 +27,7 @@ def texts(card: QWidget) -> list[str]:
 
 
 def test_the_card_of_a_deletion_names_the_places_and_offers_the_other_elements(qtbot: Any) -> None:
-    places = naming_places(STUDY, LIQUID)
+    places = places_of_references(STUDY, LIQUID)
     assert places == ("Condition Thin: Liquid", "Condition Prompt: Liquid", "Condition Late: Liquid")
     card, answers = DeleteCard(STUDY, LIQUID, places), list[object]()
     qtbot.addWidget(card)
@@ -41,7 +41,7 @@ def test_the_card_of_a_deletion_names_the_places_and_offers_the_other_elements(q
     assert answers == [DeleteElement(LIQUID, how) for how in ("gaps", "all")] + [
         DeleteElement(LIQUID, "other", "thick")
     ]
-    assert naming_places(STUDY, ("pages", "thanks")) == ("Session order: 5",)
+    assert places_of_references(STUDY, ("pages", "thanks")) == ("Session order: 5",)
 
 
 @pytest.mark.parametrize(
@@ -84,7 +84,7 @@ def test_a_confirmation_answers_its_action_and_escape_gives_up(qtbot: Any) -> No
         with qtbot.waitSignal(card.given_up):
             give_up()
     assert answers == []
-    card.go_on.click()
+    card.confirm.click()
     assert answers == ["Change it"]
 
 

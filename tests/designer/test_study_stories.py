@@ -28,7 +28,7 @@ def new_study(story: Story) -> None:
         story.expect(at=at)
     story.act("title", questions.title.setFocus)
     story.play("'Which liquid is thicker?' Tab 'thicker'")
-    story.act("standards", lambda: next(iter(questions.own.values())).setText("4, 8"))
+    story.act("standards", lambda: next(iter(questions.template_fields.values())).setText("4, 8"))
     for code in ("en", "nl", "en"):
         story.act(f"language {code}", questions.languages[code].click)
     story.act("make", page.make.click)

@@ -57,7 +57,7 @@ NAMES = {
         "version_chip", "version_choices", "edited_elements_text", "draft_title",
     )},
     **{name: getattr(document, name) for name in ("Standing", "version_standing", "check_version", "next_version")},
-    "words": lambda choice: choice.words, "template_choice": template_choice, "place_text": place_text, "demo": demo,
+    "words": lambda choice: choice.label, "template_choice": template_choice, "place_text": place_text, "demo": demo,
     "recovery": recovery, "warned": lambda *said: [row.message for row in warning_rows(Study(DEMO, NOWHERE), said)],
     "STUDY": Study(DEMO, NOWHERE), "NOWHERE": NOWHERE, "DEMO": DEMO,
     "NOW": datetime(2026, 3, 9, 18, 30, tzinfo=timezone(timedelta(hours=2))),
@@ -75,7 +75,7 @@ def test_each_call_has_its_words(monkeypatch: pytest.MonkeyPatch) -> None:
     many = [Kept(hash=str(number), origin="draft", at="") for number in range(50)]
     choices = version_rows.version_choices((), many, "", NAMES["NOW"])
     assert [key for key, _ in choices] == [*map(str, range(49, 9, -1))]
-    empty = header_state(None, (), 3, version_rows.VersionChip(words="1.0"))
+    empty = header_state(None, (), 3, version_rows.VersionChip(text="1.0"))
     assert empty == header.HeaderState()
 
 

@@ -106,7 +106,7 @@ def with_answers(study: Study, answers: Answers) -> Study:
     return study
 
 
-def new_study_file(name: str) -> Path:
+def check_free_name(name: str) -> Path:
     """Return the file of a new study in the workspace's protocols.
 
     Raises Refused if the name is not permitted, or taken.
@@ -123,7 +123,7 @@ def write_new(study: Study, name: str) -> Path:
 
     Raises Refused if the name is not permitted, or taken; StoreError if it cannot be written.
     """
-    file = new_study_file(name)
+    file = check_free_name(name)
     save_study(file, copy_of(study, name).text, "")
     return file
 
@@ -382,7 +382,7 @@ class Document:
 
     def copy_as(self, name: str) -> Document:
         """Return a document with the edited study under another name; this document reverts to its file's content."""
-        document = Document(self.study, self.selected, new_study_file(name))
+        document = Document(self.study, self.selected, check_free_name(name))
         document.done = [*self.done]
         document.edit(f"Save as {name}", text=copy_of(self.study, name).text)
         document.note_edit(0.0)
@@ -404,7 +404,7 @@ def open_file(file: Path, results: Path) -> Document:
 
 def open_new(study: Study, name: str) -> Document:
     """Open a copy of a study under another name; its file is written only when it is saved."""
-    file, named_copy = new_study_file(name), copy_of(study, name)
+    file, named_copy = check_free_name(name), copy_of(study, name)
     return Document(named_copy, first_element(named_copy.document), file)
 
 

@@ -355,7 +355,7 @@ class AddLiquid(Request):
     path: Path = ()
 
     @property
-    def words(self) -> str:
+    def label(self) -> str:
         """The label that distinguishes shipped liquids: "Water liquid, 998.2 kg/m³, 0.001 Pa·s", or effects or kind."""
         table = shipped_liquids()[self.source, self.name]
         numbers = {**table, **table.get("drag", {})}.items()
@@ -413,7 +413,7 @@ def shipped_liquids_to_add(study: Study, path: Path = ()) -> tuple[AddLiquid, ..
     by_text: dict[tuple[str, str], AddLiquid] = {}
     for source, name in shipped_liquids():
         request = AddLiquid(source, name, path)
-        by_text.setdefault((request.words, request.help(study).replace(source, "")), request)
+        by_text.setdefault((request.label, request.help(study).replace(source, "")), request)
     return tuple(by_text.values())
 
 

@@ -349,9 +349,9 @@ def _additions(study: Study, row: Row) -> Iterator[tuple[str, Request]]:
         yield new_element_label(section), AddNamed(row.path, section)
     if row.path == ("liquids",):
         yield new_element_label("liquids"), AddElement(row.path)
-        yield from ((request.words, request) for request in shipped_liquids_to_add(study))
+        yield from ((request.label, request) for request in shipped_liquids_to_add(study))
     elif (row.kind == "reference" and row.sections == ("liquids",)) or row.path[::2] == ("blocks", "conditions"):
-        yield from ((request.words, request) for request in shipped_liquids_to_add(study, row.path))
+        yield from ((request.label, request) for request in shipped_liquids_to_add(study, row.path))
 
 
 def _label_to_add(document: Mapping[str, Any], row: Row, name: str) -> str:

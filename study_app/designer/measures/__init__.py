@@ -1,4 +1,4 @@
-"""The tab *Measures*: what the open study can find, some numbers at once and some simulated.
+"""The tab *Measures*: what the open study can measure; some numbers are instant, others simulated.
 
 Reading order: cards, levels, study_facts; simulation; measures_view; measures_page.
 """

@@ -1,4 +1,4 @@
-"""Cards of measures: words, numbers, bars and tables, as values and as the widgets that show them."""
+"""Cards of measures with texts, numbers, bars and tables: their content, and the widgets that show it."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -31,27 +31,27 @@ from study_app.gui.widgets import grid as grid_of
 from study_app.protocol.source import Path
 
 UNKNOWN: Final = "–"
-"""Stands for a number that is not known."""
+"""The text of an unknown number."""
 Verdict: TypeAlias = tuple[Tone, str, str]
-"""Tone, icon and words."""
+"""Tone, icon and text."""
 INKS: dict[Tone, Ink] = {"ok": "ok", "warn": "warn", "bad": "bad", "accent": "accent", "neutral": "text2"}
 _NAME_PX = 132
-_MOST_LINES = 7
-NARROW_CODES = 3
+_MAX_LINES = 7
+FEW_CODES = 3
 
 
 @dataclass(frozen=True, slots=True)
 class Figures:
-    """Numbers with their words, side by side."""
+    """Numbers with their labels, side by side."""
 
     figures: tuple[tuple[str, str], ...]
 
 
 @dataclass(frozen=True, slots=True)
 class Segment:
-    """A step of a session: its words, its share of the time, whether it is looked at, and the element."""
+    """A step of a session: label, share of the duration (0 to 1), whether it is selected, and path."""
 
-    words: str
+    label: str
     share: float
     chosen: bool
     path: Path
@@ -59,7 +59,7 @@ class Segment:
 
 @dataclass(frozen=True, slots=True)
 class Segments:
-    """The steps of a session in order, and what is written below them: left and right."""
+    """The steps of a session in order, and the notes below them: left and right."""
 
     segments: tuple[Segment, ...]
     notes: tuple[str, ...]
@@ -67,7 +67,7 @@ class Segments:
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """A line with a bar: its title, its number in words, its share (0 to 1), and its verdict where it has an icon."""
+    """A line with a bar: title, number as text, length of the bar (0 to 1), and a verdict, shown if it has an icon."""
 
     title: str
     number: str
@@ -84,7 +84,7 @@ class Lines:
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """Rows of counts: how often each code is at a place."""
+    """A table with the count of each code (column) in each place (row)."""
 
     name: str
     codes: tuple[str, ...]
@@ -93,12 +93,12 @@ class Table:
 
 
 Part: TypeAlias = Verdict | Figures | Segments | Lines | tuple[Table, ...] | str | None
-"""What is on a card, one below the other; None is a rule."""
+"""A part of a card, one below the other; None is a rule."""
 
 
 @dataclass(frozen=True, slots=True)
 class MeasureCard:
-    """A card: title, what stands at its right, parts, and whether it is as wide as two."""
+    """A card: title, text to the right of it, parts, and whether the card takes two columns."""
 
     title: str
     aside: str = ""
@@ -107,14 +107,14 @@ class MeasureCard:
 
 
 class _Strip(Themed, QWidget):
-    """The steps of a session side by side, as wide as they are long; a click opens one."""
+    """The steps of a session side by side, with widths in proportion to durations; a click opens a step."""
 
     def __init__(self, segments: tuple[Segment, ...], opens: Callable[[Path], None]) -> None:
         super().__init__()
         self.segments, self.opens = segments, opens
         self.setFixedHeight(14)
         self.setCursor(Qt.CursorShape.PointingHandCursor)
-        listed = [segment.words for segment in segments]
+        listed = [segment.label for segment in segments]
         self.setAccessibleName("Session order: " + ", ".join(listed))
         self.setToolTip(plain_tip("\n".join((*listed, "Click a step to open it"))))
 
@@ -140,14 +140,16 @@ class _Strip(Themed, QWidget):
 
 
 class _CardWidget(Card):
-    """Shows a card; ``opens`` is called with the path of an element whose step is clicked."""
+    """Shows a card; ``opens`` is called with the path of a clicked step."""
 
     def __init__(self, shown: MeasureCard, opens: Callable[[Path], None]) -> None:
         self.aside = cut_text(shown.aside, "small", "text2", right=True)
         super().__init__(shown.title, self.aside, padding=16, gap=8)
         self.shown, self.opens = shown, opens
         self.setAccessibleName(shown.title)
-        self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)  # columns are equally wide
+        self.setSizePolicy(
+            QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred
+        )  # so that the columns are equally wide
         add_parts(self.column, *map(self._part_widget, shown.parts), STRETCH)
         self._beside = True
 
@@ -172,13 +174,13 @@ class _CardWidget(Card):
             return label(part, "small", "text2")
         if isinstance(part, Lines):
             return _lines_widget(part)
-        made = QWidget()
+        widget = QWidget()
         if isinstance(part, Figures):
-            row = hbox(spacing=6, margins=0, parent=made)
-            for value, word in part.figures:
+            row = hbox(spacing=6, margins=0, parent=widget)
+            for value, unit_text in part.figures:
                 number = figures(value, "number")
-                number.setAccessibleName(f"{value} {word}")
-                add_parts(row, number, (label(word, "small", "text2"), 0, Qt.AlignmentFlag.AlignBottom), 8)
+                number.setAccessibleName(f"{value} {unit_text}")
+                add_parts(row, number, (label(unit_text, "small", "text2"), 0, Qt.AlignmentFlag.AlignBottom), 8)
             row.addStretch()
         elif isinstance(part, Segments):
             notes = hbox(margins=0)
@@ -187,40 +189,40 @@ class _CardWidget(Card):
                 if at:
                     note.setAlignment(Qt.AlignmentFlag.AlignRight)
                 notes.addWidget(note)
-            vbox(_Strip(part.segments, self.opens), notes, spacing=8, margins=0, parent=made)
+            vbox(_Strip(part.segments, self.opens), notes, spacing=8, margins=0, parent=widget)
         elif isinstance(part[0], Table):
             tables = (
                 (_table_widget(table), 0, Qt.AlignmentFlag.AlignTop) for table in part if isinstance(table, Table)
             )
-            hbox(*tables, STRETCH, spacing=18, margins=0, parent=made)
+            hbox(*tables, STRETCH, spacing=18, margins=0, parent=widget)
         else:
             return _verdict_line(part)
-        return made
+        return widget
 
 
 def _verdict_line(verdict: Verdict) -> QWidget:
     """Return a line with a verdict's icon and its wrapped text."""
     tone, icon, text = verdict
-    made = QWidget()
-    sign = (Icon(icon or "info", INKS[tone], 16), 0, Qt.AlignmentFlag.AlignTop)
-    said = label(text, "small", "text" if tone != "neutral" else "text2", wraps=True)
-    hbox(sign, (said, 1), spacing=8, margins=0, parent=made)
-    return made
+    widget = QWidget()
+    icon_widget = (Icon(icon or "info", INKS[tone], 16), 0, Qt.AlignmentFlag.AlignTop)
+    text_label = label(text, "small", "text" if tone != "neutral" else "text2", wraps=True)
+    hbox(icon_widget, (text_label, 1), spacing=8, margins=0, parent=widget)
+    return widget
 
 
 def _table_widget(table: Table) -> QWidget:
-    made = QWidget()
-    grid = grid_of(3, 3, margins=0, parent=made)
+    widget = QWidget()
+    grid = grid_of(3, 3, margins=0, parent=widget)
     grid.addWidget(label(table.name, "small", "text2"), 0, 0, 1, len(table.codes) + 1)
     for across, code in enumerate(table.codes, start=1):
         grid.addWidget(label(code, "small", "text2"), 1, across, Qt.AlignmentFlag.AlignHCenter)
-    for down, (place, line) in enumerate(zip(table.places, table.counts, strict=True), start=2):
+    for down, (place, counts) in enumerate(zip(table.places, table.counts, strict=True), start=2):
         grid.addWidget(label(place, "small", "text2"), down, 0)
-        for across, (code, count) in enumerate(zip(table.codes, line, strict=True), start=1):
+        for across, (code, count) in enumerate(zip(table.codes, counts, strict=True), start=1):
             cell = _Cell(count, f"{code}, {table.name} {place}: {count} times")
-            cell.setFixedSize(30 if len(table.codes) <= NARROW_CODES else 24, 17)
+            cell.setFixedSize(30 if len(table.codes) <= FEW_CODES else 24, 17)
             grid.addWidget(cell, down, across)
-    return made
+    return widget
 
 
 class _Cell(Themed, QWidget):
@@ -239,13 +241,13 @@ class _Cell(Themed, QWidget):
         painter.drawText(QRectF(self.rect()), Qt.AlignmentFlag.AlignCenter, str(self._count))
 
 
-def _lines_widget(shown: Lines) -> QWidget:
-    made = QWidget()
-    grid = QGridLayout(made)
+def _lines_widget(lines_part: Lines) -> QWidget:
+    widget = QWidget()
+    grid = QGridLayout(widget)
     grid.setContentsMargins(0, 0, 0, 0)
     grid.setVerticalSpacing(4)
     grid.setColumnStretch(1, 1)
-    for at, line in enumerate(shown.lines[:_MOST_LINES]):
+    for at, line in enumerate(lines_part.lines[:_MAX_LINES]):
         name, bar = Elided("label"), Bar(6)
         name.setFixedWidth(_NAME_PX)
         name.show_text(line.title)
@@ -257,19 +259,19 @@ def _lines_widget(shown: Lines) -> QWidget:
         grid.addWidget(bar, at, 1)
         grid.addWidget(number, at, 2, Qt.AlignmentFlag.AlignRight)
         if icon:
-            mark = Icon(icon, INKS[tone], 16)
-            mark.setToolTip(plain_tip(text))
-            mark.setAccessibleName(f"{line.title}: {text}")
-            grid.addWidget(mark, at, 3)
-    if len(shown.lines) > _MOST_LINES:
-        grid.addWidget(label(f"and {len(shown.lines) - _MOST_LINES} more", "small", "text2"), _MOST_LINES, 0, 1, 2)
-    return made
+            verdict_icon = Icon(icon, INKS[tone], 16)
+            verdict_icon.setToolTip(plain_tip(text))
+            verdict_icon.setAccessibleName(f"{line.title}: {text}")
+            grid.addWidget(verdict_icon, at, 3)
+    if len(lines_part.lines) > _MAX_LINES:
+        grid.addWidget(label(f"and {len(lines_part.lines) - _MAX_LINES} more", "small", "text2"), _MAX_LINES, 0, 1, 2)
+    return widget
 
 
 class CardGrid(Themed, QWidget):
-    """Cards in two columns, wide ones across both; only those that changed are made anew.
+    """Cards in two columns, or across both if wide; only changed cards are recreated.
 
-    While the pointer is over them, none becomes lower: what is pointed at stays where it is.
+    While the pointer is over them, no card becomes lower, so that the card under the pointer keeps its position.
     """
 
     def __init__(self, opens: Callable[[Path], None]) -> None:
@@ -284,12 +286,12 @@ class CardGrid(Themed, QWidget):
     def show_cards(self, cards: tuple[MeasureCard, ...]) -> None:
         if cards == self.cards:
             return
-        pointed = self.isVisible() and self.underMouse()
-        heights = [(part.height(), part.accessibleName()) for part in self.parts] if pointed else []
+        is_hovered = self.isVisible() and self.underMouse()
+        heights = [(part.height(), part.accessibleName()) for part in self.parts] if is_hovered else []
         before, self.parts, self.cards = self.parts, [], cards
         for at, card in enumerate(cards):
-            kept = at < len(before) and before[at].shown == card
-            self.parts.append(before[at] if kept else _CardWidget(card, self.opens))
+            is_unchanged = at < len(before) and before[at].shown == card
+            self.parts.append(before[at] if is_unchanged else _CardWidget(card, self.opens))
         for part in before:
             self.grid.removeWidget(part)
             if part not in self.parts:
@@ -301,22 +303,22 @@ class CardGrid(Themed, QWidget):
             if part.shown.wide or len(pair) == 2:
                 rows.append([part] if part.shown.wide else pair)
                 pair = pair if part.shown.wide else []
-        for at, line in enumerate([*rows, pair]):
+        for at, row in enumerate([*rows, pair]):
             self.grid.setRowStretch(at, 0)
-            for column, part in enumerate(line):
-                self.grid.addWidget(part, at, column, 1, 2 if part.shown.wide else 3 - len(line))
+            for column, part in enumerate(row):
+                self.grid.addWidget(part, at, column, 1, 2 if part.shown.wide else 3 - len(row))
         self.grid.setRowStretch(len(rows) + 1, 1)
         for part, (height, title) in zip(self.parts, heights, strict=False):
             part.setMinimumHeight(height if title == part.accessibleName() else 0)
 
     def leaveEvent(self, event: QEvent) -> None:
         super().leaveEvent(event)
-        self._let_shrink()
+        self._release_heights()
 
     def hideEvent(self, event: QHideEvent) -> None:
         super().hideEvent(event)
-        self._let_shrink()
+        self._release_heights()
 
-    def _let_shrink(self) -> None:
+    def _release_heights(self) -> None:
         for part in self.parts:
             part.setMinimumHeight(0)

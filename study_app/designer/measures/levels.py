@@ -1,4 +1,4 @@
-"""The levels of a block in words and along an axis, and the block that an element belongs to."""
+"""The levels of a block as text and on an axis, and the block that uses an element."""
 
 import math
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ _STEPS: Final = (1, 2, 2.5, 5, 10)
 
 @dataclass(frozen=True, slots=True)
 class LevelFormat:
-    """How the levels of a stimulus are written: Weber fractions in percent, all others in their unit."""
+    """The text format of a stimulus' levels: Weber fractions in percent, others in their unit."""
 
     stimulus: Stimulus
 
@@ -49,27 +49,27 @@ class LevelFormat:
         return f"{self.number(level, digits)} {self.unit}".rstrip()
 
 
-_NAMED_BY: Final = {"stimuli": "stimulus", "methods": "method", "designs": "design", "questionnaires": "questionnaire",
+_BLOCK_KEYS: Final = {"stimuli": "stimulus", "methods": "method", "designs": "design", "questionnaires": "questionnaire",
                     "tasks": "task"}  # fmt: skip
 
 
 def block_of(protocol: Protocol | None, path: Path) -> Block | None:
-    """Return the selected block, or the first that uses the selected element, a main block if there is one."""
+    """Return the selected block, or the first one, preferably main, that uses the selected element; None without one."""
     if protocol is None or len(path) < 2:
         return None
-    if (key := _NAMED_BY.get(str(path[0]))) is None:
+    if (key := _BLOCK_KEYS.get(str(path[0]))) is None:
         return protocol.blocks.get(str(path[1])) if path[0] == "blocks" else None
     users = [user for user in protocol.blocks_in_order if getattr(user, key) == path[1]]
     return next((user for user in users if user.phase == "main"), next(iter(users), None))
 
 
 def limit_colour(theme: Theme, limit: Limit) -> str:
-    """Return the colour of a limit, the same on the axis of the levels and in every plot."""
+    """Return the colour of a limit, which is the same on the axis of levels and in every plot."""
     return theme.bad if limit == "slope" else theme.warn
 
 
 def rounded(value: float, digits: int = 3) -> str:
-    """Return a number with at most so many digits, without an exponent."""
+    """Return a number as text with at most ``digits`` significant digits, without an exponent."""
     if value == 0 or not math.isfinite(value):
         return "0" if value == 0 else "–"
     places = max(0, digits - 1 - math.floor(math.log10(abs(value))))
@@ -78,7 +78,7 @@ def rounded(value: float, digits: int = 3) -> str:
 
 
 def log_ticks(low: float, high: float, most: int) -> tuple[float, ...]:
-    """Return round numbers in an interval above 0, by decades, at most so many."""
+    """Return at most ``most`` round numbers, spaced by decades, in an interval above 0."""
     decades = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
     best: tuple[float, ...] = ()
     for steps in _BY_DECADE:
@@ -90,7 +90,7 @@ def log_ticks(low: float, high: float, most: int) -> tuple[float, ...]:
 
 
 def even_ticks(low: float, high: float, most: int) -> tuple[float, ...]:
-    """Return round numbers in an interval, evenly spaced, at most so many."""
+    """Return at most ``most`` round numbers, evenly spaced, in an interval."""
     if high <= low:
         return (low,)
     power = 10.0 ** math.floor(math.log10((high - low) / most))

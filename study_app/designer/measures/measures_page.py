@@ -1,4 +1,4 @@
-"""The tab Measures: cards of the selected element and the study's power; and the cards below other tabs."""
+"""The tab Measures with cards of the selected element and the study's power, and the cards below other tabs."""
 
 import re
 
@@ -12,16 +12,16 @@ from study_app.designer.measures.simulation import Simulated
 from study_app.designer.parts import small_button
 from study_app.gui.widgets import Card, add_parts, label, vbox
 
-_EARLIER = "These numbers describe the last valid version of the study. Correct the problems to update them."
-FACTS_MOST, FACTS_LEAST = 366, 190
-FACTS_SHARE, HIGH_FROM = 0.3, 940
-"""The share of a window's height that the cards take at most; in windows as high as this two rows are shown whole."""
+_OUTDATED = "These numbers describe the last valid version of the study. Correct the problems to update them."
+FACTS_MAX_PX, FACTS_MIN_PX = 366, 190
+FACTS_SHARE, HIGH_MIN_PX = 0.3, 940
+"""Greatest share of the window's height for the cards; window height from which two rows fit completely [px]."""
 
 
 class _MeasureCards(QScrollArea):
-    """Draws the cards of a `MeasuresView`; ``open_asked`` carries an element's path.
+    """Shows the cards of a `MeasuresView`; ``open_asked`` carries an element's path.
 
-    While they are hidden, the last ones are kept; ``appeared`` comes when they are shown.
+    The cards are not updated while hidden; ``appeared`` is emitted when they become visible.
     """
 
     open_asked = Signal(object)
@@ -34,7 +34,7 @@ class _MeasureCards(QScrollArea):
         self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.shown: MeasuresView | None = None
         self.grid = CardGrid(self.open_asked.emit)
-        self.earlier = label(_EARLIER, "small", "warn", wraps=True)
+        self.earlier = label(_OUTDATED, "small", "warn", wraps=True)
         self.earlier.hide()
         inside = QWidget()
         inside.setObjectName("earlier")
@@ -60,7 +60,7 @@ class _MeasureCards(QScrollArea):
 
 
 class _PowerCard(Card):
-    """The output of ``liquid-study power``, with the progress of its simulation and the trials that would be lost."""
+    """The output of ``liquid-study power``, the progress of its simulation, and the trials that would be lost."""
 
     def __init__(self) -> None:
         self.preregister = small_button("file", "Write preregistration")
@@ -87,7 +87,7 @@ class _PowerCard(Card):
 
 
 class MeasuresPage(_MeasureCards):
-    """The tab: the cards, and below them the study's power."""
+    """The tab Measures: the cards, and below them the study's power."""
 
     def __init__(self) -> None:
         super().__init__("Measures")
@@ -114,7 +114,7 @@ class FactsRow(_MeasureCards):
     def fit_height(self, window_px: int, left_px: int) -> None:
         """Set the height that the cards need, at most ``left_px`` if positive, otherwise a share of the window."""
         self._window_px, self._left_px = window_px, left_px
-        largest = FACTS_MOST if window_px >= HIGH_FROM else max(FACTS_LEAST, round(FACTS_SHARE * window_px))
+        largest = FACTS_MAX_PX if window_px >= HIGH_MIN_PX else max(FACTS_MIN_PX, round(FACTS_SHARE * window_px))
         largest = left_px if left_px > 0 else largest
         column = self.column
         needed = max(column.totalHeightForWidth(self.viewport().width()), column.totalMinimumSize().height())

@@ -7,7 +7,7 @@ from typing import Final
 from study_app.designer.document.elements import title_of
 from study_app.designer.document.study import Study
 from study_app.designer.measures.cards import (  # fmt: skip
-    NARROW_CODES,
+    FEW_CODES,
     UNKNOWN,
     Figures,
     Line,
@@ -39,15 +39,15 @@ from study_app.protocol.wording import language_name, languages_of
 
 _SQUARE_NAMES: Final = {"williams": "Williams design", "latin": "Latin square"}
 _MOST_CODES: Final = 8
-"""Of more codes only how even they are is said."""
+"""Greatest number of codes in a table; for more, a sentence summarises the counts."""
 _MOST_ROWS: Final = 6
-"""Positions that are shown of a long block."""
+"""Greatest number of positions in a table."""
 _NO_FORCES: Final = "Unknown until you correct the problems in the device and scene settings."
 
 
 @dataclass(frozen=True, slots=True)
 class MeasuresView:
-    """Cards of the selected element, and what was simulated; ``earlier``: all is of the last study without faults."""
+    """Cards of the selected element and simulated results; ``earlier`` if they are of the last study without faults."""
 
     cards: tuple[MeasureCard, ...]
     simulated: Simulated
@@ -57,7 +57,7 @@ class MeasuresView:
 def measures_view(
     study: Study, facts: Facts, path: Path, simulated: Simulated, *, earlier: bool = False
 ) -> MeasuresView:
-    """Return the measures of the selected element; ``earlier`` says that the study is the last one without faults."""
+    """Return the measures of the element at ``path``; ``earlier`` if ``study`` is an earlier one without faults."""
     protocol = valid_part(study).protocol
     cards = [_session_card(study, facts, path)]
     if protocol is not None:
@@ -71,7 +71,7 @@ def measures_view(
 
 
 def _liquids(protocol: Protocol, path: Path, block: Block | None) -> list[str]:
-    """Return the liquids of an element in file order; if it has none, those of all blocks, or else every liquid."""
+    """Return the liquids of an element in file order, else those of its block or of all blocks, else all liquids."""
     if path[0] == "liquids" and len(path) > 1 and path[1] in protocol.liquids:
         return [str(path[1])]
     blocks = protocol.blocks if block is None else (block.id,)
@@ -83,7 +83,7 @@ def _liquids(protocol: Protocol, path: Path, block: Block | None) -> list[str]:
 
 
 def _session_card(study: Study, facts: Facts, path: Path) -> MeasureCard:
-    """Return the session in numbers, with the duration of the selected step."""
+    """Return the card with the session's duration, answers, trials and steps, and verdicts on its texts."""
     verdicts = _text_verdicts(study, facts)
     if facts.expected_s is None or facts.range_s is None:
         unknown = tuple((UNKNOWN, word) for word in ("min", "answers", "trials"))
@@ -93,15 +93,17 @@ def _session_card(study: Study, facts: Facts, path: Path) -> MeasureCard:
         (str(facts.answers), _noun(facts.answers, "answer")),
         (str(facts.trials), _noun(facts.trials, "trial")),
     )
-    whole = max(1e-9, sum(facts.steps_s.values()))
+    total_s = max(1e-9, sum(facts.steps_s.values()))
     chosen = str(path[1]) if len(path) > 1 else ""
     segments = tuple(
-        Segment(f"{_title(study, step)} {duration(step_s)}", step_s / whole, step == chosen, _path(study, step))
+        Segment(f"{_title(study, step)} {duration(step_s)}", step_s / total_s, step == chosen, _path(study, step))
         for step, step_s in facts.steps_s.items()
     )
     longest = sorted(facts.steps_s, key=lambda step: -facts.steps_s[step])[:2]
-    named = [chosen, *(step for step in longest if step != chosen)][:2] if chosen in facts.steps_s else longest
-    notes = tuple(f"{_title(study, step)} {duration(facts.steps_s[step])}" for step in facts.steps_s if step in named)
+    noted_steps = [chosen, *(step for step in longest if step != chosen)][:2] if chosen in facts.steps_s else longest
+    notes = tuple(
+        f"{_title(study, step)} {duration(facts.steps_s[step])}" for step in facts.steps_s if step in noted_steps
+    )
     breaks = counted(facts.breaks, "break") if facts.breaks else ""
     least_to_most = duration_range(*facts.range_s)
     aside = ", ".join(filter(None, (least_to_most if " to " in least_to_most else "", breaks)))
@@ -118,7 +120,7 @@ def _noun(count: int | None, word: str) -> str:
 
 
 def _block_card(study: Study, facts: Facts, protocol: Protocol, block: Block) -> MeasureCard:
-    """Return a block in numbers."""
+    """Return the card with a block's duration, trials, answers and breaks."""
     order, questionnaire = order_of(protocol, block), protocol.questionnaire_of(block.id)
     answers = 0 if questionnaire is None else len(questionnaire.items)
     duration_s = facts.steps_s.get(block.id)
@@ -144,32 +146,34 @@ def _text_verdicts(study: Study, facts: Facts) -> Sequence[Verdict]:
     if copied := ", ".join(f"{count} in {language_name(code)}" for code, count in copied_texts(study).items()):
         verdicts = [*(verdicts if missing else ()), ("neutral", "info", f"Texts to translate: {copied}")]
     if (protocol := valid_part(study).protocol) is not None:
-        revealed = revealing_texts(study, protocol)
-        named = f"in {revealed[0].element}, “{revealed[0].word}” reveals a condition" if revealed else ""
-        more = f", and {len(revealed) - 1} more" if len(revealed) > 1 else ""
+        revealing = revealing_texts(study, protocol)
+        sentence = f"in {revealing[0].element}, “{revealing[0].word}” reveals a condition" if revealing else ""
+        more = f", and {len(revealing) - 1} more" if len(revealing) > 1 else ""
         verdicts.append(
-            ("warn", "warning", named + more) if revealed else ("ok", "check", "The texts do not reveal any condition")
+            ("warn", "warning", sentence + more)
+            if revealing
+            else ("ok", "check", "The texts do not reveal any condition")
         )
     return verdicts
 
 
 def _balance_card(study: Study, protocol: Protocol, block: Block) -> list[MeasureCard]:
-    """Return how balanced the orders of a block are for the planned participants; none if it has one code."""
+    """Return the card on the balance of a block's orders for the planned participants; none for a single code."""
     planned = planned_participants(study)
     participants = planned or PARTICIPANTS
-    judged = block_balance(protocol, block.id, participants)
-    if judged is None:
+    balance = block_balance(protocol, block.id, participants)
+    if balance is None:
         return []
-    order, evenness, rows = judged.order, judged.evenness, judged.rows
+    order, evenness, rows = balance.order, balance.evenness, balance.rows
     if evenness.balanced:
         verdict: Verdict = ("ok", "check", "balanced")
         if rows is not None:
-            times = counted(participants // rows, "time")
-            verdict = ("ok", "check", f"balanced: {participants} participants, each of the {rows} orders {times}")
+            repetitions = counted(participants // rows, "time")
+            verdict = ("ok", "check", f"balanced: {participants} participants, each of the {rows} orders {repetitions}")
     elif rows is not None and participants % rows:
-        last = participants - participants % rows
-        even = f"{last} or {last + rows}" if last else f"{rows}"
-        verdict = ("warn", "warning", f"a {_SQUARE_NAMES[order]} would be balanced with {even} participants")
+        lower_count = participants - participants % rows
+        suitable_counts = f"{lower_count} or {lower_count + rows}" if lower_count else f"{rows}"
+        verdict = ("warn", "warning", f"a {_SQUARE_NAMES[order]} would be balanced with {suitable_counts} participants")
     elif rows is not None:
         verdict = ("warn", "warning", "positions are balanced, but carry-over is not")
     elif order == "fixed":
@@ -179,46 +183,52 @@ def _balance_card(study: Study, protocol: Protocol, block: Block) -> list[Measur
     aside = f"{_title(study, block.id)}, {participants} {'participants' if planned is None else 'planned'}"
     if len(evenness.codes) > _MOST_CODES:
         cells = [count for line in evenness.positions for count in line]
-        after = evenness.after_another
+        following_counts = evenness.after_another
         summary = (
             f"each code occurs in each position {min(cells)} to {max(cells)} times and follows every other code "
-            f"{min(after)} to {max(after)} times"
+            f"{min(following_counts)} to {max(following_counts)} times"
         )
         return [MeasureCard("Balance", aside, ((*verdict[:2], f"{verdict[2]}; {summary}"),))]
     shown, codes = evenness.positions[:_MOST_ROWS], evenness.codes
     places = tuple(str(number + 1) for number in range(len(shown)))
     tables = Table("position", codes, places, shown), Table("comes after", codes, codes, evenness.follows)
-    hidden = len(evenness.positions) - len(shown)
-    more = (f"and {hidden} more positions",) if hidden else ()
-    return [MeasureCard("Balance", aside, (tables, *more, verdict), wide=len(codes) > NARROW_CODES)]
+    hidden_count = len(evenness.positions) - len(shown)
+    note = (f"and {hidden_count} more positions",) if hidden_count else ()
+    return [MeasureCard("Balance", aside, (tables, *note, verdict), wide=len(codes) > FEW_CODES)]
 
 
 def _lines_card(title: str, aside: str, lines: tuple[Line, ...], sentences: tuple[Verdict, ...]) -> MeasureCard:
-    """Return lines with bars, and sentences below them."""
+    """Return a card of lines with bars, and verdicts below them."""
     return MeasureCard(title, aside, (Lines(lines), *_below_rule(sentences)))
 
 
 def _force_card(study: Study, facts: Facts, protocol: Protocol, names: Sequence[str]) -> MeasureCard:
-    """Return the force of some liquids against a hand at 0.1 m/s."""
+    """Return the card with the force of liquids against a hand at 0.1 m/s."""
     if not valid_part(study).forces:
         unknown = tuple(Line(_title(study, name, "liquids"), UNKNOWN, 0.0) for name in names)
         return _lines_card("Force for each liquid", "", unknown, (("neutral", "minus", _NO_FORCES),))
     limit_n = protocol.device.force_limit_n
     lines = []
     for name in names:
-        it = steady_force(protocol.scene_of(name), HAND_MPS)
+        force = steady_force(protocol.scene_of(name), HAND_MPS)
         verdict: Verdict = ("ok", "check", "not clipped")
-        if it.limit is not None:  # in the colour of the limit
-            verdict = ("warn" if it.limit == "norm" else "bad", "warning", f"clipped by the {LIMIT_NAMES[it.limit]}")
+        if force.limit is not None:  # the tone is the colour of the limit
+            verdict = (
+                "warn" if force.limit == "norm" else "bad",
+                "warning",
+                f"clipped by the {LIMIT_NAMES[force.limit]}",
+            )
         lines.append(
-            Line(_title(study, name, "liquids"), f"{it.force_n:.2f} N", min(1.0, it.force_n / limit_n), verdict)
+            Line(_title(study, name, "liquids"), f"{force.force_n:.2f} N", min(1.0, force.force_n / limit_n), verdict)
         )
-    alike = [
+    similarity_warnings = [
         warning
         for warning in facts.warnings
         if "hard to tell apart" in warning and any(name in warning for name in names)
     ]
-    sentences: tuple[Verdict, ...] = tuple(("warn", "warning", f"{capitalised(warning)}.") for warning in alike)
+    sentences: tuple[Verdict, ...] = tuple(
+        ("warn", "warning", f"{capitalised(warning)}.") for warning in similarity_warnings
+    )
     if not sentences and len(names) > 1:
         sentences = (("ok", "check", "All pairs of liquids are distinguishable"),)
     return _lines_card(

@@ -1,4 +1,4 @@
-"""Simulations of a study in another process: the warnings of ``check`` on precision, and the output of ``power``."""
+"""Simulations of a study in another process: the precision warnings of ``check``, and the output of ``power``."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ WAITING: Final = "simulating …"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Simulated:
-    """What was simulated of a study.
+    """The results of a study's simulation.
 
-    ``warnings`` are those of ``check`` that need simulations, ``lost`` says which trials would not be delivered, and
-    ``table`` is the output of ``power``. ``waiting`` describes the progress, ``failed`` why the simulation cannot
-    continue; both are "" otherwise.
+    ``warnings`` are those of ``check`` that need simulations, ``lost`` are sentences on trials that would not be
+    delivered, and ``table`` is the output of ``power``. ``waiting`` describes the progress while the simulation runs,
+    and ``failed`` is the reason if it cannot continue.
     """
 
     warnings: tuple[str, ...] = ()
@@ -37,7 +37,7 @@ class Simulated:
 
 @dataclass(frozen=True, slots=True)
 class Simulation:
-    """The simulation of a study, with or without its power: those that agree in ``depends`` have one answer."""
+    """A requested simulation, with or without power; those with the same ``depends`` have the same result."""
 
     depends: str
     power: bool
@@ -48,14 +48,16 @@ def simulation_of(protocol: Protocol, *, power: bool) -> Simulation | None:
     """Return the simulation that a study needs; None if it needs none."""
     if not power and not needs_precision_check(protocol):
         return None
-    described = _without_texts(protocol.model_dump(mode="json", exclude={"pages"}))
-    titles = [protocol.study.title, *(block.title for block in protocol.main_blocks)] if power else []  # in the table
-    depends = json.dumps([described, titles], sort_keys=True)
+    content = _without_texts(protocol.model_dump(mode="json", exclude={"pages"}))
+    titles = (
+        [protocol.study.title, *(block.title for block in protocol.main_blocks)] if power else []
+    )  # shown in the table
+    depends = json.dumps([content, titles], sort_keys=True)
     return Simulation(depends, power, protocol)
 
 
 def needs_precision_check(protocol: Protocol) -> bool:
-    """Return whether ``check`` warns about the precision of the study's thresholds, which it simulates."""
+    """Return whether ``check`` simulates the precision of the study's thresholds."""
     decided = protocol.analysis
     planned = decided is not None and decided.precision is not None and decided.participants is not None
     return planned and any(threshold_plan(protocol, block) is not None for block in protocol.main_blocks)
@@ -75,8 +77,8 @@ def start_measure_worker() -> MeasureClient:
     return WorkerClient("study_app.designer.measures.simulation:run_simulation", name="measures", background=True)
 
 
-class _OneProcess(Executor):
-    """Runs cases in this process, each when its result is requested; ``check`` is called before each."""
+class _InProcessExecutor(Executor):
+    """An executor that runs each call in this process when its result is requested, after calling ``check``."""
 
     def __init__(self, check: Callable[[], None]) -> None:
         self._check = check
@@ -88,7 +90,10 @@ class _OneProcess(Executor):
 
 
 def run_simulation(order: Simulation, send: Send, stop: Stop) -> Simulated:
-    """Run a simulation, and send what is known so far; raise Stopped if another order came or the client has ended."""
+    """Run a simulation, and send intermediate results.
+
+    Raises Stopped if another one was ordered, or the client has ended.
+    """
 
     def check() -> None:
         if stop():
@@ -103,15 +108,15 @@ def run_simulation(order: Simulation, send: Send, stop: Stop) -> Simulated:
         from study_app.session.simulated.predicted_delivery import predicted_delivery  # noqa: PLC0415 - the compiler: only here
         from study_app.session.simulated.rehearsal import condition_features  # noqa: PLC0415 - the compiler: only here
 
-        def show_progress(words: str) -> None:
+        def show_progress(text: str) -> None:
             check()
-            send(replace(simulated, waiting=f"{words} …"))
+            send(replace(simulated, waiting=f"{text} …"))
 
         show_progress("predicting which trials can be delivered")
         simulated = replace(simulated, lost=predicted_delivery(protocol, ASSUMED_TICKS).sentences)
         for estimate in estimate_power(
             protocol,
-            _OneProcess(check),
+            _InProcessExecutor(check),
             sizes=planned_sizes(protocol),
             rehearse=lambda: condition_features(protocol, seed=1, progress=show_progress),
             progress=show_progress,

@@ -1,4 +1,4 @@
-"""What is known of a study, even of a faulty one: its texts by language, its valid part, and facts of that."""
+"""Facts on a study, even a faulty one: its texts by language, its valid part, and numbers of that."""
 
 from collections import Counter
 from collections.abc import Mapping
@@ -27,15 +27,15 @@ from study_app.store.workstation import device_without_force
 _PLANNED: Final = ("analysis", "participants")
 PARTICIPANTS: Final = 12
 """Participants of a study without `analysis.participants`."""
-_SHORTEST: Final = 3
-"""Letters of an id that does not stand in a text by chance."""
-READ: Final = ("pages", "blocks", "tasks", "designs")
-"""Sections whose texts are read before the last answer; statements may name what is compared, as all see the same."""
+_MIN_WORD_LETTERS: Final = 3
+"""Minimum number of letters of an ID, with which it does not occur in a text by chance."""
+READ_SECTIONS: Final = ("pages", "blocks", "tasks", "designs")
+"""Sections whose texts are read before the last answer; statements, which all see alike, may name conditions."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Revealing:
-    """A text that reveals a condition: its key, the element's title, and the word that reveals it."""
+    """A text that reveals a condition: path, title of the element, label of the key, and the revealing word."""
 
     path: Path
     element: str
@@ -44,22 +44,22 @@ class Revealing:
 
 
 def texts_by_language(study: Study) -> dict[str, tuple[int, int]]:
-    """Return for each language the numbers of its present and its required texts."""
+    """Return the numbers of existing and required texts of each language."""
     languages = languages_of(study.document)
-    counted = {code: [0, 0] for code in languages}
-    lacking = {(fault.path, fault.missing_language) for fault in study.faults if fault.kind == "no text"}
+    counts = {code: [0, 0] for code in languages}
+    missing = {(fault.path, fault.missing_language) for fault in study.faults if fault.kind == "no text"}
     for path, value in localised_texts(study):
         is_instrument = value_at(study.document, (*path[:2], "instrument")) is not None
-        for place, code in enumerate(languages):
-            counted[code][1] += 1
-            text = value.get(code) if isinstance(value, Mapping) else value if place == 0 else ""
-            of_program = is_instrument and (path, code) not in lacking
-            counted[code][0] += of_program or bool(text.strip() if isinstance(text, str) else text)
-    return {code: (present, wanted) for code, (present, wanted) in counted.items()}
+        for position, code in enumerate(languages):
+            counts[code][1] += 1
+            text = value.get(code) if isinstance(value, Mapping) else value if position == 0 else ""
+            is_in_program = is_instrument and (path, code) not in missing
+            counts[code][0] += is_in_program or bool(text.strip() if isinstance(text, str) else text)
+    return {code: (present, wanted) for code, (present, wanted) in counts.items()}
 
 
 def missing_texts(study: Study) -> dict[str, int]:
-    """Return the number of missing texts of each language that lacks some."""
+    """Return the number of missing texts of each language that has some."""
     return {code: wanted - present for code, (present, wanted) in texts_by_language(study).items() if present < wanted}
 
 
@@ -74,23 +74,23 @@ def _translation_warnings(study: Study) -> tuple[str, ...]:
 
 
 def revealing_texts(study: Study, protocol: Protocol) -> tuple[Revealing, ...]:
-    """Return the texts that name a liquid, condition or delay which participants must not know."""
+    """Return the texts that contain the name of a liquid or condition, or a delay, that participants must not know."""
     telltales = Telltales(_telltale_words(protocol))
     debriefs = {name for name, page in protocol.pages.items() if page.kind == "debrief"}
     revealing = []
     for path, value in localised_texts(study):
-        if path[0] not in READ or (path[0] == "pages" and path[1] in debriefs):
+        if path[0] not in READ_SECTIONS or (path[0] == "pages" and path[1] in debriefs):
             continue
         texts = value.values() if isinstance(value, Mapping) else (value,)
-        words_there = [word for text in texts if isinstance(text, str) for word in telltales.in_text(text.casefold())]
-        if words_there:
+        words = [word for text in texts if isinstance(text, str) for word in telltales.in_text(text.casefold())]
+        if words:
             element = title_of(study.document, path[:2])
-            revealing.append(Revealing(path=path, element=element, key=label_of(path[-1]), word=words_there[0]))
+            revealing.append(Revealing(path=path, element=element, key=label_of(path[-1]), word=words[0]))
     return tuple(revealing)
 
 
 def _telltale_words(protocol: Protocol) -> set[str]:
-    """Return the names of everything that main blocks compare, and their delays with the unit."""
+    """Return the names of the conditions and liquids that main blocks compare, and their delays with unit."""
     telltales: set[str] = set()
     for block in protocol.main_blocks:
         names = protocol.conditions_in(block.id)
@@ -99,7 +99,7 @@ def _telltale_words(protocol: Protocol) -> set[str]:
         for name in names:
             condition = protocol.conditions[name]
             ids = {name, *condition.liquid_ids}
-            telltales |= {name.replace("_", " ").casefold() for name in ids if len(name) >= _SHORTEST}
+            telltales |= {name.replace("_", " ").casefold() for name in ids if len(name) >= _MIN_WORD_LETTERS}
             if condition.delay_ms:
                 telltales.add(f"{condition.delay_ms:g} ms")
     return telltales
@@ -107,34 +107,34 @@ def _telltale_words(protocol: Protocol) -> set[str]:
 
 @cache
 def text_keys() -> frozenset[str]:
-    """Return the keys with a text for each language, of every model of the file format."""
+    """Return the keys of localised texts in all models of the file format."""
     models = [schema(), *schema()["$defs"].values()]
     properties = (pair for model in models for pair in model.get("properties", {}).items())
     return frozenset(key for key, node in properties if is_localised(tuple(alternatives(node))))
 
 
-_ROUNDS: Final = 8
-"""Leaving one element out may break those that name it: so often the rest is examined again."""
+_MAX_ROUNDS: Final = 8
+"""Greatest number of repeated validations, because omitting an element may break others that refer to it."""
 TEXT: Final = "…"
-_STAND_IN: Final = {
+_SUBSTITUTES: Final = {
     ("study", "version"): "1", ("study", "name"): "study", ("study", "title"): TEXT,
     ("device", "workspace_mm"): (1000, 1000, 1000),
 }  # fmt: skip
-_LEFT_OUT: Final = (("analysis",), ("limits",))
-"""Tables that no session needs."""
-_OF_FORCES: Final = (("device",), ("scene",))
-"""Tables on which every force depends, and no sum over the session."""
-_APART: Final = (*_LEFT_OUT, *_OF_FORCES)
+_OPTIONAL_TABLES: Final = (("analysis",), ("limits",))
+"""Tables without which a session can run."""
+_FORCE_TABLES: Final = (("device",), ("scene",))
+"""Tables on which every force depends, but no sum over the session."""
+_TABLES_WITHOUT_SUMS: Final = (*_OPTIONAL_TABLES, *_FORCE_TABLES)
 _MARK: Final = "\u034f"
-"""The combining grapheme joiner: nothing is seen of it, and texts with it are not taken as alike."""
+"""The combining grapheme joiner, an invisible character that makes equal texts different."""
 
 
 @dataclass(frozen=True, slots=True)
 class ValidPart:
-    """The study without its broken elements, None where everything depends on what is broken.
+    """The protocol of a study without its faulty elements; None if a fault affects everything.
 
-    It is ``whole`` where no element was left out, so that sums over the session are known; ``forces`` are known where
-    no value of device and scene was left out.
+    ``whole`` says that no element was omitted, so that sums over the session are valid; ``forces`` that no value of
+    device and scene was omitted, so that forces are valid.
     """
 
     protocol: Protocol | None
@@ -144,32 +144,32 @@ class ValidPart:
 
 @lru_cache(maxsize=2)
 def valid_part(study: Study) -> ValidPart:
-    """Return the part of a study without faults that can be measured."""
+    """Return the part of a study that has no faults."""
     return restored_part(study, {})
 
 
 def restored_part(study: Study, before: Mapping[str, Any]) -> ValidPart:
-    """Return the valid part of a study; faulty values come from the document ``before``, if any."""
+    """Return the valid part of a study; faulty values are replaced by those of the document ``before``, if any."""
     if study.formed is not None or not (study.is_toml or before):
         return ValidPart(study.formed, whole=study.formed is not None)
     document: Any = study.document
     faults: list[Fault] = list(study.faults) if study.is_toml else validate_document(document)[1]
     whole = forces = True
-    for number in range(_ROUNDS):
+    for number in range(_MAX_ROUNDS):
         for fault in sorted(faults, key=_sort_key, reverse=True):
-            place, value = _restoring_change(document, fault, before) or _repairing_change(
-                document, fault, of_others=number > 0
+            changed_path, value = _restoring_change(document, fault, before) or _repairing_change(
+                document, fault, after_omissions=number > 0
             )
-            known = value is not None or fault.kind == "unknown key" or place[:1] in _APART
-            if not place:
-                place, value = fault.path[:2], _initial_value(document, fault.path[:2])
+            keeps_element = value is not None or fault.kind == "unknown key" or changed_path[:1] in _TABLES_WITHOUT_SUMS
+            if not changed_path:
+                changed_path, value = fault.path[:2], _initial_value(document, fault.path[:2])
                 if value is None:
                     return ValidPart(None, whole=False)
-            if value_at(document, place) is None and value is None:
+            if value_at(document, changed_path) is None and value is None:
                 continue  # another fault of the same element already removed it
-            whole = whole and known
-            forces = forces and (fault.kind == "unknown key" or fault.path[:1] not in _OF_FORCES)
-            edit = Unset(place) if value is None else Set(place, value)
+            whole = whole and keeps_element
+            forces = forces and (fault.kind == "unknown key" or fault.path[:1] not in _FORCE_TABLES)
+            edit = Unset(changed_path) if value is None else Set(changed_path, value)
             with suppress(Refused):  # its table was removed
                 document = frozen(intended_document(document, edit))
         protocol, faults = validate_document(document)
@@ -179,25 +179,25 @@ def restored_part(study: Study, before: Mapping[str, Any]) -> ValidPart:
 
 
 def _restoring_change(document: Any, fault: Fault, before: Mapping[str, Any]) -> tuple[Path, Any] | None:
-    """Return the place to change because of a fault, and its earlier value; None if it had none."""
+    """Return the path to change because of a fault, and its earlier value; None if there is none."""
     if not before or fault.missing_language:
         return None
     path, value = fault.path, value_at(document, fault.path)
-    sound = value_at(before, _path_before(document, path, before))
+    earlier = value_at(before, _path_before(document, path, before))
     if fault.kind == "one language" and isinstance(value, str):
         return path, dict.fromkeys(languages_of(document), value)
     if fault.kind == "alike":  # invisible marks make the text unique
         marks = _MARK * (1 + max((step for step in path if isinstance(step, int)), default=0))
         texts = value.items() if isinstance(value, Mapping) else ()
         return path, {code: f"{text}{marks}" for code, text in texts} or f"{value}{marks}"
-    named = referenced_element(before, path) if fault.kind == "unknown name" and sound == value else None
-    if named is not None and value_at(document, named[:1]) is not None:
-        return named, value_at(before, named)
-    return (path, sound) if sound is not None and sound != value else None
+    target = referenced_element(before, path) if fault.kind == "unknown name" and earlier == value else None
+    if target is not None and value_at(document, target[:1]) is not None:
+        return target, value_at(before, target)
+    return (path, earlier) if earlier is not None and earlier != value else None
 
 
 def _path_before(document: Any, path: Path, before: Any) -> Path:
-    """Return the earlier place of an element: a question is found by its id, not by its number."""
+    """Return the earlier path of an element; questions are matched by ID, not by position."""
     path_before: list[str | int] = []
     for step in path:
         document = document[step] if has(document, step) else None
@@ -214,50 +214,50 @@ def _path_before(document: Any, path: Path, before: Any) -> Path:
 
 
 def _sort_key(fault: Fault) -> tuple[str, ...]:
-    """Return a sort key that puts later entries of a list after earlier ones."""
+    """Return a sort key that sorts list entries by index."""
     return tuple(f"{step:06}" if isinstance(step, int) else step for step in fault.path)
 
 
-def _repairing_change(document: Any, fault: Fault, *, of_others: bool) -> tuple[Path, Any]:
-    """Return the place to change because of a fault, and its value (None omits it); () if nothing helps.
+def _repairing_change(document: Any, fault: Fault, *, after_omissions: bool) -> tuple[Path, Any]:
+    """Return the path to change because of a fault, and its new value, None to omit it; () if there is no repair.
 
-    A key that is wrong only because another element was left out (``of_others``) is left out before its own element.
+    With ``after_omissions`` the fault may be due to an omitted element; its key is then omitted, not its element.
     """
     path = fault.path
     if (missing := fault.missing_language) and path and path[-1] != missing:
-        known = value_at(document, path)
-        others = known.values() if isinstance(known, Mapping) else ()
+        value = value_at(document, path)
+        others = value.values() if isinstance(value, Mapping) else ()
         return (*path, missing), next(iter(others), TEXT)
     if fault.kind == "unknown key":
         return path, None
     if fault.kind == "part" and fault.use is not None:
         return fault.use
-    named = 0 if path[:1] == ("study",) else 1  # the name of an element may be that of a text
-    for length in range(len(path), 1 + named, -1):
+    first_key = 0 if path[:1] == ("study",) else 1  # the ID of an element may equal the key of a text
+    for length in range(len(path), 1 + first_key, -1):
         if path[length - 1] in text_keys():
             return path[:length], _neutral_text(document)
-    if path[:2] in _STAND_IN:
-        return path[:2], _STAND_IN[path[0], path[1]]  # type: ignore[index]
+    if path[:2] in _SUBSTITUTES:
+        return path[:2], _SUBSTITUTES[path[0], path[1]]  # type: ignore[index]
     if path[:1] == ("questionnaires",) and path[2:3] == ("items",) and len(path) > 3:
         return (path[:5], f"item_{path[3]}") if path[4:] == ("id",) else (path[:4], None)
     if path[:1] == ("scales",) and path[2:3] == ("labels",) and len(path) == 4:
         labels = value_at(document, path[:3])
         by_language = labels.items() if isinstance(labels, Mapping) else ()
-        return path, next((own for code, own in by_language if code != path[3]), None)
-    if path[:1] in _LEFT_OUT:
+        return path, next((texts for code, texts in by_language if code != path[3]), None)
+    if path[:1] in _OPTIONAL_TABLES:
         return path[:1], None
-    if path[:1] in _OF_FORCES:
+    if path[:1] in _FORCE_TABLES:
         return path[:2], None if value_at(document, path[:2]) is not None else _initial_value(document, path[:2])
-    listed = len(path) > 1 and isinstance(path[-1], int) and isinstance(value_at(document, path), str)
-    if listed:
+    is_list_entry = len(path) > 1 and isinstance(path[-1], int) and isinstance(value_at(document, path), str)
+    if is_list_entry:
         return path, None
-    if of_others and len(path) > 2 and value_at(document, path[:3]) is not None:
+    if after_omissions and len(path) > 2 and value_at(document, path[:3]) is not None:
         return path[:3], None
     return (path[:2], None) if len(path) > 1 and isinstance(value_at(document, path[:2]), Mapping) else ((), None)
 
 
 def _initial_value(document: Any, path: Path) -> Any:
-    """Return a valid value for a key; None where there is none."""
+    """Return a valid value for a key; None if there is none."""
     try:
         return initial_value(document, path) if path else None
     except Refused:
@@ -271,56 +271,54 @@ def _neutral_text(document: Any) -> Any:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Facts:
-    """What a study is, in numbers: those that depend on a broken element are not known."""
+    """Numbers of a study; None if they depend on a faulty element."""
 
-    expected_s: float | None = None  # how long a session will take [s]
-    range_s: tuple[float, float] | None = None  # how long the shortest and the longest session will take [s]
-    # how long each page, form and block will take [s], by its id
-    steps_s: dict[str, float] = field(default_factory=dict)
-    # the maximum number in a complete session, practice included
+    expected_s: float | None = None  # expected duration of a session
+    range_s: tuple[float, float] | None = None  # expected durations of the shortest and the longest session
+    steps_s: dict[str, float] = field(default_factory=dict)  # expected duration of each page, form and block, by ID
+    # numbers of trials, answers and breaks in the longest session, including practice
     trials: int | None = None
     answers: int | None = None
     breaks: int | None = None
     forces_n: dict[str, float] = field(default_factory=dict)  # force of each liquid [N] against a hand at 0.1 m/s
-    # the number of missing texts of each language that lacks some
-    missing: dict[str, int] = field(default_factory=dict)
-    # the warnings of ``check``, but those that take simulated observers, and what is to be translated
+    missing: dict[str, int] = field(default_factory=dict)  # number of missing texts of each language that has some
+    # the warnings of ``check``, except those that need simulations, and those on untranslated texts
     warnings: tuple[str, ...] = ()
 
 
 @lru_cache(maxsize=2)
 def facts(study: Study) -> Facts:
-    """Return the facts of a study."""
-    missing, translate = missing_texts(study), _translation_warnings(study)
+    """Return the numbers and warnings of a study, as far as its faults permit."""
+    missing, translation_warnings = missing_texts(study), _translation_warnings(study)
     valid = valid_part(study)
     if (protocol := valid.protocol) is None:
-        return Facts(missing=missing, warnings=translate)
-    known = Facts(
+        return Facts(missing=missing, warnings=translation_warnings)
+    study_facts = Facts(
         steps_s={step: expected_duration_s(protocol, step) for step in protocol.steps},
         missing=missing,
-        warnings=translate,
+        warnings=translation_warnings,
     )
     if valid.forces:
         forces_n = {name: steady_force(protocol.scene_of(name), HAND_MPS).force_n for name in protocol.liquids}
-        known = replace(known, forces_n=forces_n)
+        study_facts = replace(study_facts, forces_n=forces_n)
     if not valid.whole:
-        return known
-    session = max((variant.protocol for variant in variants(protocol)), key=expected_duration_s)  # as `check` counts
+        return study_facts
+    session = max((variant.protocol for variant in variants(protocol)), key=expected_duration_s)  # as in `check`
     orders = orders_of(session)
-    warned = warnings(protocol, simulates=False, without_force=device_without_force()) if valid.forces else ()
+    check_warnings = warnings(protocol, simulates=False, without_force=device_without_force()) if valid.forces else ()
     return replace(
-        known,
+        study_facts,
         expected_s=expected_duration_s(session),
         range_s=duration_range_s(session),
         trials=sum(block.trials for block in orders.blocks),
         answers=orders.answers,
         breaks=sum(block.breaks for block in orders.blocks),
-        warnings=(*warned, *translate),
+        warnings=(*check_warnings, *translation_warnings),
     )
 
 
 def planned_participants(study: Study) -> int | None:
-    """Return the number of participants that the file plans, even if other parts are faulty; None if it states none."""
+    """Return the planned number of participants, even if other parts are faulty; None if it is not stated."""
     planned = value_at(study.document, _PLANNED)
     faulty = any(fault.path == _PLANNED for fault in study.faults)
     return planned if isinstance(planned, int) and not faulty else None

@@ -1,4 +1,4 @@
-"""Which step of which session shows an element, what is played from there on, and liquids that are felt in the lab."""
+"""The session step that shows an element, the part of a study to play, and liquids to feel in the lab."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
@@ -37,7 +37,7 @@ class ScreenSize:
     """A screen for the preview: name, label, size [logical px], and the minimum scale of its text."""
 
     name: str
-    words: str
+    label: str
     width: int
     height: int
     text_scale: float = 1.0
@@ -52,19 +52,19 @@ SIZES: Final = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ParticipantView:
-    """The content of the tab."""
+    """The content of the tab Participant."""
 
     page: Page | None = None  # None if it cannot be shown
     language: str = "en"
-    languages: tuple[str, ...] = ()  # those of the study
-    step: str = ""  # as "Liquids, trial 1 of 6"
-    has_before: bool = False  # whether there is a step before it
+    languages: tuple[str, ...] = ()  # the languages of the study
+    step: str = ""  # such as "Liquids, trial 1 of 6"
+    has_before: bool = False  # whether there is a previous step
     has_after: bool = False
-    moments: tuple[tuple[Moment, str], ...] = ()  # the pages of the step, with their words
+    moments: tuple[tuple[Moment, str], ...] = ()  # the pages of the step, with their labels
     moment: Moment | None = None  # the shown page
     focused: str | None = None  # the id of the selected question
-    note: str = ""  # what cannot be shown and why, "" if nothing
-    photodiode: bool = True  # whether the tank has a corner for one
+    note: str = ""  # the parts that are not shown as written, and why; "" if there are none
+    photodiode: bool = True  # whether the tank has a corner for a photodiode
 
     @property
     def name(self) -> str:
@@ -85,23 +85,23 @@ def step_label(shown: Preview, step: Step, language: str) -> str:
 
 def moment_labels(moments: tuple[Moment, ...]) -> tuple[tuple[Moment, str], ...]:
     """Return the pages of a step with their labels; empty if there is only one."""
-    tanks = sum(moment.kind == "tank" for moment in moments)
-    named = {
+    tank_count = sum(moment.kind == "tank" for moment in moments)
+    labels = {
         "tank": "Tank",
-        "questions": "Questions" if tanks < 2 else "Question",
+        "questions": "Questions" if tank_count < 2 else "Question",
         "feedback": "Feedback",
         "text": "Text",
     }
     if len(moments) < 2:
         return ()
     return tuple(
-        (moment, f"Interval {moment.interval}" if moment.kind == "tank" and tanks > 1 else named[moment.kind])
+        (moment, f"Interval {moment.interval}" if moment.kind == "tank" and tank_count > 1 else labels[moment.kind])
         for moment in moments
     )
 
 
 _Graph: TypeAlias = Mapping[Path, frozenset[Path]]
-"""What each table names, by paths: ``("conditions", "syrup")`` → ``{("liquids", "syrup")}``."""
+"""The tables that each table refers to, by path: ``("conditions", "syrup")`` → ``{("liquids", "syrup")}``."""
 
 
 def first_step(shown: Preview, path: Path) -> int | None:
@@ -120,43 +120,45 @@ def _graph_of(document: Mapping[str, object]) -> _Graph:
 
 
 def _reachable_tables(graph: _Graph, first: Iterable[Path]) -> frozenset[Path]:
-    """Return tables and everything that they refer to, directly or not."""
+    """Return tables and all tables that they refer to, directly or indirectly."""
     tables = dict.fromkeys(first)
-    todo = list(tables)
-    for table in todo:  # grows while it is read
-        new = [named for named in graph.get(table, ()) if named not in tables]
-        tables |= dict.fromkeys(new)
-        todo += new
+    waiting = list(tables)
+    for table in waiting:  # grows while it is read
+        new_tables = [named for named in graph.get(table, ()) if named not in tables]
+        tables |= dict.fromkeys(new_tables)
+        waiting += new_tables
     return frozenset(tables)
 
 
 def _tables_of_step(shown: Preview, step: Step, graph: _Graph) -> frozenset[Path]:
-    """Return the tables that a step presents and those they refer to; for a trial only its own condition."""
+    """Return the tables that a step presents, and those that they refer to; of a trial only its own condition."""
     if isinstance(step, PageStep):
         return _reachable_tables(graph, [("pages", step.page_id)])
     if isinstance(step, FormStep):
         return _reachable_tables(graph, [("questionnaires", step.form)])
     block: Path = ("blocks", step.block)
     parts = [part for part in graph.get(block, ()) if part[0] not in {"conditions", "pages"}]
-    named = (shown.codes[step.block][step.code], shown.protocol.blocks[step.block].standard)
-    presented = [("conditions", name) for name in named if name in shown.protocol.conditions]  # not of a varied number
+    condition_ids = (shown.codes[step.block][step.code], shown.protocol.blocks[step.block].standard)
+    presented = [
+        ("conditions", name) for name in condition_ids if name in shown.protocol.conditions
+    ]  # a varied number has no condition
     return _reachable_tables(graph, [*parts, *presented]) | {block}
 
 
-_Side: TypeAlias = Literal["tank", "questions"]
+_TrialPage: TypeAlias = Literal["tank", "questions"]
 
 STANDALONE: Final = "standalone"
-_SIDES: Final[dict[str, _Side]] = {
+_TRIAL_PAGES: Final[dict[str, _TrialPage]] = {
     "liquids": "tank", "tasks": "tank", "stimuli": "tank", "methods": "tank",
     "questionnaires": "questions", "scales": "questions", "designs": "questions",
 }  # fmt: skip
-"""On which page of a trial the elements of a section are seen; others on either."""
+"""The page of a trial that shows the elements of a section; elements of other sections are on both."""
 
 
 class StepPosition(NamedTuple):
-    """The position of a preview: a page, form or block by its id, the block's trial (from 1), language and seed.
+    """The position of a preview: the ID of a page, form or block, the block's trial (from 1), language and seed.
 
-    Without a name it is the first step that shows the selected element.
+    Without an ID, it is the first step that shows the selected element.
     """
 
     name: str = ""
@@ -166,21 +168,21 @@ class StepPosition(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
-    """A step of a session; ``session`` names the session, "" for the first participant's first one."""
+class SessionStep:
+    """A step of a session; ``session`` is the name of the session, "" for the first participant's first one."""
 
     shown: Preview
     index: int
     session: str = ""
 
 
-def step_name(step: Step) -> str:
+def step_id(step: Step) -> str:
     """Return the id of a step's page, form or block."""
     return step.block if isinstance(step, Trial) else step.page_id if isinstance(step, PageStep) else step.form
 
 
 def _previews(study: Protocol) -> Iterator[tuple[str, Preview]]:
-    """Yield each kind of session with its name; the first participant's first session comes first, without a name."""
+    """Yield name and preview of each kind of session, first the first participant's first one with the name ""."""
     first = preview(study)
     yield "", first
     for variant in variants(study):
@@ -189,14 +191,14 @@ def _previews(study: Protocol) -> Iterator[tuple[str, Preview]]:
             yield variant.name, replace(first, protocol=variant.protocol, schedule=schedule)
 
 
-def first_showing(study: Protocol, path: Path) -> Found | None:
+def find_first_step(study: Protocol, path: Path) -> SessionStep | None:
     """Return the first step that shows an element, None if none does.
 
-    A page or questionnaire that is in no session is shown separately.
+    A page or questionnaire that is not in any session is the only step of a session of its own.
     """
     for session, shown in _previews(study):
         if (index := first_step(shown, path)) is not None:
-            return Found(shown, index, session)
+            return SessionStep(shown, index, session)
     if len(path) > 1 and path[0] in {"pages", "questionnaires"}:
         name = str(path[1])
         shown = preview(study)
@@ -206,37 +208,37 @@ def first_showing(study: Protocol, path: Path) -> Found | None:
         elif path[0] == "questionnaires" and name in study.questionnaires:
             step = FormStep(name, tuple(item.id for item in study.questionnaires[name].items))
         if step is not None:
-            return Found(replace(shown, schedule=replace(shown.schedule, steps=(step,))), 0, STANDALONE)
+            return SessionStep(replace(shown, schedule=replace(shown.schedule, steps=(step,))), 0, STANDALONE)
     return None
 
 
-def same_step(study: Protocol, name: str, trial: int, session: str) -> Found | None:
-    """Return the step with a name, for a block the trial with that index or its last; None if it is gone."""
-    for called, shown in _previews(study):
-        if called == session and (at := _step_of(shown, name, trial)) is not None:
-            return Found(shown, at, session)
+def find_step(study: Protocol, name: str, trial: int, session: str) -> SessionStep | None:
+    """Return the step with an ID in a session, as described in `_step_index`; None if there is none."""
+    for session_name, shown in _previews(study):
+        if session_name == session and (at := _step_index(shown, name, trial)) is not None:
+            return SessionStep(shown, at, session)
     return None
 
 
-def _step_of(shown: Preview, name: str, trial: int) -> int | None:
-    """Return the index of the step with a name, for a block the trial with that index or its last; None without one."""
-    named = [(at, step) for at, step in enumerate(shown.schedule.steps) if step_name(step) == name]
-    exact = (pair for pair in named if isinstance(pair[1], Trial) and pair[1].index == trial)
-    return next((at for at, _ in (*exact, *(named[::-1] if trial > 1 else named))), None)
+def _step_index(shown: Preview, name: str, trial: int) -> int | None:
+    """Return the index of the step with an ID; of a block, the given trial or else its last one; None without one."""
+    candidates = [(at, step) for at, step in enumerate(shown.schedule.steps) if step_id(step) == name]
+    exact = (pair for pair in candidates if isinstance(pair[1], Trial) and pair[1].index == trial)
+    return next((at for at, _ in (*exact, *(candidates[::-1] if trial > 1 else candidates))), None)
 
 
-def side_of(path: Path) -> _Side | None:
-    """Return the page of a trial that shows an element; None: either."""
-    return _SIDES.get(str(path[0])) if path else None
+def trial_page_of(path: Path) -> _TrialPage | None:
+    """Return the page of a trial that shows an element; None for both."""
+    return _TRIAL_PAGES.get(str(path[0])) if path else None
 
 
-_MOST_EARLIER: Final = 5
-"""So many kept versions are looked at for one without faults."""
+_MAX_EARLIER: Final = 5
+"""Greatest number of stored versions that are searched for one without faults."""
 
 
 def last_valid_study(opened: Document) -> Study | None:
     """Return the study in the file, or in its newest stored version without faults."""
-    earlier = (kept_content(version.hash) or b"" for version in reversed(kept_versions(opened.file)[-_MOST_EARLIER:]))
+    earlier = (kept_content(version.hash) or b"" for version in reversed(kept_versions(opened.file)[-_MAX_EARLIER:]))
     for text in (opened.saved.encode(), *(StudySource.split(content).file for content in earlier)):
         with suppress(Refused):
             study = read_study(text, opened.study.folder)
@@ -250,15 +252,15 @@ class Playable:
     """A part of a study to play."""
 
     source: bytes = field(repr=False)
-    folder: Folder  # where its footage is
+    folder: Folder  # the folder of its videos
     protocol: Protocol = field(repr=False)
     step: int  # index in the preview's schedule of the first step shown
-    words: str  # that step, as "Liquids, trial 3 of 6"
+    words: str  # the label of that step, such as "Liquids, trial 3 of 6"
     position: StepPosition  # language and seed
 
 
 class NotPlayableError(StudyError):
-    """Faults that prevent playing, each as ``check`` prints it."""
+    """The study cannot be played; ``problems`` are the faults that prevent it, as ``check`` prints them."""
 
     def __init__(self, problems: tuple[Problem, ...]) -> None:
         self.problems = problems
@@ -266,17 +268,17 @@ class NotPlayableError(StudyError):
 
 
 def part_to_play(study: Study, path: Path, position: StepPosition | None = None) -> Playable:
-    """Return the part to play from a position, or from the first step that shows an element.
+    """Return the part to play from the preview's position, or from the first step that shows an element.
 
-    ``position`` is that of the preview. Raises NotPlayableError if the study has faults other than missing texts in
+    Raises NotPlayableError if the study has faults other than missing texts in
     languages that are not shown.
     """
     position = position or StepPosition()
     if not study.is_toml:
         raise NotPlayableError(study.problems)
     language = position.language or languages_of(study.document)[0]
-    filled = tuple(_edits_to_fill_in(study, language))
-    completed = study.with_edits(*filled)[0] if filled else study
+    edits = tuple(_edits_to_fill_in(study, language))
+    completed = study.with_edits(*edits)[0] if edits else study
     if completed.protocol is None:
         known = {(problem.place, problem.message): problem for problem in study.problems}
         own = tuple(
@@ -288,7 +290,7 @@ def part_to_play(study: Study, path: Path, position: StepPosition | None = None)
     shown = preview(completed.protocol, position.seed)
     step = first_step(shown, path) or 0
     if position.name:
-        step = _step_of(shown, position.name, position.trial) or 0
+        step = _step_index(shown, position.name, position.trial) or 0
     return Playable(
         completed.source,
         completed.folder,
@@ -303,20 +305,20 @@ def _edits_to_fill_in(study: Study, language: str) -> Iterator[Edit]:
     """Yield the edits that fill in missing texts of languages that are not shown."""
     for fault in study.faults:
         text = value_at(study.document, fault.path)
-        lacking = fault.missing_language
-        if lacking and lacking != language and isinstance(text, Mapping) and text:
-            yield Set((*fault.path, lacking), text.get(language) or next(iter(text.values())))
+        missing_language = fault.missing_language
+        if missing_language and missing_language != language and isinstance(text, Mapping) and text:
+            yield Set((*fault.path, missing_language), text.get(language) or next(iter(text.values())))
         elif fault.kind == "one language" and isinstance(text, str):
             yield Set(fault.path, dict.fromkeys(languages_of(study.document), text))
 
 
-_OF_THE_STUDY: Final = frozenset({"scene", "velocity", "knee", "body"})
-"""Tables of the lab's parameters that a study has once for all of its liquids."""
+_STUDY_TABLES: Final = frozenset({"scene", "velocity", "knee", "body"})
+"""Parameter tables of the lab that apply to all liquids of a study."""
 
 
 @dataclass(frozen=True, slots=True)
 class LabLiquids:
-    """Settings A and B for the lab; ``study`` is the study that takes changes back, "" if it cannot be changed."""
+    """Settings A and B for the lab; ``study`` is the study to which changes return, "" if it cannot be changed."""
 
     a: Setting
     b: Setting
@@ -326,7 +328,7 @@ class LabLiquids:
 class Feeling(QObject):
     """Opens liquids of the open study in the lab.
 
-    ``asked`` carries a `LabLiquids`, ``returned`` is emitted when a liquid was taken back.
+    ``asked`` carries a `LabLiquids`, ``returned`` is emitted when a liquid was put back into the study.
     """
 
     asked = Signal(object)
@@ -347,20 +349,20 @@ class Feeling(QObject):
             return
         study = opened.study
         protocol, problems = study.protocol or valid_part(study).protocol, study.problems
-        named = protocol is not None and str(path[1]) in getattr(protocol, str(path[0]))
-        if protocol is None or not named:
+        is_valid = protocol is not None and str(path[1]) in getattr(protocol, str(path[0]))
+        if protocol is None or not is_valid:
             self.place.message.emit(
                 "The element cannot be opened in the lab yet", f"Correct this problem first: {problems[0]}."
             )
             return
-        names = _liquids(protocol, path)
+        names = _liquid_ids(protocol, path)
         if not names:
             self.place.message.emit("The element cannot be opened in the lab", "It does not contain a liquid.")
             return
-        titled = [
+        titles_and_scenes = [
             (title_of(study.document, ("liquids", name)), protocol.scene_of(name)) for name in (names[0], names[-1])
         ]
-        settings = [Setting(title, scene, scene) for title, scene in titled]
+        settings = [Setting(title, scene, scene) for title, scene in titles_and_scenes]
         self._sides = {"A": settings[0].scene.liquids[0], "B": settings[1].scene.liquids[0]}
         self._file = opened.file
         self.asked.emit(LabLiquids(settings[0], settings[1], "" if opened.read_only else opened.file.stem))
@@ -399,15 +401,15 @@ class Feeling(QObject):
         self._sides[side] = after.model_copy(update={"id": before.id})
         self.editing.select(path)
         self.returned.emit()
-        shared = [name for name in setting.changed_names() if name.partition(".")[0] in _OF_THE_STUDY]
-        if shared:
-            names = ", ".join(parameter(setting.scene, name).label.lower() for name in shared)
+        shared_settings = [name for name in setting.changed_names() if name.partition(".")[0] in _STUDY_TABLES]
+        if shared_settings:
+            names = ", ".join(parameter(setting.scene, name).label.lower() for name in shared_settings)
             self.place.message.emit(
                 f"{title} was put back into the study", f"These settings apply to all liquids in the study: {names}."
             )
 
 
-def _liquids(protocol: Protocol, path: Path) -> tuple[str, ...]:
+def _liquid_ids(protocol: Protocol, path: Path) -> tuple[str, ...]:
     """Return the ids of at most two liquids of an element."""
     section, name = str(path[0]), str(path[1])
     if section == "liquids":
@@ -435,13 +437,13 @@ def _liquid_edits(
         if isinstance(value, Mapping) and isinstance(old, Mapping) and has(value_at(document, path), key):
             yield from _liquid_edits(document, place, old, value)
         else:
-            yield Set(place, _as_written(value))
+            yield Set(place, _toml_types(value))
 
 
-def _as_written(value: Any) -> Any:
-    """Return a value as TOML writes it: lists, and whole numbers without a decimal point."""
+def _toml_types(value: Any) -> Any:
+    """Return a value in types that TOML has, with whole numbers as integers."""
     if isinstance(value, Mapping):
-        return {key: _as_written(entry) for key, entry in value.items()}
+        return {key: _toml_types(entry) for key, entry in value.items()}
     if isinstance(value, tuple):
-        return [_as_written(entry) for entry in value]
+        return [_toml_types(entry) for entry in value]
     return int(value) if isinstance(value, float) and value.is_integer() else value

@@ -1,4 +1,4 @@
-"""The participant's page of the study that is edited: its real widgets, with language, screen, steps and pages."""
+"""The tab Participant: a preview with the real widgets of the participant's pages, and its controls."""
 
 import atexit
 import math
@@ -42,17 +42,17 @@ from study_app.designer.measures.study_facts import restored_part
 from study_app.designer.participant.playable import (
     SIZES,
     STANDALONE,
-    Found,
     ParticipantView,
     ScreenSize,
+    SessionStep,
     StepPosition,
-    first_showing,
+    find_first_step,
+    find_step,
     last_valid_study,
     moment_labels,
-    same_step,
-    side_of,
+    step_id,
     step_label,
-    step_name,
+    trial_page_of,
 )
 from study_app.designer.parts import Segments, make_dense
 from study_app.designer.problems import problem_rows
@@ -95,15 +95,15 @@ from study_app.session.transitions.page_builder import (
 
 _FRAME_MS: Final = 33
 _RING: Final = 2
-_LEAVES: Final = "Esc leaves the page"
+_LEAVE_HINT: Final = "Esc leaves the page"
 
 
 class _LivePage(Coloured, QGraphicsView):
-    """Shows a page in an interactive `ParticipantWindow`, at 100 % or as large as it fits.
+    """Shows a page in an interactive `ParticipantWindow`, at 100 % or scaled to fit.
 
     The page has its own keyboard focus, independent of the designer's, so that it looks as in a session; it receives
-    keys while this view is focused. ``happened`` carries the page's session events, ``left`` is emitted at Esc,
-    ``frame_due`` while a tank is visible, ``shown`` when the view is.
+    keys while this view has the focus. Signals: ``happened`` (a session event of the page), ``left`` (Esc was
+    pressed), ``frame_due`` (for each frame of a visible tank), ``shown`` (the view became visible).
     """
 
     happened = Signal(object)
@@ -119,7 +119,7 @@ class _LivePage(Coloured, QGraphicsView):
         self.setFrameShape(QFrame.Shape.NoFrame)
         self.setRenderHints(QPainter.RenderHint.SmoothPixmapTransform | QPainter.RenderHint.TextAntialiasing)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        self.setAccessibleDescription(f"{_LEAVES}, as does Tab after the last control.")
+        self.setAccessibleDescription(f"{_LEAVE_HINT}, as does Tab after the last control.")
         self.setMinimumHeight(120)
         self.setTransformationAnchor(QGraphicsView.ViewportAnchor.NoAnchor)
         self.setAlignment(Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignTop)
@@ -128,8 +128,8 @@ class _LivePage(Coloured, QGraphicsView):
         self._view = ParticipantView()
         self._screen = SIZES[0]
         self._fits = True
-        self._since_s = 0.0
-        _OPEN.add(self)
+        self._start_s = 0.0
+        _OPEN_PAGES.add(self)
         self._frames = QTimer(self)
         self._frames.setInterval(_FRAME_MS)
         self._frames.timeout.connect(self.frame_due)
@@ -137,8 +137,8 @@ class _LivePage(Coloured, QGraphicsView):
     # display
 
     def show_view(self, view: ParticipantView) -> None:
-        """Show a page; if only its answers differ, it is kept with the typed text."""
-        before, self._view = self._view, view
+        """Show a page; if only the answers differ, the page is kept with its typed text."""
+        previous, self._view = self._view, view
         self.setAccessibleName(view.name)
         self.viewport().setAccessibleName(view.name)
         self._colour_ground()
@@ -146,37 +146,39 @@ class _LivePage(Coloured, QGraphicsView):
             self._frames.stop()
             self.close_page()
             return
-        another = (view.step, view.moment) != (before.step, before.moment)
-        if another:
-            self._since_s = time.perf_counter()
+        is_other_page = (view.step, view.moment) != (previous.step, previous.moment)
+        if is_other_page:
+            self._start_s = time.perf_counter()
         window = self.page_window
-        if window is None or view.language != before.language or view.photodiode != before.photodiode:
+        if window is None or view.language != previous.language or view.photodiode != previous.photodiode:
             window = self._open_page(view)
         elif (
-            isinstance(before.page, TaskPage)
+            isinstance(previous.page, TaskPage)
             and isinstance(view.page, TaskPage)
-            and before.page.trial == view.page.trial
+            and previous.page.trial == view.page.trial
         ):
-            window = window if before.page == view.page else self._open_page(view)
-        elif _without_answers(view.page) == _without_answers(before.page) and not another:
-            if view.focused != before.focused:
+            window = window if previous.page == view.page else self._open_page(view)
+        elif _without_answers(view.page) == _without_answers(previous.page) and not is_other_page:
+            if view.focused != previous.focused:
                 self._go_to(view.focused)
             return
-        kept = None if another else self._question_now()
+        focused_question = None if is_other_page else self._focused_question()
         if window.page != view.page:
             window.show_page(view.page)
         if window.tank is not None:
             window.tank.unsetCursor()
         self._go_to(
-            view.focused if view.focused is not None and view.focused != before.focused else kept or view.focused
+            view.focused
+            if view.focused is not None and view.focused != previous.focused
+            else focused_question or view.focused
         )
-        self._time_frames()
+        self._run_or_stop_frames()
 
     def apply_theme(self, theme: Theme) -> None:
         self._colour_ground()
 
     def _colour_ground(self) -> None:
-        """Set the background: dark around a page, as in a session, and that of a card without one."""
+        """Set the background: that of a session around a page, and that of a card if there is no page."""
         colour = self.theme.surface if self._view.page is None else PARTICIPANT.window
         self.setBackgroundBrush(QBrush(QColor(colour)))
 
@@ -185,7 +187,7 @@ class _LivePage(Coloured, QGraphicsView):
         if self._view.page is not None:
             self._open_page(self._view).show_page(self._view.page)
             self._go_to(self._view.focused)
-            self._time_frames()
+            self._run_or_stop_frames()
         self._scale()
 
     def show_fitted(self, *, fits: bool) -> None:
@@ -214,20 +216,20 @@ class _LivePage(Coloured, QGraphicsView):
 
     def _open_page(self, view: ParticipantView) -> ParticipantWindow:
         self.close_page()
-        made = ParticipantWindow(
+        window = ParticipantWindow(
             LANGUAGES[view.language],
-            clock=lambda: time.perf_counter() - self._since_s,
+            clock=lambda: time.perf_counter() - self._start_s,
             windowed=True,
             text_scale=self._screen.text_scale,
             photodiode=view.photodiode,
         )
-        made.event.connect(self.happened)
-        made.resize(self.page_size)
-        self.page_window = made
-        self._proxy = self._scene.addWidget(made)
+        window.event.connect(self.happened)
+        window.resize(self.page_size)
+        self.page_window = window
+        self._proxy = self._scene.addWidget(window)
         self._scene.setFocusItem(self._proxy)
         self._scale()
-        return made
+        return window
 
     def close_page(self) -> None:
         if self.page_window is not None and self._proxy is not None:
@@ -239,8 +241,8 @@ class _LivePage(Coloured, QGraphicsView):
             self._scene.removeItem(proxy)
             proxy.deleteLater()
 
-    def _question_now(self) -> str | None:
-        """Return the id of the focused question."""
+    def _focused_question(self) -> str | None:
+        """Return the ID of the focused question, or None."""
         page = None if self.page_window is None else self.page_window.widget
         if not isinstance(page, QuestionsPage):
             return None
@@ -262,10 +264,10 @@ class _LivePage(Coloured, QGraphicsView):
                     top = field.mapTo(page.window(), QPoint(0, 0)).y()
                     self.ensureVisible(QRectF(0, top, 1, field.height()))
 
-    def make_room(self, width: int) -> None:
-        """Use the page's height at this width if it is shown completely."""
-        high = math.ceil(width * self._screen.height / self._screen.width)
-        self.setMaximumHeight(high if self._fits else QWIDGETSIZE_MAX)
+    def fit_height(self, width: int) -> None:
+        """Limit the height to that of the page at this width, if the page is scaled to fit."""
+        height = math.ceil(width * self._screen.height / self._screen.width)
+        self.setMaximumHeight(height if self._fits else QWIDGETSIZE_MAX)
         self._scale()
 
     def _scale(self) -> None:
@@ -276,11 +278,11 @@ class _LivePage(Coloured, QGraphicsView):
         self.setVerticalScrollBarPolicy(policy)
         self.setTransform(QTransform.fromScale(scale, scale))
 
-    def _time_frames(self) -> None:
-        seen = self.isVisible() and isinstance(self._view.page, TaskPage)
-        if seen and not self._frames.isActive():
+    def _run_or_stop_frames(self) -> None:
+        is_tank_visible = self.isVisible() and isinstance(self._view.page, TaskPage)
+        if is_tank_visible and not self._frames.isActive():
             self._frames.start()
-        elif not seen:
+        elif not is_tank_visible:
             self._frames.stop()
 
     # Qt's events
@@ -297,7 +299,7 @@ class _LivePage(Coloured, QGraphicsView):
 
     def focusInEvent(self, event: QFocusEvent) -> None:
         QAbstractScrollArea.focusInEvent(self, event)
-        announce(self, _LEAVES)
+        announce(self, _LEAVE_HINT)
         self.viewport().update()
 
     def focusOutEvent(self, event: QFocusEvent) -> None:
@@ -313,22 +315,22 @@ class _LivePage(Coloured, QGraphicsView):
         super().paintEvent(event)
         painter = QPainter(self.viewport())
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        whole = QRectF(self.viewport().rect())
+        view_rect = QRectF(self.viewport().rect())
         if self._fits:
             corners, inside = QPainterPath(), QPainterPath()
-            corners.addRect(whole)
-            inside.addRoundedRect(whole, RADIUS_CONTROL, RADIUS_CONTROL)
+            corners.addRect(view_rect)
+            inside.addRoundedRect(view_rect, RADIUS_CONTROL, RADIUS_CONTROL)
             painter.fillPath(corners.subtracted(inside), QColor(self.theme.surface))
         if self.hasFocus():
             painter.setPen(QPen(QColor(self.theme.accent), _RING))
-            inset = whole.adjusted(1, 1, -1, -1)
+            inset = view_rect.adjusted(1, 1, -1, -1)
             painter.drawRoundedRect(inset, RADIUS_CONTROL, RADIUS_CONTROL)
             painter.setFont(font("small", weight=600))
-            label = QRectF(painter.fontMetrics().boundingRect(_LEAVES)).adjusted(-10, -4, 10, 4)
+            label = QRectF(painter.fontMetrics().boundingRect(_LEAVE_HINT)).adjusted(-10, -4, 10, 4)
             label.moveBottomLeft(inset.bottomLeft() + QPointF(6, -6))
             fill_rounded(painter, label, RADIUS_CONTROL, self.theme.accent)
             painter.setPen(QColor(self.theme.on_accent))
-            painter.drawText(label, Qt.AlignmentFlag.AlignCenter, _LEAVES)
+            painter.drawText(label, Qt.AlignmentFlag.AlignCenter, _LEAVE_HINT)
         painter.end()
 
     def resizeEvent(self, event: QResizeEvent) -> None:
@@ -340,23 +342,23 @@ class _LivePage(Coloured, QGraphicsView):
         if self._proxy is not None:
             self._proxy.show()
             self._scene.setFocusItem(self._proxy)
-        self._time_frames()
+        self._run_or_stop_frames()
         self.shown.emit()
 
     def hideEvent(self, event: QHideEvent) -> None:
         super().hideEvent(event)
         self._frames.stop()
-        if self._proxy is not None and isValid(self._proxy):  # the scene is freed before a view that is still shown
+        if self._proxy is not None and isValid(self._proxy):  # at exit, Qt frees the scene before a visible view
             self._proxy.hide()
 
 
-_OPEN: WeakSet[_LivePage] = WeakSet()
+_OPEN_PAGES: WeakSet[_LivePage] = WeakSet()
 
 
 @atexit.register
 def _close_pages() -> None:
-    """Close open pages when the program ends: Qt cannot free a visible window in a scene after Python."""
-    for page in tuple(_OPEN):
+    """Close open pages at exit, because Qt cannot free a visible window in a scene after Python has ended."""
+    for page in tuple(_OPEN_PAGES):
         if isValid(page):
             page.close_page()
 
@@ -366,14 +368,14 @@ def _without_answers(page: Page | None) -> Page | None:
 
 
 _NO_ANSWERS: Final[Mapping[str, Value]] = {}
-_MOST_IN_ROW: Final = 2
+_MAX_IN_ROW: Final = 2
 
 
 class ParticipantPreview(Card):
     """The tab Participant: the page that shows the selected element, with language, screen, steps and pages.
 
-    It is drawn with the seed of `session.preview`; no sealed key is read. Answers are kept while the study is open, so
-    that an edit does not clear the page, and are not stored.
+    Orders are drawn with the seed of `session.preview`; no sealed key is read. Answers are kept while the study is
+    open, so that an edit does not clear the page, but are not stored.
     """
 
     def __init__(self, editing: Editing, place: DesignerPlace) -> None:
@@ -381,7 +383,7 @@ class ParticipantPreview(Card):
         self.editing, self.place = editing, place
         self.view = ParticipantView()
         self._screens_shown: tuple[ScreenSize, ...] = ()
-        self._high = 0
+        self._minimum_px = 0
         self.page = _LivePage()
         self.setFocusProxy(self.page)
         self.note = label("", "small", "warn", wraps=True)
@@ -406,25 +408,25 @@ class ParticipantPreview(Card):
         add_parts(self.column, self.note, (self.page, 1), self._row, self._second, STRETCH)
 
         self._language = ""
-        self._found: Found | None = None
+        self._step: SessionStep | None = None
         self._moment: Moment | None = None
-        self._side = "questions"
+        self._trial_page = "questions"
         self._selected: Path = ()
         self._protocol: Protocol | None = None
         self._study: Study | None = None
         self._valid: Study | None = None
         self._answers: dict[tuple[str, int], dict[str, Value]] = {}
         self._ball: ProgrammedBall | None = None
-        self._ball_of: object = None
-        self._since_s = 0.0
+        self._ball_state: object = None
+        self._start_s = 0.0
         self._photodiode = False
-        self._after_form = delayed_call(
+        self._update_timer = delayed_call(
             self, 0, self._show_if_visible
-        )  # after another selection the form is painted first
+        )  # so that the form is painted first after another selection
         editing.opened_other.connect(self._forget_study)
-        editing.changed.connect(self._after_form.start)
+        editing.changed.connect(self._update_timer.start)
         editing.edited.connect(self._show_if_visible)
-        place.entered.connect(self._look_at_screen)
+        place.entered.connect(self._update_screens)
         application = QApplication.instance()
         assert isinstance(application, QApplication)  # noqa: S101 - a window has one
         application.focusChanged.connect(self._follow_focus)
@@ -438,22 +440,22 @@ class ParticipantPreview(Card):
         self.after.clicked.connect(lambda: self.go(1))
         self.moments.chosen.connect(self.show_moment)
         self.zoom.chosen.connect(self._show_fitted)
-        page = PanePage(name="participant", words="Participant", body=self, aside=self.aside,
-                        most_px=lambda: self.most_px, tip=command_tip("page"))  # fmt: skip
+        page = PanePage(name="participant", title="Participant", body=self, aside=self.aside,
+                        max_body_px=lambda: self.max_body_px, tip=command_tip("page"))  # fmt: skip
         place.pane.add_page(page, first=True)
         add_commands(place, {"page": self.enter_page, "language": self.show_next_language})
-        self._look_at_screen()
+        self._update_screens()
 
     @property
     def position(self) -> StepPosition | None:
-        """The previewed position; None if there is none, or the page is not in the first session."""
+        """The position of the preview; None without a page, or if the page is not in the first session."""
         self._find_step()
-        shown = self._found
-        if shown is None or shown.session:
+        current = self._step
+        if current is None or current.session:
             return None
-        step = shown.shown.schedule.steps[shown.index]
+        step = current.shown.schedule.steps[current.index]
         trial = step.index if isinstance(step, Trial) else 1
-        return StepPosition(step_name(step), trial, self._language, shown.shown.schedule.seed)
+        return StepPosition(step_id(step), trial, self._language, current.shown.schedule.seed)
 
     # requests
 
@@ -462,7 +464,7 @@ class ParticipantPreview(Card):
         self.page.setFocus(Qt.FocusReason.ShortcutFocusReason)
 
     def _leave_page(self) -> None:
-        """Focus the first control below the page; the first step has no previous one."""
+        """Focus the first enabled control below the page."""
         part = next(part for part in (self.before, self.after, self.zoom) if part.isEnabled())
         part.setFocus(Qt.FocusReason.OtherFocusReason)
 
@@ -471,11 +473,11 @@ class ParticipantPreview(Card):
         self.place.pane.show_tab("participant")
 
     def show_next_language(self) -> None:
-        """Show the pages in the next language; the keyboard focus stays, if its part is still visible."""
+        """Show the pages in the next language; the focus moves to the tabs if the form is hidden."""
         form = self.place.form
-        hides = form.isVisible()
+        was_visible = form.isVisible()
         self._show_tab()
-        if hides and not form.isVisible():
+        if was_visible and not form.isVisible():
             self.place.pane.tabs.setFocus(Qt.FocusReason.ShortcutFocusReason)
         languages = self.view.languages
         if len(languages) > 1:
@@ -485,29 +487,29 @@ class ParticipantPreview(Card):
         self._language = language
         self._show_step()
 
-    def _follow_focus(self, _left: QWidget | None, now: QWidget | None) -> None:
-        """Show the pages in the language of the text that is edited."""
-        language = now.property(LANGUAGE) if now is not None and self.place.form.isAncestorOf(now) else None
+    def _follow_focus(self, _left: QWidget | None, focused: QWidget | None) -> None:
+        """Show the pages in the language of the focused text."""
+        language = focused.property(LANGUAGE) if focused is not None and self.place.form.isAncestorOf(focused) else None
         if language in self.view.languages and language != self._language:
             self._language = language
-            self._after_form.start()
+            self._update_timer.start()
 
     def go(self, by: int) -> None:
-        if (shown := self._found) is None:
+        if (current := self._step) is None:
             return
-        index = shown.index + by
-        if 0 <= index < len(shown.shown.schedule.steps):
-            self._found = Found(shown.shown, index, shown.session)
+        index = current.index + by
+        if 0 <= index < len(current.shown.schedule.steps):
+            self._step = SessionStep(current.shown, index, current.session)
             self._moment = None
             self._show_step()
 
     def show_moment(self, moment: Moment) -> None:
         self._moment = moment
-        self._side = "tank" if moment.kind == "tank" else "questions"
+        self._trial_page = "tank" if moment.kind == "tank" else "questions"
         self._show_step()
 
     def _handle_page_event(self, event: object) -> None:
-        """Keep an answer for this page; go to the next page when the participant would."""
+        """Keep an answer of this page, or go to the next page, as a session would."""
         if isinstance(event, LanguageChosen):
             self.show_language(event.language)
         elif isinstance(event, Chosen):
@@ -520,26 +522,26 @@ class ParticipantPreview(Card):
             self._go_to_next()
 
     def _go_to_next(self) -> None:
-        if (shown := self._found) is None:
+        if (current := self._step) is None:
             return
-        pages = pages_of_step(shown.shown, shown.index)
+        pages = pages_of_step(current.shown, current.index)
         at = pages.index(self._moment) if self._moment in pages else 0
         if at + 1 < len(pages):
             self.show_moment(pages[at + 1])
-        elif shown.index + 1 < len(shown.shown.schedule.steps):
-            self._side = "tank"
+        elif current.index + 1 < len(current.shown.schedule.steps):
+            self._trial_page = "tank"
             self.go(1)
 
     # updates
 
     def _forget_study(self) -> None:
-        self._found = self._moment = self._protocol = self._study = self._valid = None
+        self._step = self._moment = self._protocol = self._study = self._valid = None
         self._selected, self._answers, self._language = (), {}, ""
-        self._side = "questions"
-        self._after_form.start()
+        self._trial_page = "questions"
+        self._update_timer.start()
 
-    def _look_at_screen(self) -> None:
-        """Offer this computer's participant screen, which may have been changed elsewhere."""
+    def _update_screens(self) -> None:
+        """Update the list of screens with this computer's participant screen, which may have changed."""
         settings, _ = settings_here()
         self._photodiode = settings.photodiode
         screen = choose_screens(screen_number(settings))[0]
@@ -549,92 +551,94 @@ class ParticipantPreview(Card):
         self.offer_screens((*SIZES, own))
 
     def _show_if_visible(self) -> None:
-        self._after_form.stop()
+        self._update_timer.stop()
         if self.editing.opened is not None and self.isVisible():
             self._show_step()
 
     def _find_step(self) -> None:
-        """Find the displayed step in the current study; another step if another element was selected."""
+        """Find the shown step in the current study, or the step of another element if the selection changed."""
         opened = self.editing.opened
         if opened is None:
             return
         study, selected = opened.study, opened.selected
         if study is not self._study:
-            self._study, before = study, self._protocol
+            self._study, previous_protocol = study, self._protocol
             if study.protocol is not None:
                 self._valid = study
-            elif self._valid is None and before is None:
+            elif self._valid is None and previous_protocol is None:
                 self._valid = last_valid_study(opened)
             valid = {} if self._valid is None else self._valid.document
             self._protocol = study.protocol or restored_part(study, valid).protocol
             if self._protocol is None and self._valid is not None:
                 self._protocol = self._valid.protocol
-            if self._protocol is not None and before is not None and self._found is not None:
-                self._found = self._same_step(self._found)
+            if self._protocol is not None and previous_protocol is not None and self._step is not None:
+                self._step = self._find_same_step(self._step)
         if self._protocol is None:
-            self._found = None
-        elif selected != self._selected or self._found is None:
-            step = first_showing(self._protocol, selected)
-            if step is None and self._found is None:
+            self._step = None
+        elif selected != self._selected or self._step is None:
+            step = find_first_step(self._protocol, selected)
+            if step is None and self._step is None:
                 shown = preview(self._protocol)
-                step = Found(shown, 0) if shown.schedule.steps else None
+                step = SessionStep(shown, 0) if shown.schedule.steps else None
             if step is not None:
-                self._found = step if not self._is_shown(step) else self._found
-            if (side := side_of(selected)) is not None and selected != self._selected:
-                self._side, self._moment = side, None
+                self._step = step if not self._keeps_trial(step) else self._step
+            if (side := trial_page_of(selected)) is not None and selected != self._selected:
+                self._trial_page, self._moment = side, None
             self._selected = selected
         if self._protocol is not None and self._language not in self._protocol.study.languages:
             self._language = self._protocol.study.languages[0]
 
-    def _is_shown(self, step: Found) -> bool:
-        """Return whether the displayed step belongs to the same block, so that its trial is kept."""
-        now = self._found
-        if now is None or now.session != step.session or step.session == STANDALONE:
+    def _keeps_trial(self, step: SessionStep) -> bool:
+        """Return whether the shown step is in the same block as ``step``, so that its trial is kept."""
+        current = self._step
+        if current is None or current.session != step.session or step.session == STANDALONE:
             return False
-        old, other = (here.shown.schedule.steps[here.index] for here in (now, step))
-        whole = self._selected[:1] in {("questionnaires",), ("blocks",), ("scales",)}
-        return step_name(old) == step_name(other) and (not isinstance(old, Trial) or whole)
+        current_step, new_step = (
+            session_step.shown.schedule.steps[session_step.index] for session_step in (current, step)
+        )
+        shows_block = self._selected[:1] in {("questionnaires",), ("blocks",), ("scales",)}
+        return step_id(current_step) == step_id(new_step) and (not isinstance(current_step, Trial) or shows_block)
 
-    def _same_step(self, previous: Found) -> Found | None:
-        assert self._protocol is not None  # noqa: S101 - the caller has looked
+    def _find_same_step(self, previous: SessionStep) -> SessionStep | None:
+        assert self._protocol is not None  # noqa: S101 - checked by the caller
         step = previous.shown.schedule.steps[previous.index]
         if previous.session == STANDALONE:
-            return first_showing(self._protocol, self._selected)
-        return same_step(
-            self._protocol, step_name(step), step.index if isinstance(step, Trial) else 1, previous.session
-        )
+            return find_first_step(self._protocol, self._selected)
+        return find_step(self._protocol, step_id(step), step.index if isinstance(step, Trial) else 1, previous.session)
 
     # display
 
     def _show_step(self) -> None:
         self._find_step()
-        study, place = self._study, self._found
+        study, current = self._study, self._step
         if study is None:
             return
-        if place is None:
+        if current is None:
             faults = study.faults if study.is_toml else ()
-            hiding = next((fault for fault in faults if fault.kind != "no text"), None)  # a missing text hides no page
-            found = study.problems[:1] if hiding is None else (hiding.located(Places.of(study.text)),)
-            problem = next(map(str, found), "the session does not have any steps")
+            hiding_fault = next(
+                (fault for fault in faults if fault.kind != "no text"), None
+            )  # a missing text does not hide a page
+            problems = study.problems[:1] if hiding_fault is None else (hiding_fault.located(Places.of(study.text)),)
+            problem = next(map(str, problems), "the session does not have any steps")
             note = f"The page cannot be shown: {problem}"
-            if hiding is not None and study.is_unfinished(hiding):
+            if hiding_fault is not None and study.is_unfinished(hiding_fault):
                 note = "The page will be shown when its entry is complete"
             self.show_view(ParticipantView(note=note))
             return
-        shown, index = place.shown, place.index
+        shown, index = current.shown, current.index
         pages = pages_of_step(shown, index)
         if self._moment not in pages:
-            of_side = [moment for moment in pages if (moment.kind == "tank") == (self._side == "tank")]
-            self._moment = (of_side or list(pages))[0]
+            matching_pages = [moment for moment in pages if (moment.kind == "tank") == (self._trial_page == "tank")]
+            self._moment = (matching_pages or list(pages))[0]
         page = previewed_page(
             shown, index, self._moment, self._language, self._answers.get(self._page_key, _NO_ANSWERS)
         )
         if isinstance(page, TaskPage):
-            self._place_ball(page, presented_condition(shown, index))
-        now = shown.schedule.steps[index]
-        step = step_label(shown, now, shown.protocol.study.languages[0])
-        if place.session and place.session != STANDALONE:
-            step = f"{step} ({place.session})"
+            self._restart_ball(page, presented_condition(shown, index))
+        session_step = shown.schedule.steps[index]
+        step = step_label(shown, session_step, shown.protocol.study.languages[0])
+        if current.session and current.session != STANDALONE:
+            step = f"{step} ({current.session})"
         self.show_view(
             ParticipantView(
                 page=page,
@@ -646,17 +650,17 @@ class ParticipantPreview(Card):
                 moments=moment_labels(pages),
                 moment=self._moment,
                 focused=self._selected_question(study),
-                note=self._page_note(study, place),
+                note=self._page_note(study, current),
                 photodiode=self._photodiode,
             )
         )
 
     @property
     def _page_key(self) -> tuple[str, int]:
-        """The key of the page's answers: a form, or a trial of a block."""
-        assert self._found is not None  # noqa: S101 - a page is shown
-        step = self._found.shown.schedule.steps[self._found.index]
-        return step_name(step), step.index if isinstance(step, Trial) else 0
+        """The key of the page's answers: the ID of a page, form or block, and the trial (0 without one)."""
+        assert self._step is not None  # noqa: S101 - a page is shown
+        step = self._step.shown.schedule.steps[self._step.index]
+        return step_id(step), step.index if isinstance(step, Trial) else 0
 
     def _selected_question(self, study: Study) -> str | None:
         if "items" not in self._selected:
@@ -665,47 +669,49 @@ class ParticipantPreview(Card):
         name = item.get("id") if isinstance(item, Mapping) else None
         return name if isinstance(name, str) else None
 
-    def _page_note(self, study: Study, step: Found) -> str:
-        """Return a note, in the page's language, on parts that are not shown as written."""
+    def _page_note(self, study: Study, step: SessionStep) -> str:
+        """Return a note on parts of the page that are not shown as written in the study."""
         first = step.shown.protocol.study.languages[0]
         faults = [fault for fault in study.shown_faults if fault.concerns(self._language, first)]
-        count = sum(row.fault.concerns(self._language, first) for row in problem_rows(study))  # as the header counts
+        count = sum(
+            row.fault.concerns(self._language, first) for row in problem_rows(study)
+        )  # as counted in the header
         if not count:
             return "This page is not part of any session." if step.session == STANDALONE else ""
         values = "only the valid parts" if self._valid is None else "the last valid values"
-        own = next((fault for fault in faults if fault.path[: len(self._selected)] == self._selected), None)
-        if own is None:
-            are = f"There {'is' if count == 1 else 'are'} {counted(count, 'problem')} elsewhere"
+        own_fault = next((fault for fault in faults if fault.path[: len(self._selected)] == self._selected), None)
+        if own_fault is None:
+            note = f"There {'is' if count == 1 else 'are'} {counted(count, 'problem')} elsewhere"
             first_name = unique_name(study.document, element_of(study, faults[0].path))
-            are += f" ({first_name})" if count == 1 else f" (the first: {first_name})"
-            return f"{are}, so {values} are shown."
+            note += f" ({first_name})" if count == 1 else f" (the first: {first_name})"
+            return f"{note}, so {values} are shown."
         shown = f"{values} are shown"
-        if own.kind == "alike":
+        if own_fault.kind == "alike":
             shown = "the text is shown as written"
-        elif own.missing_language or own.kind == "one language":
+        elif own_fault.missing_language or own_fault.kind == "one language":
             shown = "the text is shown in another language"
-        return f"{unique_name(study.document, self._selected)} has a problem ({own.message}), so {shown}."
+        return f"{unique_name(study.document, self._selected)} has a problem ({own_fault.message}), so {shown}."
 
-    def _place_ball(self, page: TaskPage, condition: str | None) -> None:
-        """Move the ball to the start of its path if the tank has changed."""
-        assert self._found is not None  # noqa: S101 - a page is shown
-        hides = condition is not None and self._found.shown.protocol.conditions[condition].ball == "hidden"
-        tank = (page.task, page.workspace_m, page.trial, self._moment, hides)
-        if tank != self._ball_of:
-            self._ball_of = tank
-            self._ball = ProgrammedBall(page.task, page.workspace_m, hidden_after_lead=hides)
-            self._since_s = time.perf_counter()
+    def _restart_ball(self, page: TaskPage, condition: str | None) -> None:
+        """Restart the ball on its path if the tank has changed."""
+        assert self._step is not None  # noqa: S101 - a page is shown
+        is_hidden = condition is not None and self._step.shown.protocol.conditions[condition].ball == "hidden"
+        tank = (page.task, page.workspace_m, page.trial, self._moment, is_hidden)
+        if tank != self._ball_state:
+            self._ball_state = tank
+            self._ball = ProgrammedBall(page.task, page.workspace_m, hidden_after_lead=is_hidden)
+            self._start_s = time.perf_counter()
 
     def _move_ball(self) -> None:
         if self._ball is not None:
-            self.page.show_tank(self._ball.view(time.perf_counter() - self._since_s))
+            self.page.show_tank(self._ball.view(time.perf_counter() - self._start_s))
 
     # the widgets
 
     def show_view(self, view: ParticipantView) -> None:
-        before, self.view = self.view, view
+        previous, self.view = self.view, view
         self.setAccessibleName(view.name)
-        if before.language and view.language != before.language:
+        if previous.language and view.language != previous.language:
             announce(self.languages, view.name)
         self.languages.tips = dict.fromkeys(view.languages, command_tip("language"))
         self.languages.setVisible(len(view.languages) > 1)
@@ -717,16 +723,18 @@ class ParticipantPreview(Card):
         self.after.setEnabled(view.has_after)
         self.moments.setVisible(bool(view.moments))
         self.moments.show_values(view.moments, view.moment)
-        if len(view.moments) > _MOST_IN_ROW:
+        if len(view.moments) > _MAX_IN_ROW:
             self._second.insertWidget(0, self.moments)
         else:
             self._row.insertWidget(self._row.indexOf(self.after) + 1, self.moments)
         self.page.show_view(view)
-        if view.languages != before.languages:
-            self.place.pane.make_room()  # the controls beside the tabs have another width
-        if (high := self.column.minimumSize().height()) != self._high:  # another note, or another row of pages
-            self._high = high
-            self.place.pane.make_room()
+        if view.languages != previous.languages:
+            self.place.pane.arrange_parts()  # the width of the controls beside the tabs has changed
+        if (
+            minimum_px := self.column.minimumSize().height()
+        ) != self._minimum_px:  # the note or the row of pages has changed
+            self._minimum_px = minimum_px
+            self.place.pane.arrange_parts()
 
     def offer_screens(self, sizes: tuple[ScreenSize, ...]) -> None:
         if sizes == self._screens_shown:
@@ -735,30 +743,30 @@ class ParticipantPreview(Card):
         self._screens_shown = sizes
         self.screens.clear()
         for size in sizes:
-            self.screens.addItem(size.words, size.name)
+            self.screens.addItem(size.label, size.name)
         self.screens.setCurrentIndex(max(self.screens.findData(chosen), 0))
         self._choose_screen(self.screens.currentIndex())
 
     def _choose_screen(self, at: int) -> None:
         self.page.show_screen(self._screens_shown[at])
-        self._make_room()
+        self._fit_page()
 
     def _show_fitted(self, fits: object) -> None:
         self.zoom.show_values(((True, "Fit"), (False, "100 %")), fits)
         self.page.show_fitted(fits=bool(fits))
-        self._make_room()
+        self._fit_page()
 
-    def _make_room(self) -> None:
+    def _fit_page(self) -> None:
         margins = self.column.contentsMargins()
-        self.page.make_room(self.width() - margins.left() - margins.right())
-        self.place.pane.make_room()
+        self.page.fit_height(self.width() - margins.left() - margins.right())
+        self.place.pane.arrange_parts()
 
     @property
-    def most_px(self) -> int:
-        """The largest height that it can use, for a page shown completely the height of the page [px]."""
+    def max_body_px(self) -> int:
+        """Maximum useful height; if the page is scaled to fit, that with the whole page [px]."""
         other = self.column.minimumSize().height() - self.page.minimumHeight()
         return min(QWIDGETSIZE_MAX, self.page.maximumHeight() + other)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
-        self._make_room()
+        self._fit_page()

@@ -1,4 +1,4 @@
-"""Templates: studies that work as they are, to begin one's own from."""
+"""Templates of studies: complete studies from which new ones are made."""
 
 from pathlib import Path
 from typing import Final
@@ -18,7 +18,7 @@ QUESTIONS: Final[dict[str, tuple[tuple[str, tuple[str, ...]], ...]]] = {
     "two-liquids-abx": (("Trials", ("blocks", "liquids", "repetitions")),),
     "rate-realism": (("Repetitions", ("blocks", "liquids", "repetitions")),),
 }
-"""What a template asks beyond title, name and languages: words, and the key that holds the answer."""
+"""The questions of a template besides title, name and languages: text, and path of the value."""
 
 
 def templates() -> tuple[str, ...]:

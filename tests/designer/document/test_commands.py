@@ -143,7 +143,7 @@ def asked(study: Study) -> Iterator[tuple[Path, Request, Any]]:
             continue
         offered.add(generic(path))
         for one in addable_elements(study, path):
-            place = (*generic(path)[:1], one.words.partition(" of ")[0])
+            place = (*generic(path)[:1], one.label.partition(" of ")[0])
             if isinstance(one.asks, AddElement | AddInstrument) and not added.issuperset(place):
                 added.update(place)
                 yield path, one.asks, place

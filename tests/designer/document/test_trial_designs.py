@@ -151,7 +151,7 @@ def test_another_liquid_and_another_delay_are_warned_of_and_a_drawn_order_is_not
 
 
 def test_shipped_liquids_are_found_and_added_with_all_their_numbers(study: Study) -> None:
-    entries = {entry.words: entry for entry in addable_elements(study, ())}
+    entries = {entry.label: entry for entry in addable_elements(study, ())}
     slime = entries["Slime liquid, 1020 kg/m³, Maxwell"]
     told_apart = {words for words in entries if words.startswith(("Water liquid", "Damper liquid"))}
     assert told_apart == {
@@ -188,7 +188,7 @@ def test_shipped_liquids_are_found_and_added_with_all_their_numbers(study: Study
     assert dict(listed.additions)["Slime liquid, 1020 kg/m³, Maxwell"] == slime.asks
     liquids = after(study, dict(listed.additions)["New liquid …"]).document["liquids"]
     assert len(liquids) == len(study.document["liquids"]) + 1
-    beside = [entry.words for entry in addable_elements(study, ("liquids", "slime"))]
+    beside = [entry.label for entry in addable_elements(study, ("liquids", "slime"))]
     assert beside[0] == "Liquid"
     assert {words for words in beside[1:21] if " liquid, " in words} == set(beside[1:21])
     assert "such as water or slime" in entries["Liquid"].help

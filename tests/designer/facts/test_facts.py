@@ -20,7 +20,7 @@ from study_app.designer.measures.measures_view import measures_view
 from study_app.designer.measures.simulation import Simulated
 from study_app.designer.measures.study_facts import facts, restored_part
 from study_app.designer.outline import outline_rows
-from study_app.designer.participant.playable import NotPlayableError, first_showing, part_to_play
+from study_app.designer.participant.playable import NotPlayableError, find_first_step, part_to_play
 from study_app.designer.problems import problem_rows
 from study_app.designer.templates import FOLDER, templates
 from study_app.protocol.source.document import Path, entries, value_at
@@ -103,7 +103,7 @@ def test_a_value_of_a_wrong_type_is_a_fault_that_every_view_shows(name: str, pat
         form_of(study, selected)
         measures_view(study, known, selected, Simulated())
         if protocol is not None:
-            first_showing(protocol, selected)
+            find_first_step(protocol, selected)
         with pytest.raises(NotPlayableError):
             part_to_play(study, selected)
 

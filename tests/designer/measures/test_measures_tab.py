@@ -32,7 +32,7 @@ def test_power_is_shown_in_parts_cancelled_by_an_edit_and_kept(qtbot: Any, desig
     worker.answer("10 of 200 studies of each size")
     qtbot.waitUntil(lambda: power.progress.text() == "10 of 200 studies of each size")
     assert "| 12 | 80% |" in power.table.text()
-    assert designer.place.header.problems.words == "1 warning"  # that of the precision is simulated
+    assert designer.place.header.problems.chip_text == "1 warning"  # that of the precision is simulated
     worker.answer()
     qtbot.waitUntil(lambda: not power.progress.isVisible())
 
@@ -135,7 +135,7 @@ def test_the_preregistration_of_the_saved_study_is_written_with_its_power(
     qtbot.waitUntil(lambda: not designer.place.measures.power.progress.isVisible())
     write.click()
     assert file.read_text(encoding="utf-8") == before, "another text is replaced only after a question"
-    designer.place.prompt.go_on.click()
+    designer.place.prompt.confirm.click()
     assert "| 12 | 80% |" in file.read_text(encoding="utf-8")
     (file.parent / "data" / "sub-P001" / "ses-01").mkdir(parents=True)
     file.write_bytes(b"\xff another program's text")
@@ -143,7 +143,7 @@ def test_the_preregistration_of_the_saved_study_is_written_with_its_power(
     said = " ".join(one.text() for one in designer.place.prompt.findChildren(QLabel))
     assert f"{file} differs from the text generated" in said
     assert "already has 1 session; the text cannot preregister data that already exist" in said
-    designer.place.prompt.go_on.click()
+    designer.place.prompt.confirm.click()
     written = designer.messages.pop()[1]
     assert "The study already has 1 session" in written
     assert "before the first session" not in written

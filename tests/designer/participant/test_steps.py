@@ -9,11 +9,11 @@ from study_app.designer.participant.playable import (
     STANDALONE,
     NotPlayableError,
     StepPosition,
-    first_showing,
+    find_first_step,
+    find_step,
     first_step,
     part_to_play,
-    same_step,
-    step_name,
+    step_id,
 )
 from study_app.protocol.load import load
 from study_app.protocol.orders.schedule import PageStep, Trial
@@ -25,41 +25,42 @@ from tests.protocol.groups.grouped import grouped
 def test_an_element_of_another_group_is_shown_in_a_session_of_that_group() -> None:
     study = grouped()
     found = {
-        name: first_showing(study, ("questionnaires" if name == "end" else "blocks", name)) for name in ("thin", "end")
+        name: find_first_step(study, ("questionnaires" if name == "end" else "blocks", name))
+        for name in ("thin", "end")
     }
     assert all(one is not None for one in found.values())
     thin, end = found["thin"], found["end"]
     assert thin is not None
     assert thin.session == ""
     assert end is not None
-    assert step_name(end.shown.schedule.steps[end.index]) == "end"
+    assert step_id(end.shown.schedule.steps[end.index]) == "end"
     groups = {end.session, thin.session}
     assert groups <= {"", "group first_thin"}
-    again = same_step(study, "end", 1, end.session)
+    again = find_step(study, "end", 1, end.session)
     assert again is not None
     assert again.index == end.index
 
 
 def test_a_step_that_is_gone_is_not_found_and_a_shorter_block_keeps_its_last_trial() -> None:
     study = grouped()
-    assert same_step(study, "gone", 1, "") is None
-    last = same_step(study, "thick", 99, "")
+    assert find_step(study, "gone", 1, "") is None
+    last = find_step(study, "thick", 99, "")
     assert last is not None
     assert last.shown.schedule.steps[last.index].index == 4  # type: ignore[union-attr]
 
 
 @pytest.mark.parametrize("path", [("study",), ("device", "force_limit_n"), ("sequence", 0), ("sequences", "thin")])
 def test_an_element_that_no_step_is_about_is_shown_nowhere(path: tuple[str | int, ...]) -> None:
-    assert first_showing(grouped(), path) is None
+    assert find_first_step(grouped(), path) is None
 
 
 def test_a_page_that_is_in_no_session_is_shown_on_its_own() -> None:
     study = grouped()
     page = study.pages["hello"].model_copy()
-    found = first_showing(study.model_copy(update={"pages": {**study.pages, "unused": page}}), ("pages", "unused"))
+    found = find_first_step(study.model_copy(update={"pages": {**study.pages, "unused": page}}), ("pages", "unused"))
     assert found is not None
     assert found.session == STANDALONE
-    assert step_name(found.shown.schedule.steps[found.index]) == "unused"
+    assert step_id(found.shown.schedule.steps[found.index]) == "unused"
 
 
 @pytest.mark.parametrize("name", ["rek2024", "thickness", "delayjnd"])

@@ -325,4 +325,4 @@ def test_the_end_of_a_pilot_is_told(
     assert designer.messages == [said] * (said is not None)
     notice = designer.place.header.strip.notice
     words = f"Played from Thin: {outcome}. The recorded data will be deleted unless you save them."
-    assert (notice and notice.words, data.exists()) == ((words, True) if outcome else (None, False))
+    assert (notice and notice.text, data.exists()) == ((words, True) if outcome else (None, False))
