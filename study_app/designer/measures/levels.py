@@ -49,12 +49,12 @@ class LevelFormat:
         return f"{self.number(level, digits)} {self.unit}".rstrip()
 
 
-_BLOCK_KEYS: Final = {"stimuli": "stimulus", "methods": "method", "designs": "design", "questionnaires": "questionnaire",
-                    "tasks": "task"}  # fmt: skip
+_BLOCK_KEYS: Final = {"stimuli": "stimulus", "methods": "method", "designs": "design",
+                      "questionnaires": "questionnaire", "tasks": "task"}  # fmt: skip
 
 
 def block_of(protocol: Protocol | None, path: Path) -> Block | None:
-    """Return the selected block, or the first one, preferably main, that uses the selected element; None without one."""
+    """Return the selected block, or the first one, preferably main, that uses the selected element."""
     if protocol is None or len(path) < 2:
         return None
     if (key := _BLOCK_KEYS.get(str(path[0]))) is None:

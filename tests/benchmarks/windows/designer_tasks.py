@@ -120,13 +120,13 @@ class Tasks:
         """A file with five faults made valid."""
         user = self.user
         user.choose("Study", "A first look  ·  faulty.toml")
-        wait_until(lambda: self.header().problems.words == f"{len(FAULTS)} problems", "the problems")
+        wait_until(lambda: self.header().problems.chip_text == f"{len(FAULTS)} problems", "the problems")
         user.shortcut("ctrl+4", name_of(self.header().problems))
         (card,) = user.window.findChildren(ProblemsCard)
         if not card.isVisible():
             user.press(name_of(self.header().problems))
         for _ in range(12):
-            if self.header().problems.words.startswith("No") or "warning" in self.header().problems.words:
+            if self.header().problems.chip_text.startswith("No") or "warning" in self.header().problems.chip_text:
                 break
             offered = lambda: [  # noqa: E731 - looked for anew
                 one
@@ -135,7 +135,9 @@ class Tasks:
             ]
             wait_until(offered, "a repair", 60_000)
             user.press(name_of(offered()[0]))
-        assert "problem" not in self.header().problems.words.removeprefix("No problem"), self.header().problems.words
+        assert "problem" not in self.header().problems.chip_text.removeprefix("No problem"), (
+            self.header().problems.chip_text
+        )
 
     def played(self) -> None:
         """A study of thickness by two intervals from a template, played from its tenth trial."""
