@@ -64,7 +64,7 @@ from study_app.gui.widgets import (
     vbox,
 )
 from study_app.number_text import counted, duration
-from study_app.protocol.checks import OWN
+from study_app.protocol.checks import SEQUENCE_KEYS
 from study_app.protocol.questionnaires import Instrument
 from study_app.protocol.questions import STATEMENT
 from study_app.protocol.source import Path, names, value_at
@@ -213,7 +213,7 @@ def _outline_row(study: Study, element: Element, times_s: Mapping[str, float], *
 
 
 _TABLE_SECTIONS: Final = frozenset(_ICONS) - {
-    *OWN, "study", "device", "scene", "limits", "analysis", "simulated_participants"
+    *SEQUENCE_KEYS, "study", "device", "scene", "limits", "analysis", "simulated_participants"
 }  # fmt: skip
 
 

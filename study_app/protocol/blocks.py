@@ -1,4 +1,4 @@
-"""Blocks: trials that share a task and a questionnaire, and the order in which their conditions come."""
+"""Blocks: trials that share a task and a questionnaire, and the order of their conditions."""
 
 from collections import Counter
 from collections.abc import Mapping
@@ -21,8 +21,8 @@ Kind: TypeAlias = Annotated[str, StringConstraints(pattern=r"^[a-z0-9][a-z0-9_]*
 _NOT_WITH_DESIGN: Final = ("max_repeats", "min_distance", "questionnaire")
 """Keys of a block without a design: a design draws its own order and asks its own question."""
 
-_WAYS: Final = ("a stimulus", "a design", "conditions but no design")
-"""What a block presents, in words, for each entry of `Block.NOT_WITH`."""
+_CONTENTS: Final = ("a stimulus", "a design", "conditions but no design")
+"""The content of a block as text, for each entry of `Block.NOT_WITH`."""
 _ROUNDING: Final = 1e-9
 
 
@@ -37,7 +37,7 @@ class Criterion(Table):
     )
 
     @model_validator(mode="after")
-    def _can_be_met(self) -> Self:
+    def _check_counts(self) -> Self:
         if self.right > self.of:
             raise invalid(f"{self.right} of {self.of} answers cannot be correct: choose at most {self.of}", "right")
         return self
@@ -57,11 +57,11 @@ class Catch(Table):
     )
 
     def count(self, trials: int) -> int:
-        """Return the number of catch trials among so many others."""
+        """Return the number of catch trials that are added to this number of other trials."""
         return int(trials * self.share + _ROUNDING)
 
     def stretch(self, number: int) -> range:
-        """Return the slots among which catch trial ``number`` (from 0) is drawn; none is a track's first slot."""
+        """Return the range of slots from which that of catch trial ``number`` (from 0) is drawn, without slot 0."""
         begin, end = (number + int(at / self.share + _ROUNDING) for at in (number, number + 1))
         return range(max(begin, 1), end + 1)
 
@@ -168,25 +168,27 @@ class Block(Table):
     questionnaire: Id | None = Field(default=None, description="The questionnaire after each trial; default: none.")
 
     @model_validator(mode="after")
-    def _presents_in_one_way(self) -> Self:
-        ways = zip(_WAYS, self.NOT_WITH, strict=True)
-        what, refused = next((what, keys) for what, (given, keys) in ways if all(getattr(self, key) for key in given))
-        for name in refused:
+    def _check_presentation_keys(self) -> Self:
+        contents = zip(_CONTENTS, self.NOT_WITH, strict=True)
+        content, surplus_keys = next(
+            (content, keys) for content, (given, keys) in contents if all(getattr(self, key) for key in given)
+        )
+        for name in surplus_keys:
             if name in self.model_fields_set and getattr(self, name) is not None:  # receipts contain every key
-                instead = {
+                hint = {
                     "repetitions": "set it in the method's table",
                     "questionnaire": "ask its questions in a form after the block",
                 }.get(name, "")
-                raise invalid(f"cannot be used in a block with {what}", name, instead, kind="surplus")
-        if what == "a design" and len(self.conditions) < 2:
+                raise invalid(f"cannot be used in a block with {content}", name, hint, kind="surplus")
+        if content == "a design" and len(self.conditions) < 2:
             message = "the block has one condition, but its design compares at least two"
             raise invalid(message, "conditions", "add another condition")
-        if what == "a design" and self.standard not in self.conditions:
+        if content == "a design" and self.standard not in self.conditions:
             raise invalid("must be one of the block's conditions", "standard", use=("standard", self.conditions[0]))
         return self
 
     @model_validator(mode="after")
-    def _codes_where_blinded(self) -> Self:
+    def _check_codes_and_part(self) -> Self:
         if self.phase == "main":
             if self.code_prefix is None:
                 raise invalid("a main block needs a code_prefix (one capital letter)", "code_prefix")
@@ -205,19 +207,19 @@ class Block(Table):
         return self
 
     @model_validator(mode="after")
-    def _constraint_is_possible(self) -> Self:
-        given = [name for name in ("max_repeats", "min_distance") if getattr(self, name) is not None]
+    def _check_constraint(self) -> Self:
+        stated_keys = [name for name in ("max_repeats", "min_distance") if getattr(self, name) is not None]
         if self.order != "constrained":
-            if given:
+            if stated_keys:
                 raise invalid(
                     f'requires order = "constrained", but order is "{self.order}"',
-                    given[0],
+                    stated_keys[0],
                     'write order = "constrained"',
                     ("order", "constrained"),
                     "surplus",
                 )
             return self
-        if not given:
+        if not stated_keys:
             raise invalid('"constrained" needs max_repeats, min_distance or both', "order")
         if self.repetitions == 1:
             raise invalid('is 1, so conditions cannot repeat: write order = "shuffled"', "repetitions")
@@ -228,16 +230,17 @@ class Block(Table):
         return self
 
     @model_validator(mode="after")
-    def _breaks_have_a_page(self) -> Self:
+    def _check_breaks(self) -> Self:
         keys = {"break_every": self.break_every, "break_page": self.break_page}
         missing = [name for name, value in keys.items() if value is None]
         if len(missing) == 1:
             raise invalid("is missing: break_every and break_page must be used together", missing[0])
         trials = len(self.conditions) * self.repetitions
         if self.break_every is not None and self.design is None and trials <= self.break_every:
-            counted = "1 trial" if trials == 1 else f"{trials} trials"
+            trials_text = "1 trial" if trials == 1 else f"{trials} trials"
             raise invalid(
-                f"is {self.break_every}, but the block has only {counted}, so there would be no break", "break_every"
+                f"is {self.break_every}, but the block has only {trials_text}, so there would be no break",
+                "break_every",
             )
         return self
 
@@ -253,4 +256,4 @@ def block_titles(protocol: Mapping[str, Any]) -> dict[str, str]:
     language = display_language(protocol)
     titles = {name: (block["phase"], text_in(block["title"], language)) for name, block in protocol["blocks"].items()}
     counts = Counter(titles.values())
-    return {name: f"{own[1]} ({name})" if counts[own] > 1 else own[1] for name, own in titles.items()}
+    return {name: f"{title[1]} ({name})" if counts[title] > 1 else title[1] for name, title in titles.items()}

@@ -1,4 +1,4 @@
-"""A file becomes a validated protocol, or one ProtocolError that lists every problem with its line and a hint."""
+"""Load a protocol file: return the validated protocol, or raise one ProtocolError that lists every problem."""
 
 import re
 import tomllib
@@ -53,7 +53,7 @@ __all__ = [
 _M = TypeVar("_M", bound=BaseModel)
 
 _RENAME: Final = "rename the file, because its name must also be valid on Windows"
-_SHOWN = 200  # characters of a bad value that a message repeats
+_SHOWN = 200  # greatest number of characters of a value that a message repeats
 _LONG = re.compile(rf'(?<=")[^"]{{{_SHOWN + 1},}}(?=")|\S{{{_SHOWN + 1},}}')
 
 
@@ -73,7 +73,7 @@ class SceneFile(Table):
 
 
 def load(name_or_path: str | File, *, delay_ticks: int = ASSUMED_TICKS) -> Protocol:
-    """Return the protocol of a file or known name (`files.protocol_file`); ProtocolError lists all problems of a file.
+    """Return the protocol of a file or known name (`files.protocol_file`); raise ProtocolError with all its problems.
 
     Levels are checked for a device whose forces act ``delay_ticks`` ticks late.
 
@@ -89,7 +89,7 @@ def load(name_or_path: str | File, *, delay_ticks: int = ASSUMED_TICKS) -> Proto
 
 
 def parse(source: bytes, name: str, *, delay_ticks: int = ASSUMED_TICKS) -> Protocol:
-    """Return the protocol in ``source``; messages use ``name``, otherwise like `load`."""
+    """Return the protocol in ``source``, like `load`; error messages contain ``name``."""
     document, places = read_document(source, name)
     protocol, faults = validate_document(document, delay_ticks=delay_ticks)
     if protocol is None or faults:
@@ -112,11 +112,11 @@ def validate_document(
     document, unfilled = with_instruments(with_omitted_keys(document))
     faults += missing + unfilled
     broken = [fault.path[:2] for fault in faults]
-    protocol, wrong = _validate(Protocol, document)
-    faults += _faults_outside(broken, wrong)
+    protocol, model_faults = _validate(Protocol, document)
+    faults += _faults_outside(broken, model_faults)
     questionnaires = [path for path in broken if path[0] == "questionnaires"]
-    sound = None if faults else protocol
-    faults += _faults_outside(questionnaires, check(document, [fault.path for fault in faults], sound))
+    valid = None if faults else protocol
+    faults += _faults_outside(questionnaires, check(document, [fault.path for fault in faults], valid))
     if protocol is None or faults:
         return None, faults
     if faults := list(dict.fromkeys(check_designs(protocol))):
@@ -125,7 +125,7 @@ def validate_document(
 
 
 def _faults_outside(broken: Iterable[Path], faults: Iterable[Fault]) -> list[Fault]:
-    """Return the faults outside the places that are already broken."""
+    """Return the faults outside the paths that already have one."""
     known = list(broken)
     return [fault for fault in faults if not any(fault.path[: len(path)] == path for path in known)]
 
@@ -133,7 +133,7 @@ def _faults_outside(broken: Iterable[Path], faults: Iterable[Fault]) -> list[Fau
 def load_scene(name_or_path: str | File, liquid_id: str) -> Scene:
     """Return the scene of one liquid of a protocol, or of a file with only ``[scene]`` and ``[liquids.*]``.
 
-    ProtocolError lists every problem of the file, or says that the liquid is not in it.
+    Raises ProtocolError with every problem of the file, or if the liquid is not in it.
     """
     scenes = load_scenes(name_or_path)
     if liquid_id not in scenes:
@@ -167,26 +167,26 @@ def _completed_scene(document: dict[str, Any], name: str, places: Places) -> dic
 def is_scene_file(name_or_path: str | File) -> bool:
     """Return whether a file contains liquids and no other part of a study.
 
-    ProtocolError is raised if it does not exist or is not TOML.
+    Raises ProtocolError if it does not exist or is not TOML.
     """
     document, _ = read_document(source_bytes(name_or_path), str(name_or_path))
     return "liquids" in document and not _holds_study(document)
 
 
 def _with_liquids_of_files(document: dict[str, Any]) -> tuple[dict[str, Any], list[Fault]]:
-    """Return a study's document with the liquids of its liquid files, and the faults of these."""
+    """Return a study's document with the liquids of its liquid files, and the faults in these files."""
     liquids = document.get("liquids")
     if not isinstance(liquids, Mapping):
         return document, []
-    named = {name for name, table in liquids.items() if isinstance(table, Mapping) and "file" in table}
-    if not named:
+    from_files = {name for name, table in liquids.items() if isinstance(table, Mapping) and "file" in table}
+    if not from_files:
         return document, []
     texts = document.get(TABLE, {})
     resolved: dict[str, Any] = dict(liquids)
     faults: list[Fault] = []
-    for name in named:
-        table, alone = liquids[name], Fault((), "belongs in the liquid file", kind="surplus")
-        faults += [alone._replace(path=("liquids", name, key)) for key in table if key != "file"]
+    for name in from_files:
+        table, surplus_fault = liquids[name], Fault((), "belongs in the liquid file", kind="surplus")
+        faults += [surplus_fault._replace(path=("liquids", name, key)) for key in table if key != "file"]
         try:
             resolved[name] = _liquid_of_file(table["file"], texts)
         except _LiquidFileFault as fault:
@@ -198,17 +198,19 @@ def _with_liquids_of_files(document: dict[str, Any]) -> tuple[dict[str, Any], li
 
 def _with_footage(document: dict[str, Any]) -> tuple[dict[str, Any], list[Fault]]:
     """Return a study's document with the SHA-256 of each condition's footage, and faults for missing files."""
-    stated = [
+    stated_hashes = [
         Fault(path, "unknown key", "the program computes it")
         for path, _ in entries(document, "conditions.*.footage_sha256")
     ]
-    shown = [(path, view) for path, view in entries(document, "conditions.*.view") if is_footage(view) and "." in view]
-    if stated or not shown:
-        return document, stated
+    footage_views = [
+        (path, view) for path, view in entries(document, "conditions.*.view") if is_footage(view) and "." in view
+    ]
+    if stated_hashes or not footage_views:
+        return document, stated_hashes
     hashes = document.get(FOOTAGE_TABLE, {})
     conditions = dict(document["conditions"])
     faults: list[Fault] = []
-    for path, view in shown:
+    for path, view in footage_views:
         if fault := file_path_fault(view):
             faults.append(Fault(path, fault, _RENAME))
         elif view in hashes:
@@ -261,7 +263,7 @@ def read_document(source: bytes, name: str) -> tuple[dict[str, Any], Places]:
         raise ProtocolError(name, (Problem("file", "is not UTF-8 text", line, hint="save it as UTF-8"),)) from error
     try:
         document: dict[str, Any] = frozen(tomllib.loads(text))
-    except tomllib.TOMLDecodeError as error:  # which states the place in its message
+    except tomllib.TOMLDecodeError as error:  # its message contains the position
         sentence = re.sub(r" \(at .*\)$", "", str(error))
         place = re.search(r"\(at line (\d+), column (\d+)\)", str(error))
         line, column = (int(place[1]), int(place[2])) if place else (text.count("\n") + 1, 1)
@@ -272,15 +274,15 @@ def read_document(source: bytes, name: str) -> tuple[dict[str, Any], Places]:
     except RecursionError as error:
         broken = Problem("file", "is nested too deeply", hint="use fewer brackets within brackets")
         raise ProtocolError(name, (broken,)) from error
-    except ValueError as error:  # Python's own limit of digits names no place either
+    except ValueError as error:  # Python's limit of digits; the message does not contain the position
         raise ProtocolError(name, (Problem("file", "contains a whole number with more than 64 bits"),)) from error
     return document, Places(text)
 
 
 def _validate(model: type[_M], document: Mapping[str, Any]) -> tuple[_M | None, list[Fault]]:
-    """Return the validated document, None if it is invalid, and the faults found by its models."""
-    named = [path for section in ("liquids", "blocks") for path, _ in entries(document, f"{section}.*.id")]
-    faults = [Fault(path, "unknown key", "the name of the table is its ID") for path in named]
+    """Return the validated document, None if it is invalid, and the faults that its models found."""
+    stated_ids = [path for section in ("liquids", "blocks") for path, _ in entries(document, f"{section}.*.id")]
+    faults = [Fault(path, "unknown key", "the name of the table is its ID") for path in stated_ids]
     try:
         validated = model.model_validate(document, strict=True)
     except ValidationError as error:
@@ -294,11 +296,14 @@ def _validate(model: type[_M], document: Mapping[str, Any]) -> tuple[_M | None, 
 def located_problems(faults: Iterable[Fault], places: Places) -> tuple[Problem, ...]:
     """Return faults as problems with their lines, in the order of the lines."""
 
-    def shortened(text: str) -> str:
+    def shorten(text: str) -> str:
         return _LONG.sub(lambda match: f"{match[0][:_SHOWN]}…", text)
 
-    problems = (fault.located(places) for fault in faults)
-    short = [Problem(shortened(it.place), shortened(it.message), it.line, hint=shortened(it.hint)) for it in problems]
+    located = (fault.located(places) for fault in faults)
+    short = [
+        Problem(shorten(problem.place), shorten(problem.message), problem.line, hint=shorten(problem.hint))
+        for problem in located
+    ]
     return tuple(sorted(short, key=lambda problem: problem.line or 0))
 
 

@@ -1,7 +1,7 @@
-"""A study as a frozen, validated value; field names are the keys of the TOML file.
+"""A study as an immutable, validated value; field names are the keys of the TOML file.
 
-Each class is one table of the file (blocks, tasks and questionnaires have modules of their own). What a single table
-can decide by itself is checked by its class; what needs two tables is in ``checks``.
+Each class is one table of the file (blocks, tasks and questionnaires have modules of their own). A class checks its
+table alone; checks that need several tables are in ``checks``.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -156,7 +156,7 @@ class StudyHead(Table):
     credits: Credits | None = later(default=None, description="Authors, licence and citation for exports.")
 
     @model_validator(mode="after")
-    def _name_can_be_a_file(self) -> Self:
+    def _check_file_name(self) -> Self:
         if fault := file_name_fault(self.name):
             raise invalid(f'"{self.name}" {fault}: choose a name that is also valid on Windows', "name")
         return self
@@ -184,7 +184,7 @@ class DeviceNeeds(Table):
         return (x / 1000, y / 1000, z / 1000)
 
     @model_validator(mode="after")
-    def _workspace_has_room(self) -> Self:
+    def _check_workspace(self) -> Self:
         if not all(10 <= size <= 1000 for size in self.workspace_mm):
             raise invalid("every dimension must be between 10 and 1000 mm", "workspace_mm")
         return self
@@ -206,7 +206,7 @@ class SceneDefaults(Table):
 
 
 def compared(conditions: Sequence[Condition]) -> Compared:
-    """Return the quantity in which conditions differ; with one liquid, views or else delays if these differ."""
+    """Return the quantity in which conditions differ: liquids, else views, else delays; liquids if none differ."""
     liquids, delays, views = (
         {getattr(condition, name) for condition in conditions} for name in ("liquid_ids", "delay_ms", "seen")
     )
@@ -236,7 +236,7 @@ class PageText(Table):
     )
 
     @model_validator(mode="after")
-    def _only_breaks_last(self) -> Self:
+    def _check_duration(self) -> Self:
         if self.min_s is not None and self.kind != "break":
             raise invalid(f"is only for pages of kind break, not {self.kind}", "min_s", kind="surplus")
         return self
@@ -371,22 +371,22 @@ class Published(Table):
     def value_words(self, unit: str) -> str:
         """Return the value with its measure, such as "PSE 3 ms"; ``unit`` is that of the varied parameter."""
         names = {"weber": "Weber fraction", "pse": "PSE"}
-        of_value = unit if self.measure in ("threshold", "pse") else ""
-        return f"{names.get(self.measure, self.measure)} {self.value:g} {of_value}".rstrip()
+        value_unit = unit if self.measure in ("threshold", "pse") else ""
+        return f"{names.get(self.measure, self.measure)} {self.value:g} {value_unit}".rstrip()
 
     def described(self, unit: str) -> str:
         """Return the value with its block, standard and source; ``unit`` is that of the varied parameter."""
-        about = (
+        details = (
             "" if self.standard is None else f", standard {self.standard:g} {unit}".rstrip(),
             "" if self.percent is None else f", at {self.percent:g} % correct",
             "" if self.n is None else f", n = {self.n}",
             f", {self.source}" if self.source else "",
         )
-        return f"{self.block}: {self.value_words(unit)}{''.join(about)}"
+        return f"{self.block}: {self.value_words(unit)}{''.join(details)}"
 
 
 OF_LEVELS: Final = ("threshold", "exponent", "d_prime", "pse")
-"""What contrasts compare of blocks of levels."""
+"""The measures of blocks with levels that contrasts can compare."""
 
 
 class Contrast(Table):
@@ -431,7 +431,7 @@ class Contrast(Table):
     )
 
     @model_validator(mode="after")
-    def _compares_two(self) -> Self:
+    def _check_sides(self) -> Self:
         if len(self.blocks) == 2 and self.conditions is not None:
             raise invalid("specify two blocks, or two conditions of one block", "conditions")
         if self.form is not None and (self.conditions is not None or self.measure in OF_LEVELS):
@@ -472,25 +472,29 @@ class Contrast(Table):
         )
 
     def effect_words(self, within: tuple[str, str] | None = None, measure: str = "", block: str = "") -> str:
-        """Return what the two sides are compared in: the measure, or in an interaction the difference in it.
+        """Return the compared quantity as text: the measure, or in an interaction the difference in the measure.
 
-        ``within`` names the two blocks or conditions, ``measure`` the measure in words and ``block`` a single block; by
-        default their ids.
+        ``within`` are the names of the two blocks or conditions, ``measure`` is the name of the measure and ``block``
+        that of a single block; by default, IDs are used.
         """
         measure = measure or self.measure_words
         if self.groups is None or self.within is None:
             return measure
-        where = "" if len(self.blocks) == 2 else f" in {quoted_title(block) or f'block {self.blocks[0]}'}"
+        block_text = "" if len(self.blocks) == 2 else f" in {quoted_title(block) or f'block {self.blocks[0]}'}"
         first, second = map(quoted_title, within or self.within)
-        return f"the difference in {measure} between {first} and {second}{where}"
+        return f"the difference in {measure} between {first} and {second}{block_text}"
 
     def words(self, conditions: Mapping[str, str | None]) -> tuple[str, str]:
         """Return the labels of the two sides; blocks get the conditions of their stimuli if these differ."""
         first, second = self.compared
         if self.groups is not None:
             return first, second
-        of = [conditions.get(block) for block in self.blocks]
-        return (f"{first} ({of[0]})", f"{second} ({of[1]})") if len(set(of)) > 1 and None not in of else (first, second)
+        stimulus_conditions = [conditions.get(block) for block in self.blocks]
+        return (
+            (f"{first} ({stimulus_conditions[0]})", f"{second} ({stimulus_conditions[1]})")
+            if len(set(stimulus_conditions)) > 1 and None not in stimulus_conditions
+            else (first, second)
+        )
 
     def described(
         self,
@@ -499,15 +503,15 @@ class Contrast(Table):
         measure: str = "",
         block: str = "",
     ) -> str:
-        """Return a sentence with the hypothesis; ``names`` are those of the two sides, others as in `effect_words`."""
+        """Return the hypothesis as a sentence; ``names`` are those of the two sides, for others see `effect_words`."""
         first, second = map(quoted_title, names or self.compared)
-        at = quoted_title(block) or f"block {self.blocks[0]}"
-        where = "" if len(self.blocks) == 2 or self.is_interaction else f" in {at}"
-        moves = "differs between" if self.expected is None else f"is {self.expected} in"
+        block_name = quoted_title(block) or f"block {self.blocks[0]}"
+        where = "" if len(self.blocks) == 2 or self.is_interaction else f" in {block_name}"
+        verb = "differs between" if self.expected is None else f"is {self.expected} in"
         joint = "and" if self.expected is None else "than in"
-        near = "" if self.bound is None else f", with an equivalence bound of {self.bound:g}"
+        bound = "" if self.bound is None else f", with an equivalence bound of {self.bound:g}"
         kind = " (interaction)" if self.is_interaction else ""
-        return f"{self.effect_words(within, measure, block)} {moves} {first} {joint} {second}{kind}{where}{near}"
+        return f"{self.effect_words(within, measure, block)} {verb} {first} {joint} {second}{kind}{where}{bound}"
 
 
 def quoted_title(name: str) -> str:
@@ -523,7 +527,7 @@ RULES: Final[Mapping[_Rule, str]] = {
     "constant_answers": "more than {limit:g} % of the answers to statements are identical",
     "fast_answers": "the median response time is below {limit:g} s",
 }
-"""When each planned rule proposes a session for exclusion."""
+"""The condition under which each rule proposes a session for exclusion."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -540,7 +544,7 @@ RULE_LIMITS: Final[Mapping[str, RuleLimit]] = {
     "constant_answers": RuleLimit(least=1, most=100, usual=95, unit="%"),
     "fast_answers": RuleLimit(least=0.05, most=600, usual=0.3, unit="s"),
 }
-"""The limits of the exclusion rules that have one."""
+"""The ranges of the limits of exclusion rules."""
 
 
 class ExclusionRule(Table):
@@ -558,7 +562,7 @@ class ExclusionRule(Table):
     )
 
     @model_validator(mode="after")
-    def _limit_belongs_to_rule(self) -> Self:
+    def _check_limit(self) -> Self:
         known = RULE_LIMITS.get(self.rule)
         if known is None and self.limit is not None:
             raise invalid(f"is not used by the rule {self.rule}", "limit", kind="surplus")
@@ -629,7 +633,7 @@ class Analysis(Table):
     exclusions: tuple[ExclusionRule, ...] = later(default=(), description="Rules for proposing sessions for exclusion.")
 
     @model_validator(mode="after")
-    def _looks_end_at_the_last_participant(self) -> Self:
+    def _check_looks(self) -> Self:
         if self.looks and (len(self.looks) < 2 or self.looks[-1] != self.participants):
             raise invalid("specify two or more numbers; the last must equal analysis.participants", "looks")
         if any(after <= look for look, after in pairwise(self.looks)):

@@ -43,7 +43,7 @@ class Score(Table):
     )
 
     @model_validator(mode="after")
-    def _names_its_items(self) -> Self:
+    def _check_item_names(self) -> Self:
         for key in ("reverse", "weights"):
             for name in getattr(self, key):
                 if name not in self.items:

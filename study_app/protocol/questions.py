@@ -45,7 +45,7 @@ class Scale(Table):
 
     @field_validator("labels", mode="before")
     @classmethod
-    def _has_every_label(cls, labels: Any) -> Any:
+    def _check_label_counts(cls, labels: Any) -> Any:
         """Reject a language with fewer labels than another one."""
         listed = labels.items() if isinstance(labels, Mapping) else ()
         tuples = {code: texts for code, texts in listed if isinstance(texts, tuple)}
@@ -92,7 +92,7 @@ class ShowIf(Table):
         return (self.at_least is None or answer >= self.at_least) and (self.at_most is None or answer <= self.at_most)
 
     @model_validator(mode="after")
-    def _values_or_bounds(self) -> Self:
+    def _check_rule(self) -> Self:
         bounded = self.at_least is not None or self.at_most is not None
         if (self.values is not None) == bounded:
             raise invalid('needs the key "is", or one or both of "at_least" and "at_most"', "is")
@@ -376,7 +376,7 @@ class Choice(Question):
     several: bool = Field(default=False, description="Whether participants can choose several options.")
 
     @model_validator(mode="after")
-    def _options_differ(self) -> Self:
+    def _check_options(self) -> Self:
         ids = [option.id for option in self.options]
         for number, name in enumerate(ids):
             if name in ids[:number]:
@@ -453,7 +453,7 @@ class Number(Question):
     unit: Localised | None = Field(default=None, description="Unit shown after the field.")
 
     @model_validator(mode="after")
-    def _range_has_numbers(self) -> Self:
+    def _check_range(self) -> Self:
         if self.least is not None and self.most is not None:
             least = math.ceil(self.least) if self.whole else self.least
             if self.most < least:
@@ -524,7 +524,7 @@ class Slider(Question):
     step: float = Field(default=1, gt=0, description="Difference between neighbouring numbers.")
 
     @model_validator(mode="after")
-    def _whole_steps(self) -> Self:
+    def _check_steps(self) -> Self:
         if self.most <= self.least:
             raise invalid(f"{self.most:g} must be greater than from = {self.least:g}", "to")
         steps = (self.most - self.least) / self.step

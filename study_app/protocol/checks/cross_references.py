@@ -1,12 +1,13 @@
-"""Names that must fit together: references to tables, sequences, groups, items and their scales, languages.
+"""Checks of names: references to tables, sequences, groups, items and their scales, languages.
 
-These checks read the document itself, so that they also see the sound keys of tables that are broken elsewhere.
+These checks read the document itself, so that they include the valid keys of tables with other invalid keys.
 """
 
 from __future__ import annotations
 
 import unicodedata
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from itertools import permutations
 from typing import Any, TypeVar
 
 from pydantic import ValidationError
@@ -43,7 +44,7 @@ CHOICES = {
     "blocks.*.method": ("methods",),
     "analysis.published.*.block": ("blocks",),
 }
-"""Every place that names a table, with the sections whose tables it may name; a design or method may be a kind, too."""
+"""Patterns of the references to tables, with the sections of these; a design or method may also be a kind."""
 
 ITEM_REFERENCES = (
     "conditions.*.label",
@@ -57,7 +58,7 @@ ITEM_REFERENCES = (
     "questionnaires.*.scores.*.reverse.*",
     "questionnaires.*.scores.*.weights_from.*",
 )
-"""Every place that names an item; within a questionnaire one of its own items."""
+"""Patterns of the references to items; within a questionnaire, they refer to its own items."""
 
 TEXTS = (
     "study.title",
@@ -99,7 +100,7 @@ def _repeated_names(listed: Sequence[tuple[Path, Any]]) -> Iterator[Fault]:
 
 
 def check_references(document: Document) -> Iterator[Fault]:
-    """Check that every reference to a table names an existing one."""
+    """Check that every reference to a table has an existing target."""
     for pattern, section in _REFERENCES.items():
         known, kind = names(document, section), "stimulus" if section == "stimuli" else section.removesuffix("s")
         for path, name in entries(document, pattern):
@@ -112,38 +113,38 @@ def check_sequences(document: Document) -> Iterator[Fault]:
     Blocks and forms occur once in a sequence. `check_groups` checks that no block is omitted in a study with groups.
     """
     pages, blocks, forms = (names(document, section) for section in ("pages", "blocks", "questionnaires"))
-    apart = "rename one of them: every entry of sequence needs its own name"
+    rename_hint = "rename one of them: every entry of sequence needs its own name"
     for name in pages:
         if name in blocks:
-            yield Fault(("blocks", name), "a page has the same name", apart)
+            yield Fault(("blocks", name), "a page has the same name", rename_hint)
     if not document.keys() & {"sequence", "sequences", "groups"}:
         hint = "list the pages and blocks of a session in order"
         yield Fault(("sequence",), "is missing", hint, kind="missing")
     breaks = [page for _, page in entries(document, "blocks.*.break_page")]
     used: set[str] = set()
-    for place, steps in sequences_in(document):
+    for sequence_path, steps in sequences_in(document):
         seen: set[str] = set()
-        since: set[str] = set()  # the block before, or the start
+        since_block: set[str] = set()  # the steps since the last block, or since the start
         for index, name in enumerate(steps):
-            path = (*place, index)
+            path = (*sequence_path, index)
             yield from _unknown_name(path, name, "page or block", {*pages, *blocks, *forms})
             if name in blocks and name in seen:
                 message = f'block "{name}" occurs twice'
                 yield Fault(path, message, "use repetitions in the block", kind="surplus")
             elif name in forms and (name in pages or name in blocks) and name not in used:
                 other = "page" if name in pages else "block"
-                yield Fault(("questionnaires", name), f"a {other} has the same name", apart)
-            elif name in forms and name in since:
+                yield Fault(("questionnaires", name), f"a {other} has the same name", rename_hint)
+            elif name in forms and name in since_block:
                 message = f'form "{name}" occurs twice after the same block'
                 yield Fault(path, message, "put a block between them", kind="surplus")
             seen.add(str(name))
-            since = {*(since if name not in blocks else ()), str(name)}
+            since_block = {*(since_block if name not in blocks else ()), str(name)}
         used |= seen
     unused = [("pages", name) for name in pages if name not in breaks]
     unused += [("blocks", name) for name in blocks if "groups" not in document]
-    for place in unused if used else ():
-        if place[1] not in used:
-            yield Fault(place, "is not listed in sequence", "add it there, or remove it", kind="not in sequence")
+    for path in unused if used else ():
+        if path[1] not in used:
+            yield Fault(path, "is not listed in sequence", "add it there, or remove it", kind="not in sequence")
 
 
 def check_repeats(document: Document) -> Iterator[Fault]:
@@ -176,13 +177,18 @@ def check_statements_differ(document: Document) -> Iterator[Fault]:
             yield from _repeated_texts(list(entries(document, f"questionnaires.{name}.items.*.{key}")), "item", readers)
     for path, labels in entries(document, "scales.*.labels.*"):
         points = [((*path, *at), label) for at, label in entries(labels, "*")]
-        for _, off in entries(document, f"scales.{path[1]}.cannot_judge"):
-            points.append(((*path[:2], "cannot_judge"), off.get(path[-1]) if isinstance(off, Mapping) else off))
+        for _, off_scale_label in entries(document, f"scales.{path[1]}.cannot_judge"):
+            points.append(
+                (
+                    (*path[:2], "cannot_judge"),
+                    off_scale_label.get(path[-1]) if isinstance(off_scale_label, Mapping) else off_scale_label,
+                )
+            )
         yield from _repeated_texts(points, "label")
 
 
 def _repeated_texts(located_texts: list[tuple[Path, Any]], kind: str, readers: str = "participants") -> Iterator[Fault]:
-    """Yield a fault for every text that looks like an earlier one in all its languages, or in each that repeats one.
+    """Yield a fault for every text that looks like an earlier one in all languages, else for each such language.
 
     Readers do not distinguish texts by case, width or white space, nor Latin letters from Cyrillic or Greek ones that
     look the same.
@@ -190,19 +196,19 @@ def _repeated_texts(located_texts: list[tuple[Path, Any]], kind: str, readers: s
     seen: set[tuple[str, str]] = set()
     for path, entry in located_texts:
         texts = entry if isinstance(entry, Mapping) else {"": entry}
-        read = {(language, visible_text(text)) for language, text in texts.items() if isinstance(text, str)}
+        visible_texts = {(language, visible_text(text)) for language, text in texts.items() if isinstance(text, str)}
         message, hint = f"reads the same as an earlier {kind}", f"{readers} could not tell them apart: change one"
-        repeated = sorted(language for language, _ in read & seen)
-        if repeated and len(repeated) == len(read):
+        repeated = sorted(language for language, _ in visible_texts & seen)
+        if repeated and len(repeated) == len(visible_texts):
             yield Fault(path, message, hint, kind="alike")
         else:
             for language in repeated:
                 yield Fault((*path, language), f"{message} in {language_name(language)}", hint, kind="alike")
-        seen |= read
+        seen |= visible_texts
 
 
 _LOOKALIKES = str.maketrans("аеіјорсухѕһοαρνικ", "aeijopcyxshoapvik")
-"""Small letters of the Cyrillic and the Greek alphabet, and the Latin ones that look the same."""
+"""Small Cyrillic and Greek letters, mapped to the Latin letters that look the same."""
 
 
 def visible_text(text: str) -> str:
@@ -213,8 +219,8 @@ def visible_text(text: str) -> str:
 
 def check_languages(document: Document) -> Iterator[Fault]:
     """Check that every text exists in exactly the study's languages."""
-    written = [(path, name) for path, name in entries(document, "study.languages.*") if isinstance(name, str)]
-    for path, name in written:
+    stated = [(path, name) for path, name in entries(document, "study.languages.*") if isinstance(name, str)]
+    for path, name in stated:
         if name not in LANGUAGES or name in REFUSED:
             known = REFUSED.get(
                 name,
@@ -222,29 +228,29 @@ def check_languages(document: Document) -> Iterator[Fault]:
                 "new language",
             )
             yield Fault(path, f'the program does not support "{name}"', known, permitted=tuple(LANGUAGES))
-    wanted = tuple(name for _, name in written)
-    texts = (texts_of_pattern for pattern in TEXTS for texts_of_pattern in entries(document, pattern)) if wanted else ()
+    codes = tuple(name for _, name in stated)
+    texts = (texts_of_pattern for pattern in TEXTS for texts_of_pattern in entries(document, pattern)) if codes else ()
     for path, text in texts:
-        if isinstance(text, str) and len(wanted) > 1:
-            listed = ", ".join(f'{language} = "…"' for language in wanted)
+        if isinstance(text, str) and len(codes) > 1:
+            listed = ", ".join(f'{language} = "…"' for language in codes)
             message = "is written in one language, but the study has several languages"
             yield Fault(path, message, f"write {{ {listed} }}", kind="one language")
         elif isinstance(text, Mapping):
-            for language in wanted:
+            for language in codes:
                 if language not in text:
                     yield missing_text(path, language)
             for language in text:
-                if language not in wanted:
-                    hint = f"languages of the study: {', '.join(wanted)}"
+                if language not in codes:
+                    hint = f"languages of the study: {', '.join(codes)}"
                     yield Fault((*path, language), "is not a language of the study", hint, kind="other language")
 
 
-OWN = ("sequence", "sequences")
+SEQUENCE_KEYS = ("sequence", "sequences")
 
 
 def check_groups(document: Mapping[str, Any]) -> Iterator[Fault]:
-    """Check that there are several groups, and that every block and every sequence is used."""
-    if all(key in document for key in OWN):
+    """Check that there are at least two groups, and that every block and every sequence is used."""
+    if all(key in document for key in SEQUENCE_KEYS):
         yield Fault(("sequences",), "specify either sequence or sequences, not both")
     tables = [table for _, table in entries(document, "groups.*") if isinstance(table, Mapping)]
     if not tables:
@@ -253,14 +259,10 @@ def check_groups(document: Mapping[str, Any]) -> Iterator[Fault]:
         return
     if len(names(document, "groups")) == 1:
         yield Fault(("groups",), "the study has only one group", "add another group", kind="surplus")
-    own = [any(key in table for key in OWN) for table in tables]
-    for key in OWN:
-        if key in document and all(own):
-            yield Fault(
-                (key,),
-                f"is not used, because every group has its own {key} or {next(other for other in OWN if other != key)}",
-                kind="surplus",
-            )
+    have_own = [any(key in table for key in SEQUENCE_KEYS) for table in tables]
+    for key, other in permutations(SEQUENCE_KEYS):
+        if key in document and all(have_own):
+            yield Fault((key,), f"is not used, because every group has its own {key} or {other}", kind="surplus")
     used = {step for _, steps in sequences_in(document) for step in steps if isinstance(step, str)}
     for block in names(document, "blocks"):
         if used and block not in used:
@@ -270,7 +272,7 @@ def check_groups(document: Mapping[str, Any]) -> Iterator[Fault]:
 
 
 def check_decisions(document: Document) -> Iterator[Fault]:
-    """Check that decisions name existing statements once each, and existing liquids."""
+    """Check that decisions refer to existing statements, each at most once."""
     questions = [item for _, item in entries(document, "questionnaires.*.items.*") if isinstance(item, Mapping)]
     named_questions = [item for item in questions if isinstance(item.get("id"), str)]
     statements = {item["id"] for item in named_questions if "kind" not in item}
@@ -305,9 +307,9 @@ def check_questions(document: Document) -> Iterator[Fault]:
     for path, table in entries(document, "questionnaires.*"):
         if not isinstance(table, Mapping):
             continue
-        read = (((*path, *at), _valid_or_none(question_of, item)) for at, item in entries(table, "items.*"))
-        sound = [(place, item) for place, item in read if item is not None]
-        items = [item for _, item in sound]
+        parsed_items = (((*path, *at), _valid_or_none(question_of, item)) for at, item in entries(table, "items.*"))
+        valid_items = [(place, item) for place, item in parsed_items if item is not None]
+        items = [item for _, item in valid_items]
         if any(isinstance(item, Statement) for item in items):
             if "scale" not in table:
                 message = "the scale is needed for statements (items without a kind)"
@@ -316,7 +318,7 @@ def check_questions(document: Document) -> Iterator[Fault]:
                 message = f"has {scale.points} points, but statements need {POINTS}"
                 hint = f'write kind = "rating" and scale = "{table["scale"]}" in the items'
                 yield Fault((*path, "scale"), message, hint)
-        yield from _check_show_if(table, sound, Context(scales, table.get("scale"), language))
+        yield from _check_show_if(table, valid_items, Context(scales, table.get("scale"), language))
         numbers = [item.id for item in items if item.value_type != "text"]
         choices = [item.id for item in items if item.value_type == "text"]
         for key, answered, known in (("items", "a number", numbers), ("weights_from", "a choice", choices)):
@@ -327,7 +329,7 @@ def check_questions(document: Document) -> Iterator[Fault]:
 
 
 def _valid_or_none(read: Callable[[Any], _T], table: Any) -> _T | None:
-    """Return a valid scale or question, None if it is invalid."""
+    """Return the scale or question that ``read`` makes of a table; None if that is invalid."""
     try:
         return read(table) if isinstance(table, Mapping) else None
     except (KeyError, ValidationError):
@@ -339,29 +341,29 @@ def _check_show_if(table: Document, items: Sequence[tuple[Path, Question]], cont
     ids = [item.id for _, item in items]
     for path, item in items:
         if (rule := item.show_if) is not None:
-            place = (*path, "show_if")
+            rule_path = (*path, "show_if")
             if rule.item not in ids:
                 missing = f'there is no item "{rule.item}" in this questionnaire'
-                yield Fault(place, missing, did_you_mean(rule.item, earlier), kind="unknown name")
+                yield Fault(rule_path, missing, did_you_mean(rule.item, earlier), kind="unknown name")
             elif rule.item not in earlier:
-                yield Fault(place, f'"{rule.item}" comes later', "choose an earlier item")
+                yield Fault(rule_path, f'"{rule.item}" comes later', "choose an earlier item")
             elif table.get("item_order", "fixed") != "fixed":
                 hint = 'write item_order = "fixed": an item must follow the item that it depends on'
-                yield Fault(place, "item_order is shuffled", hint)
+                yield Fault(rule_path, "item_order is shuffled", hint)
             else:
-                yield from _check_permitted_answers(place, rule, earlier[rule.item], context)
+                yield from _check_permitted_answers(rule_path, rule, earlier[rule.item], context)
         earlier[item.id] = item
 
 
-def _check_permitted_answers(place: Path, rule: ShowIf, earlier: Question, context: Context) -> Iterator[Fault]:
+def _check_permitted_answers(path: Path, rule: ShowIf, earlier: Question, context: Context) -> Iterator[Fault]:
     try:
         levels = list(earlier.levels(context))
-    except KeyError:  # its scale, or a text in the language, is missing: another check says so
+    except KeyError:  # its scale, or a text in the language, is missing, which another check reports
         levels = []
     for value in rule.permitted:
         if levels and str(value) not in levels:
-            yield Fault(place, f'"{value}" is not one of its answers', f"choose one of these: {', '.join(levels)}")
+            yield Fault(path, f'"{value}" is not one of its answers', f"choose one of these: {', '.join(levels)}")
         elif earlier.value_type != "text" and isinstance(value, str):
-            yield Fault(place, f'"{value}" is not one of its answers', "specify a number")
+            yield Fault(path, f'"{value}" is not one of its answers', "specify a number")
     if not rule.permitted and earlier.value_type == "text":
-        yield Fault(place, f'the answer to "{rule.item}" is not a number', 'write is = "…"')
+        yield Fault(path, f'the answer to "{rule.item}" is not a number', 'write is = "…"')

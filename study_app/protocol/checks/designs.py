@@ -1,6 +1,6 @@
-"""What is wrong with blocks that have a design: names, methods that no answer can steer, levels beyond what is felt.
+"""Checks of blocks with a design: names, methods that answers cannot control, levels that cannot be presented.
 
-These checks need a whole sound protocol, whose stimuli can be presented at the ends of their levels.
+These checks need a valid protocol.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ from study_app.protocol.trials.methods import METHOD_KINDS
 from study_app.protocol.trials.stimuli import DELAY, OF_CONDITION, OF_LINK, Stimulated, Stimulus
 
 _LEAST_MS: Final = 1e-3
-"""The least difference between two times that is presented [ms]: a thousandth of a tick. [choice]"""
+"""Smallest difference between two times that counts as different [ms]: a thousandth of a tick. [choice]"""
 _LEAST_SHARE: Final = 1e-6
-"""The least difference between two other numbers, as a share of the standard. [choice]"""
+"""Smallest difference between two other numbers that counts as different, as a share of the standard. [choice]"""
 
 
 def check_kinds(document: Mapping[str, Any]) -> Iterator[Fault]:
@@ -42,8 +42,10 @@ def check_kinds(document: Mapping[str, Any]) -> Iterator[Fault]:
                 continue
             if name not in known:
                 yield unknown_name(path, f'there is no {key} "{name}"', name, {*tables, *known})
-            elif needed := [of for of, field in known[name].model_fields.items() if field.is_required()]:
-                listed = ", ".join(needed)
+            elif required := [
+                field_name for field_name, field in known[name].model_fields.items() if field.is_required()
+            ]:
+                listed = ", ".join(required)
                 example = f'add a table [{section}.NAME] with kind = "{name}" and {listed}, and write {key} = "NAME"'
                 yield Fault(path, f'the kind "{name}" does not have a default for {listed}', example)
 
@@ -64,16 +66,20 @@ def check_designs(protocol: Protocol) -> Iterator[Fault]:
     for number, contrast in enumerate(protocol.analysis.contrasts if protocol.analysis is not None else ()):
         yield from _check_contrast(protocol, contrast, ("analysis", "contrasts", number))
     for number, rule in enumerate(protocol.analysis.exclusions if protocol.analysis is not None else ()):
-        if (lacks := _missing_for_rule(protocol, rule.rule)) is not None:
-            yield Fault(("analysis", "exclusions", number, "rule"), f'"{rule.rule}" never applies: {lacks}')
+        if (missing := _missing_for_rule(protocol, rule.rule)) is not None:
+            yield Fault(("analysis", "exclusions", number, "rule"), f'"{rule.rule}" never applies: {missing}')
 
 
 def _missing_for_rule(protocol: Protocol, rule: str) -> str | None:
-    """Return the part that the study lacks for a rule to apply."""
+    """Return the reason why an exclusion rule can never apply to the study; None if it can."""
     blocks = [block for block in protocol.main_blocks if block.design is not None]
     if rule == "constant_answers":
-        asked = filter(None, (protocol.questionnaire_of(block.id) for block in protocol.main_blocks))
-        return None if any(questionnaire.statements for questionnaire in asked) else "no main block has statements"
+        questionnaires = filter(None, (protocol.questionnaire_of(block.id) for block in protocol.main_blocks))
+        return (
+            None
+            if any(questionnaire.statements for questionnaire in questionnaires)
+            else "no main block has statements"
+        )
     if rule == "threshold_beyond_levels":
         return None if any(block.stimulus is not None for block in blocks) else "no main block has levels"
     stimuli = {block.id: None if block.stimulus is None else protocol.stimuli[block.stimulus] for block in blocks}
@@ -91,13 +97,13 @@ def fitting_rules(protocol: Protocol) -> tuple[str, ...]:
 
 def _check_block(protocol: Protocol, block: Block) -> Iterator[Fault]:
     design, place = protocol.design_of(block), ("blocks", block.id)
-    correct = design.can_be_correct(None if block.stimulus is None else protocol.stimuli[block.stimulus])
+    can_be_correct = design.can_be_correct(None if block.stimulus is None else protocol.stimuli[block.stimulus])
     for key in ("until", "catch"):
-        if not correct and getattr(block, key) is not None:
-            forced = design.has_correct_answer
-            what = 'a forced choice with level = "value"' if forced else f'a design "{block.design}"'
-            yield Fault((*place, key), f"{what} does not have a correct answer", kind="surplus")
-    if not correct and design.feedback not in {None, "never"}:
+        if not can_be_correct and getattr(block, key) is not None:
+            is_forced_choice = design.has_correct_answer
+            subject = 'a forced choice with level = "value"' if is_forced_choice else f'a design "{block.design}"'
+            yield Fault((*place, key), f"{subject} does not have a correct answer", kind="surplus")
+    if not can_be_correct and design.feedback not in {None, "never"}:
         yield Fault(
             ("designs", str(block.design), "feedback"),
             "its answers are neither correct nor incorrect, so feedback is not possible",
@@ -151,12 +157,12 @@ def _check_block(protocol: Protocol, block: Block) -> Iterator[Fault]:
 
 
 def _check_published(protocol: Protocol, published: Published, place: Path) -> Iterator[Fault]:
-    """Check that a published value belongs to a block of levels, and its standard to the block."""
-    of_levels = [block.id for block in protocol.blocks.values() if block.stimulus is not None]
-    if published.block not in of_levels:
+    """Check that a published value refers to a block with levels and to one of its standards."""
+    blocks_with_levels = [block.id for block in protocol.blocks.values() if block.stimulus is not None]
+    if published.block not in blocks_with_levels:
         message = f'there is no block "{published.block}" with levels'
-        if of_levels:
-            yield unknown_name((*place, "block"), message, published.block, of_levels)
+        if blocks_with_levels:
+            yield unknown_name((*place, "block"), message, published.block, blocks_with_levels)
         else:
             yield Fault(place, message, kind="surplus")
         return
@@ -181,18 +187,18 @@ def _check_published(protocol: Protocol, published: Published, place: Path) -> I
 
 
 def _check_contrast(protocol: Protocol, contrast: Contrast, place: Path) -> Iterator[Fault]:
-    """Check that the blocks of a contrast have its measure, and its conditions."""
+    """Check that the blocks of a contrast have its measure and its conditions."""
     for name in contrast.blocks:
-        block, asked = protocol.blocks[name], protocol.questionnaire_of(name)
+        block, questionnaire = protocol.blocks[name], protocol.questionnaire_of(name)
         if block.phase != "main":
             yield Fault((*place, "blocks"), f"{name} is not a main block, so it is not analysed", "choose a main block")
             continue
         if contrast.form is not None:
             yield from _check_form(protocol, contrast, contrast.form, name, place)
             continue
-        items = [item.id for item in asked.statements] if asked is not None else []
+        items = [item.id for item in questionnaire.statements] if questionnaire is not None else []
         known = items if block.design is None else protocol.measures_of(block)
-        kinds = {} if asked is None else {item.id: item.kind_id for item in asked.items}
+        kinds = {} if questionnaire is None else {item.id: item.kind_id for item in questionnaire.items}
         if contrast.measure not in known and contrast.measure in kinds:
             yield Fault(
                 (*place, "measure"),
@@ -218,11 +224,11 @@ def _check_form(protocol: Protocol, contrast: Contrast, form: str, block: str, p
     """Check that a form is asked after a block of a contrast, and has its measure."""
     if block not in protocol.follows(form):
         yield Fault((*place, "form"), f"{form} does not follow every block in the comparison", f"add it after {block}")
-    asked = protocol.questionnaires[form]
-    known = [*(item.id for item in asked.items if item.value_type != "text"), *asked.scores]
+    questionnaire = protocol.questionnaires[form]
+    known = [*(item.id for item in questionnaire.items if item.value_type != "text"), *questionnaire.scores]
     if contrast.measure not in known:
-        words = f'"{form}" does not have a numeric question or score {contrast.measure}'
-        yield unknown_name((*place, "measure"), words, contrast.measure, known)
+        message = f'"{form}" does not have a numeric question or score {contrast.measure}'
+        yield unknown_name((*place, "measure"), message, contrast.measure, known)
 
 
 def _check_varied_number(protocol: Protocol, name: str, stimulus: Stimulus) -> Iterator[Fault]:
@@ -265,15 +271,15 @@ def _check_levels(protocol: Protocol, block: Block) -> Iterator[Fault]:
     if faults:
         yield from faults
         return
-    least, most = stimulus.levels
-    levels = sorted((*method.levels_of(stimulus), *([most] if block.catch else [])))
-    if levels[0] < least * (1 - 1e-9) or levels[-1] > most * (1 + 1e-9):
-        beyond = levels[0] if levels[0] < least * (1 - 1e-9) else levels[-1]
+    lowest, highest = stimulus.levels
+    levels = sorted((*method.levels_of(stimulus), *([highest] if block.catch else [])))
+    if levels[0] < lowest * (1 - 1e-9) or levels[-1] > highest * (1 + 1e-9):
+        beyond = levels[0] if levels[0] < lowest * (1 - 1e-9) else levels[-1]
         message = f"{beyond:g} is outside the stimulus's levels"
-        yield Fault(("methods", str(block.method), "levels"), message, f"choose levels from {least:g} to {most:g}")
+        yield Fault(("methods", str(block.method), "levels"), message, f"choose levels from {lowest:g} to {highest:g}")
         return
     for standard in protocol.standards_of(block):
-        if standard is not None and (fault := _standard_fault(protocol, block, stimulus, standard, least)) is not None:
+        if standard is not None and (fault := _standard_fault(protocol, block, stimulus, standard, lowest)) is not None:
             yield fault
             return
         for level in (levels[-1], levels[0]):
@@ -281,9 +287,11 @@ def _check_levels(protocol: Protocol, block: Block) -> Iterator[Fault]:
             if stimulus.vary in OF_CONDITION and not 0 <= value <= OF_CONDITION[stimulus.vary]:
                 yield _out_of_range_fault(block, stimulus, standard, level)
                 return
-            if (why := _presentation_problem(protocol, stimulus, value)) is not None:
-                what = f"a standard of {standard:g} at level {level:g} gives" if standard is not None else "the level"
-                yield Fault(("stimuli", str(block.stimulus), "levels"), f"{what} {value:g}: {why}")
+            if (reason := _presentation_problem(protocol, stimulus, value)) is not None:
+                subject = (
+                    f"a standard of {standard:g} at level {level:g} gives" if standard is not None else "the level"
+                )
+                yield Fault(("stimuli", str(block.stimulus), "levels"), f"{subject} {value:g}: {reason}")
                 return
     yield from _check_adjustment(protocol, block)
 
@@ -296,13 +304,17 @@ def _standard_fault(
     if stimulus.vary in OF_CONDITION and not 0 <= standard <= OF_CONDITION[stimulus.vary]:
         permitted = f"choose a standard from 0 to {OF_CONDITION[stimulus.vary]:g}"
         return Fault((*place, "standards"), f"{standard:g} is not permitted for {stimulus.vary}", permitted)
-    if (why := _presentation_problem(protocol, stimulus, standard)) is not None:
-        return Fault((*place, "standards"), f"{standard:g}: {why}")
-    least = _LEAST_MS if stimulus.vary.endswith("_ms") else _LEAST_SHARE * (abs(standard) or 1.0)
-    if level == 0 or stimulus.level_kind == "value" or abs(stimulus.comparison(standard, level) - standard) >= least:
+    if (reason := _presentation_problem(protocol, stimulus, standard)) is not None:
+        return Fault((*place, "standards"), f"{standard:g}: {reason}")
+    least_difference = _LEAST_MS if stimulus.vary.endswith("_ms") else _LEAST_SHARE * (abs(standard) or 1.0)
+    if (
+        level == 0
+        or stimulus.level_kind == "value"
+        or abs(stimulus.comparison(standard, level) - standard) >= least_difference
+    ):
         return None
     message = f"at level {level:g} the comparison equals the standard of {standard:g}, so the intervals do not differ"
-    return Fault((*place, "levels"), message, f"the comparison must differ by at least {least:g}")
+    return Fault((*place, "levels"), message, f"the comparison must differ by at least {least_difference:g}")
 
 
 def _out_of_range_fault(block: Block, stimulus: Stimulus, standard: float | None, level: float) -> Fault:
@@ -324,7 +336,7 @@ def _out_of_range_fault(block: Block, stimulus: Stimulus, standard: float | None
 
 
 def _presentation_problem(protocol: Protocol, stimulus: Stimulus, value: float) -> str | None:
-    """Return why a value of the varied number cannot be presented; None if it can."""
+    """Return the reason why a value of the varied number cannot be presented; None if it can."""
     if stimulus.vary in OF_CONDITION:
         return None
     try:
@@ -351,7 +363,7 @@ def _check_design_and_method(protocol: Protocol, block: Block) -> Iterator[Fault
 
 
 def _check_adjustment(protocol: Protocol, block: Block) -> Iterator[Fault]:
-    """Yield the reasons why a number cannot be adjusted during presentation, or a standard cannot be matched."""
+    """Yield a fault if a number cannot be adjusted during a presentation, or a standard cannot be matched."""
     design, stimulus = protocol.design_of(block), protocol.stimulus_of(block)
     if not design.adjusts:
         return
@@ -374,9 +386,9 @@ def _check_adjustment(protocol: Protocol, block: Block) -> Iterator[Fault]:
 
 
 def _can_change(protocol: Protocol, condition: str, vary: str, values: list[float]) -> bool:
-    """Return whether the servo can change between successive values while keeping its state.
+    """Return whether the servo can change from each value to the next one while keeping its state.
 
-    It cannot if the force is delayed, since forces in transit belong to the previous delay.
+    A delay of the force cannot change, since forces in transit belong to the previous delay.
     """
     from study_app.haptics.runtime.pack import is_built_alike  # noqa: PLC0415 - loads numpy
 

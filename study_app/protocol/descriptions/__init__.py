@@ -1,4 +1,4 @@
-"""A protocol in words, and how one protocol differs from another."""
+"""The description of a protocol as text, and the differences between two protocols."""
 
 from study_app.protocol.descriptions.protocol_differences import CONDITIONS_DIFFER, differences, document_differences
 from study_app.protocol.descriptions.protocol_text import (

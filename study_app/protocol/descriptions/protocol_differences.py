@@ -1,7 +1,7 @@
-"""How one protocol differs from another, for a session that is to go on under a changed file.
+"""The differences between two protocols, for a session that is continued with a changed file.
 
-What blinding hides is compared and never shown: of the conditions, the liquids and the blocks' lists of conditions it
-is said only that they differ.
+Values that blinding hides are compared but never shown: for the conditions, the liquids and the blocks' lists of
+conditions, the result is only that they differ.
 """
 
 from __future__ import annotations
@@ -19,19 +19,19 @@ _HIDDEN = ("conditions", "liquids")
 
 
 _Place: TypeAlias = tuple[str | int, ...]
-"""Where two protocols differ: keys, ids of entries, and indices from 0."""
+"""A path in two protocols: keys, IDs of entries, and indices from 0."""
 
 
 class Difference(NamedTuple):
-    """A place where two protocols differ, and the difference."""
+    """A path at which two protocols differ, and the change as text."""
 
     place: _Place
-    words: str
+    change: str
 
     @property
     def sentence(self) -> str:
-        """The place for display, with entries counted from 1, and the difference."""
-        return f"{'.'.join(str(step + 1) if isinstance(step, int) else step for step in self.place)}: {self.words}"
+        """The path, with entries counted from 1, and the change."""
+        return f"{'.'.join(str(step + 1) if isinstance(step, int) else step for step in self.place)}: {self.change}"
 
 
 def differences(old: Protocol | Mapping[str, Any], new: Protocol | Mapping[str, Any]) -> tuple[str, ...]:
@@ -76,7 +76,7 @@ def _drop_unknown_comparisons(before: dict[str, Any], after: dict[str, Any]) -> 
 
 
 def _pop_hidden(tables: dict[str, Any]) -> dict[str, Any]:
-    """Remove the values that blinding hides and return them by place."""
+    """Remove the values that blinding hides, and return them by path."""
     hidden = {name: tables.pop(name) for name in _HIDDEN if name in tables}
     for name, block in tables["blocks"].items():
         if "conditions" in block:
@@ -85,7 +85,7 @@ def _pop_hidden(tables: dict[str, Any]) -> dict[str, Any]:
 
 
 def _differences(place: _Place, old: Any, new: Any) -> Iterator[Difference]:
-    """Yield the differences below a place; a key that is None counts as missing."""
+    """Yield the differences at a path; a key that is None counts as missing."""
     if _has_ids(old) and _has_ids(new):
         yield from _entry_differences(place, old, new)
     elif isinstance(old, Mapping) and isinstance(new, Mapping):
@@ -122,6 +122,6 @@ def _entry_differences(
     """Yield the differences between tables matched by id, then differences in the order of common tables."""
     before, after = ({entry["id"]: entry for entry in entries} for entries in (old, new))
     yield from _differences(place, before, after)
-    stayed = before.keys() & after.keys()
-    if [name for name in before if name in stayed] != [name for name in after if name in stayed]:
+    common_ids = before.keys() & after.keys()
+    if [name for name in before if name in common_ids] != [name for name in after if name in common_ids]:
         yield Difference(place, "in a different order")

@@ -1,4 +1,4 @@
-"""A protocol in words: what ``liquid-study check`` prints, for the author to compare with the intention."""
+"""A protocol as text: the output of ``liquid-study check``, which shows authors what they have specified."""
 
 from __future__ import annotations
 
@@ -34,30 +34,32 @@ _BLINDINGS = {
     "double": "double-blind: the operator does not see the force",
     "single": "single-blind: the operator sees the force and the wake",
 }
-_GROUP_WORDS = {
+_ASSIGNMENTS = {
     "randomised": "randomised in permuted blocks",
     "pre-existing": "pre-existing: entered by the operator for each participant, not randomised",
 }
 
 
 def describe(protocol: Protocol, delay_ticks: int = ASSUMED_TICKS, without_force: str = "") -> str:
-    """Describe the whole study in its first language.
+    """Return the description of a study in its first language.
 
     Forces act ``delay_ticks`` ticks late; ``without_force`` is the name of the sessions' device, if it has no force.
     """
     language = protocol.study.languages[0]
     effects = [line for name in protocol.liquids for line in (*describe_gate(protocol.scene_of(name)), "")]
     conditions = [
-        (name, " + ".join(condition.liquid_ids), ", ".join(_drawing_notes(condition)))
+        (name, " + ".join(condition.liquid_ids), ", ".join(_condition_notes(condition)))
         for name, condition in protocol.conditions.items()
     ]
-    warned = [f"  {sentence}" for sentence in warnings(protocol, without_force=without_force)]
-    decided = [("nothing", "there is no [analysis] table, so the report will label all findings as exploratory")]
+    warning_lines = [f"  {sentence}" for sentence in warnings(protocol, without_force=without_force)]
+    decision_rows = [("nothing", "there is no [analysis] table, so the report will label all findings as exploratory")]
     if protocol.analysis is not None:
-        named = [f"{name} by {condition.label}" for name, condition in protocol.conditions.items() if condition.label]
+        recognised = [
+            f"{name} by {condition.label}" for name, condition in protocol.conditions.items() if condition.label
+        ]
         statements = any(block.design is None and block.questionnaire is not None for block in protocol.main_blocks)
         units = {block.id: protocol.stimulus_of(block).unit for block in protocol.main_blocks if block.stimulus}
-        decided = list(protocol.analysis.described(named, units=units, statements=statements))
+        decision_rows = list(protocol.analysis.described(recognised, units=units, statements=statements))
     people = protocol.simulated_participants
     sections = (
         _head_lines(protocol, language),
@@ -66,20 +68,20 @@ def describe(protocol: Protocol, delay_ticks: int = ASSUMED_TICKS, without_force
             for variant in variants(protocol)
         ),
         *(_block_lines(protocol, block, language, delay_ticks) for block in protocol.blocks_in_order),
-        _add_title("Liquids", _liquid_rows(protocol)),
+        _titled_lines("Liquids", _liquid_rows(protocol)),
         ("Effects in each liquid", *(f"  {line}".rstrip() for line in effects[:-1])),
-        _add_title("Conditions", conditions),
+        _titled_lines("Conditions", conditions),
         *(_question_lines(protocol, name, language) for name in protocol.questionnaires),
-        _add_title("Decisions about the analysis", decided),
-        *([] if people is None else [_add_title("Simulated participants", [("Answers", people.described())])]),
-        _add_title("Limits for a valid trial", limit_rows(protocol)),
-        *([("Warnings", *warned)] if warned else []),
+        _titled_lines("Decisions about the analysis", decision_rows),
+        *([] if people is None else [_titled_lines("Simulated participants", [("Answers", people.described())])]),
+        _titled_lines("Limits for a valid trial", limit_rows(protocol)),
+        *([("Warnings", *warning_lines)] if warning_lines else []),
     )
     return "\n\n".join("\n".join(section) for section in sections)
 
 
 def describe_scenes(scenes: Mapping[str, Scene]) -> str:
-    """Describe the liquids of a file without a study; ``scenes`` are by name."""
+    """Return the description of the liquids in a file without a study; ``scenes`` are by liquid."""
     scene = next(iter(scenes.values()))
     ball_mm = scene.body.diameter_m * 1000
     rows = [
@@ -88,7 +90,7 @@ def describe_scenes(scenes: Mapping[str, Scene]) -> str:
         ("Scale", f"{scene.scale:g} times the hand's motion"),
         ("Ball", f"{ball_mm:g} mm in the scene ({ball_mm / scene.scale:.3g} mm in the hand frame)"),
     ]
-    effects = ("\n".join(f"  {line}".rstrip() for line in describe_gate(it)) for it in scenes.values())
+    effects = ("\n".join(f"  {line}".rstrip() for line in describe_gate(each_scene)) for each_scene in scenes.values())
     head = ("Liquids that are not part of a study", *_align_columns(rows))
     return "\n\n".join(("\n".join(head), "Effects in each liquid", *effects))
 
@@ -100,7 +102,7 @@ def _align_columns(rows: Sequence[Sequence[str]]) -> Iterator[str]:
         yield "  " + "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
 
 
-def _add_title(title: str, rows: Sequence[Sequence[str]]) -> Iterable[str]:
+def _titled_lines(title: str, rows: Sequence[Sequence[str]]) -> Iterable[str]:
     return (title, *_align_columns(rows))
 
 
@@ -114,7 +116,7 @@ def _head_lines(protocol: Protocol, language: str) -> Iterable[str]:
     rows = [
         ("Languages", ", ".join(study.languages)),
         ("Parts", f"{protocol.parts}"),
-        *([("Groups", _GROUP_WORDS[study.group_assignment])] if protocol.groups else ()),
+        *([("Groups", _ASSIGNMENTS[study.group_assignment])] if protocol.groups else ()),
         *(("Group", f"{name}, share {group.share}") for name, group in protocol.groups.items()),
         ("Answers", f"{number_range(counts)} per {'session' if protocol.sessions_differ else 'participant'}"),
         ("Blinding", _BLINDINGS[study.blinding]),
@@ -128,7 +130,7 @@ def _head_lines(protocol: Protocol, language: str) -> Iterable[str]:
 
 
 def number_range(numbers: Sequence[float], digits: str = "") -> str:
-    """Return the range of the numbers, "4 to 8"; a single number if both ends read alike."""
+    """Return the range of numbers as text, "4 to 8", or a single number if both ends have the same text."""
     least, largest = f"{min(numbers):{digits}}", f"{max(numbers):{digits}}"
     return least if least == largest else f"{least} to {largest}"
 
@@ -153,17 +155,17 @@ def _session_lines(variant: Variant, planned: int | None, language: str) -> Iter
             description = f"{protocol.text(block.title, language)}: {trials}"
         rows.append((f"{number:>2}", kind, description))
     if len(protocol.main_blocks) < 2:
-        return _add_title(title, rows)
+        return _titled_lines(title, rows)
     order = block_order_words(protocol, planned, in_group=variant.group is not None)
-    return (*_add_title(title, rows), f"  Block order: {order}")
+    return (*_titled_lines(title, rows), f"  Block order: {order}")
 
 
 def _block_lines(protocol: Protocol, block: Block, language: str, delay_ticks: int) -> Iterable[str]:
     part = "" if block.part is None else f"Part {block.part}: "
     questionnaire, compared = protocol.questionnaire_of(block.id), protocol.compared_in(block.id)
     trials = order_of(protocol, block).trials
-    shown = "condition" if block.design is None else "comparison"
-    times = f"each {shown} {block.repetitions} times" if block.repetitions > 1 else ""
+    unit = "condition" if block.design is None else "comparison"
+    times = f"each {unit} {block.repetitions} times" if block.repetitions > 1 else ""
     rows = [
         ("Trials", ", ".join(filter(None, (counted(trials, "trial"), times, _order_text(block))))),
         *_assignment_and_break_rows(protocol, block, language),
@@ -181,9 +183,9 @@ def _block_lines(protocol: Protocol, block: Block, language: str, delay_ticks: i
     elif block.design is None and questionnaire is not None:
         order = "in the order of the file" if questionnaire.item_order == "fixed" else "in a new order each time"
         noun = "statement" if len(questionnaire.statements) == len(questionnaire.items) else "question"
-        asked = counted(len(questionnaire.items), noun)
-        rows.append(("Questions", f"{asked} (questionnaire {block.questionnaire}), {order}"))
-    return _add_title(f"{part}{protocol.text(block.title, language)} (block {block.id}, {block.phase})", rows)
+        questions = counted(len(questionnaire.items), noun)
+        rows.append(("Questions", f"{questions} (questionnaire {block.questionnaire}), {order}"))
+    return _titled_lines(f"{part}{protocol.text(block.title, language)} (block {block.id}, {block.phase})", rows)
 
 
 def _design_rows(protocol: Protocol, block: Block, delay_ticks: int) -> Iterator[tuple[str, str]]:
@@ -207,17 +209,17 @@ def _design_rows(protocol: Protocol, block: Block, delay_ticks: int) -> Iterator
         against = f", {'standard' if len(standards) == 1 else 'standards'} {standards_text} {unit}".rstrip()
     yield "Design", f"{kind} of {stimulus.vary}{against}: {intervals}"
     name = _LEVELS[stimulus.level_kind]
-    of_each = " per standard" if standards else ""
+    per_standard = " per standard" if standards else ""
     slots = [track.slots for track in tracks_of(protocol, block)]
     guess = design.guess_rate if design.can_be_correct(stimulus) else 0.0
     target = method.target(guess, design.success_of(stimulus))
-    aimed = "" if target is None else f": {target}"
+    target_text = "" if target is None else f": {target}"
     trials = slots[0] * method.tracks
     tracks = "" if method.tracks == 1 else f" in {method.tracks} tracks"
     yield (
         "Levels",
         f"{name} {number_range(levels, '.3g')}{f' {unit}' if unit and stimulus.level_kind != 'weber' else ''} "
-        f"({method.kind}{aimed}), {trials} trials{of_each}{tracks}",
+        f"({method.kind}{target_text}), {trials} trials{per_standard}{tracks}",
     )
     if isinstance(method, Adjustment):
         low, high = stimulus.domain
@@ -225,21 +227,21 @@ def _design_rows(protocol: Protocol, block: Block, delay_ticks: int) -> Iterator
         longest = f"at most {method.most_s:g} s per setting"
         yield "Settings", f"{steps} steps from one end to the other, starting near either end, {longest}"
     pairs = product(protocol.standards_of(block), levels)
-    compared = [stimulus.comparison(standard, level) for standard, level in pairs]
-    yield "Comparisons", f"{stimulus.vary} {number_range(compared, '.4g')} {unit}".rstrip()
+    comparisons = [stimulus.comparison(standard, level) for standard, level in pairs]
+    yield "Comparisons", f"{stimulus.vary} {number_range(comparisons, '.4g')} {unit}".rstrip()
     task = protocol.tasks[block.task]
     if isinstance(task, Follow) and stimulus.vary != DELAY:
         pace_mps = task.fastest_stroke(protocol.device.workspace_m).speed_mps
         scene = protocol.scene_for(protocol.condition_of(stimulus))
-        values = (*standards, *compared)
+        values = (*standards, *comparisons)
         scenes = (
             [scene] if stimulus.vary in OF_LINK else [override_value(scene, stimulus.vary, value) for value in values]
         )
-        felt_n = [steady_force(level_scene, pace_mps).drag_n for level_scene in scenes]
-        fast_n = max(steady_force(level_scene, FASTER * pace_mps).drag_n for level_scene in scenes[-len(compared) :])
+        paced_n = [steady_force(level_scene, pace_mps).drag_n for level_scene in scenes]
+        fast_n = max(steady_force(level_scene, FASTER * pace_mps).drag_n for level_scene in scenes[-len(comparisons) :])
         yield (
             "Force at the paced speed",
-            f"{number_range(felt_n, '.1f')} N at {pace_mps:.3g} m/s, and at most {fast_n:.1f} N at "
+            f"{number_range(paced_n, '.1f')} N at {pace_mps:.3g} m/s, and at most {fast_n:.1f} N at "
             f"{FASTER:g} times that speed",
         )
     if (highest_nspm := highest_damping(protocol, block)) > 0:
@@ -263,12 +265,14 @@ def _order_text(block: Block) -> str:
         case "shuffled":
             return "a different order for each participant"
         case "constrained":
-            most, least = block.max_repeats, block.min_distance
-            kept = [] if most is None else [f"each condition at most {most} times in a row"]
-            kept += (
-                [] if least is None else [(f"at least {least} trials from one presentation of a condition to the next")]
+            max_repeats, min_distance = block.max_repeats, block.min_distance
+            rules = [] if max_repeats is None else [f"each condition at most {max_repeats} times in a row"]
+            rules += (
+                []
+                if min_distance is None
+                else [(f"at least {min_distance} trials from one presentation of a condition to the next")]
             )
-            return f"a different order for each participant, with {' and '.join(kept)}"
+            return f"a different order for each participant, with {' and '.join(rules)}"
         case "williams" | "latin" as square:
             rows = row_count(square, len(block.conditions))
             name = "a Williams design" if square == "williams" else "a Latin square"
@@ -278,10 +282,10 @@ def _order_text(block: Block) -> str:
 def _assignment_and_break_rows(protocol: Protocol, block: Block, language: str) -> Iterator[tuple[str, str]]:
     """Yield the rows about the assignment of square rows and about breaks."""
     if block.order in ("williams", "latin") and len(block.conditions) > 1:
-        of_id = "assigned by the number in the participant's ID (P007 is number 7), not by the seed"
+        by_id = "assigned by the number in the participant's ID (P007 is number 7), not by the seed"
         yield (
             "Rows",
-            ("assigned by the participant's position in the group, not by the seed") if protocol.groups else of_id,
+            ("assigned by the participant's position in the group, not by the seed") if protocol.groups else by_id,
         )
     if block.break_page is not None:
         title = protocol.text(protocol.pages[block.break_page].title, language)
@@ -297,18 +301,18 @@ def _liquid_rows(protocol: Protocol) -> list[tuple[str, ...]]:
     rows: list[tuple[str, ...]] = []
     for name in protocol.liquids:
         body = protocol.liquids[name].model_dump(mode="json").get("body")
-        words = liquid_words(resolve(protocol.scene_of(name)).liquids[0].model_dump(mode="json") | {"body": body})
-        rows.append((name, words if name in used else f"{words}; not used in any condition"))
+        description = liquid_words(resolve(protocol.scene_of(name)).liquids[0].model_dump(mode="json") | {"body": body})
+        rows.append((name, description if name in used else f"{description}; not used in any condition"))
     return rows
 
 
-def _drawing_notes(condition: Condition) -> Iterator[str]:
-    """Yield notes on unusual displays and force links of a condition."""
+def _condition_notes(condition: Condition) -> Iterator[str]:
+    """Yield notes on a condition's display and force link where they differ from the defaults."""
     if condition.delay_ms:
         yield f"shown with a delay of {condition.delay_ms:g} ms"
     if condition.shows_video:
-        alone = ", without the ball and the targets" if condition.overlay == "hidden" else ""
-        yield f"video: {condition.view}{alone}"
+        without_overlay = ", without the ball and the targets" if condition.overlay == "hidden" else ""
+        yield f"video: {condition.view}{without_overlay}"
     if condition.ball == "hidden":
         yield "ball hidden"
     yield from link_descriptions(condition.force_delay_ms, condition.force_jitter_ms, condition.force_loss)
@@ -360,14 +364,14 @@ def limit_label(key: str) -> str:
 def limit_rows(protocol: Protocol) -> list[tuple[str, str]]:
     """Return the limits of a valid trial that the study's blocks can exceed: each value with its meaning."""
     units, rows = {"ms": " ms", "percent": " %"}, []
-    with_intervals = [block for block in protocol.blocks_in_order if block.design is not None]
-    varied = {protocol.stimulus_of(block).vary for block in with_intervals if block.stimulus is not None}
+    blocks_with_design = [block for block in protocol.blocks_in_order if block.design is not None]
+    varied = {protocol.stimulus_of(block).vary for block in blocks_with_design if block.stimulus is not None}
     applies = {
         "level_error_percent": bool(varied - {*OF_CONDITION}),
         "level_error_ms": bool(varied & {*DELAYS}),
-        "pace_error_percent": any(isinstance(protocol.tasks[block.task], Follow) for block in with_intervals),
-        "attempts": bool(with_intervals),
-        "missing_percent": bool(with_intervals),
+        "pace_error_percent": any(isinstance(protocol.tasks[block.task], Follow) for block in blocks_with_design),
+        "attempts": bool(blocks_with_design),
+        "missing_percent": bool(blocks_with_design),
     }
     for key in Limits.model_fields:
         if not applies.get(key, True):

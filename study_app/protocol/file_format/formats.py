@@ -1,4 +1,4 @@
-"""The format of study and scene files: the number that they state, and the keys that they may omit."""
+"""The format of study and scene files: its number, and the keys that a file may omit."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _LEVEL_LIMITS: Final = {
     "attempts": 3,
     "missing_percent": 5,
 }
-"""Limits of what an interval delivers, and of how many trials may be missing, with their defaults."""
+"""Default limits for delivered intervals and missing trials, in studies with a design."""
 
 
 ESTIMATOR: Final = "kalman"
@@ -27,7 +27,7 @@ _DENSITY_KG_M3: Final = 1000.0
 
 
 def format_fault(document: Mapping[str, Any]) -> Fault | None:
-    """Return the fault of a file in another format, so that its other content cannot be checked; otherwise None."""
+    """Return the fault of a file in another format, whose content cannot be checked, or None."""
     stated = document.get("format")
     if type(stated) is not int or stated < 1 or stated == FORMAT:
         return None
@@ -39,11 +39,11 @@ def format_fault(document: Mapping[str, Any]) -> Fault | None:
 def with_omitted_keys(document: Mapping[str, Any]) -> dict[str, Any]:
     """Return a study's document with its omitted keys filled in; invalid parts are unchanged."""
     completed = dict(document)
-    head = completed.get("study", {})
-    if isinstance(head, dict):
-        completed["study"] = {"version": "1", "languages": ("en",), **head}
-        if isinstance(head.get("name"), str):
-            completed["study"].setdefault("title", dict.fromkeys(_languages(completed), head["name"]))
+    study_table = completed.get("study", {})
+    if isinstance(study_table, dict):
+        completed["study"] = {"version": "1", "languages": ("en",), **study_table}
+        if isinstance(study_table.get("name"), str):
+            completed["study"].setdefault("title", dict.fromkeys(_languages(completed), study_table["name"]))
     completed["device"] = _add_defaults(completed.get("device", {}), workspace_mm=_WORKSPACE_MM)
     if any(
         "stimulus" in block or "design" in block
@@ -56,15 +56,17 @@ def with_omitted_keys(document: Mapping[str, Any]) -> dict[str, Any]:
         completed.setdefault("conditions", {name: {"liquid": name} for name in liquids})
     if isinstance(blocks := completed.get("blocks", {}), dict) and blocks:
         completed["blocks"] = _add_block_defaults(blocks, names(completed, "tasks"), _languages(completed))
-        own = {"sequence", "sequences"}  # if each group has one, the study needs none
-        groups = [isinstance(group, Mapping) and group.keys() & own for _, group in entries(completed, "groups.*")]
+        sequence_keys = {"sequence", "sequences"}  # the study needs none if each group has its own
+        groups = [
+            isinstance(group, Mapping) and group.keys() & sequence_keys for _, group in entries(completed, "groups.*")
+        ]
         if "sequences" not in completed and not (groups and all(groups)):
             completed.setdefault("sequence", tuple(blocks))
     return completed
 
 
 def with_scene_defaults(document: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a study's or scene's document with the omitted estimator and densities of dampers."""
+    """Return a study's or scene's document with an omitted estimator, and omitted densities of dampers, filled in."""
     completed = dict(document)
     completed["scene"] = _add_defaults(completed.get("scene", {}), velocity={"kind": ESTIMATOR})
     if isinstance(liquids := completed.get("liquids"), dict):
@@ -78,7 +80,7 @@ _OMITTED: Final = {
     "device": ("workspace_mm",),
     "blocks": ("title", "setting_label", "task"),
 }
-"""Keys of the file and of its tables that a file may omit."""
+"""Keys of the whole file ("") and of its tables that may be omitted."""
 
 
 def relax_schema(schema: dict[str, Any]) -> None:
@@ -105,21 +107,23 @@ def _add_density(liquid: Any) -> Any:
     if not isinstance(liquid, dict):
         return liquid
     drag = liquid.get("drag")
-    damper = isinstance(drag, Mapping) and drag.get("law") == "linear" and liquid.get("effects", ("drag",)) == ("drag",)
-    return _add_defaults(liquid, density_kg_m3=_DENSITY_KG_M3) if damper else liquid
+    is_damper = (
+        isinstance(drag, Mapping) and drag.get("law") == "linear" and liquid.get("effects", ("drag",)) == ("drag",)
+    )
+    return _add_defaults(liquid, density_kg_m3=_DENSITY_KG_M3) if is_damper else liquid
 
 
 def _add_block_defaults(
     blocks: Mapping[str, Any], tasks: tuple[str, ...], languages: tuple[str, ...]
 ) -> dict[str, Any]:
     """Return the blocks with default titles and trial labels, and with parts and code letters for main blocks."""
-    taken = [table.get("code_prefix") for table in blocks.values() if isinstance(table, Mapping)]
-    letters = (letter for letter in string.ascii_uppercase if letter not in taken)
-    numbered: dict[str, Any] = {}
+    used_letters = [table.get("code_prefix") for table in blocks.values() if isinstance(table, Mapping)]
+    letters = (letter for letter in string.ascii_uppercase if letter not in used_letters)
+    completed: dict[str, Any] = {}
     part = 0
     for name, table in blocks.items():
         if not isinstance(table, dict):
-            numbered[name] = table
+            completed[name] = table
             continue
         defaults: dict[str, Any] = {
             "title": name.replace("_", " ").capitalize(),
@@ -136,5 +140,5 @@ def _add_block_defaults(
                 defaults["code_prefix"] = next(letters, "Z")
         if len(languages) > 1:
             defaults["title"] = dict.fromkeys(languages, defaults["title"])
-        numbered[name] = {**defaults, **table}
-    return numbered
+        completed[name] = {**defaults, **table}
+    return completed

@@ -26,18 +26,18 @@ _LIQUID_FILE = (
 
 _LINEAR_DRAG: Final = {"properties": {"law": {"const": "linear"}}, "required": ["law"]}
 _NEED_NO_DENSITY: Final = [{"required": ["file"]}, {"properties": {"drag": _LINEAR_DRAG}, "required": ["drag"]}]
-"""Liquids without a density: those of a file, and dampers."""
+"""Schemas of liquids that need no density: liquid files and dampers."""
 
 
 class _Generator(GenerateJsonSchema):
-    """Writes defaults unchanged; pydantic would build a validator for the type of each."""
+    """Writes defaults unchanged, without building a validator for the type of each one."""
 
     def encode_default(self, dft: Any) -> Any:
         """Return a default as JSON."""
         return to_jsonable_python(dft)
 
     def get_defs_ref(self, core_mode_ref: CoreModeRef) -> DefsRef:
-        """Return the name of a definition, with the module's name for a plug-in's."""
+        """Return the name of a definition; that of a plug-in contains its module."""
         ref = super().get_defs_ref(core_mode_ref)
         if not core_mode_ref[0].startswith("study_app."):
             del self._prioritized_defsref_choices[ref][:2]
@@ -45,41 +45,41 @@ class _Generator(GenerateJsonSchema):
 
 
 @cache
-def schema(of: type[BaseModel] = Protocol) -> dict[str, Any]:
+def schema(model: type[BaseModel] = Protocol) -> dict[str, Any]:
     """Return the JSON Schema of a protocol file with the meaning of each key."""
-    described = of.model_json_schema(schema_generator=_Generator)
-    for node in described["properties"].values():
+    document = model.model_json_schema(schema_generator=_Generator)
+    for node in document["properties"].values():
         if "patternProperties" in node:
             node["additionalProperties"] = False
-    for table in ("Liquid", "Block"):  # their id is the name of their table
-        for part in described["$defs"].values():
+    for table in ("Liquid", "Block"):  # their ID is the name of their table
+        for part in document["$defs"].values():
             if part.get("title") == table:
                 part["properties"].pop("id")
                 part["required"].remove("id")
-                if "body" in part["properties"]:  # a liquid of a study may be that of a file instead
+                if "body" in part["properties"]:  # a study may refer to a liquid file instead
                     part["properties"]["file"] = {"type": "string", "description": _LIQUID_FILE}
                     part["if"], part["then"] = {"not": {"anyOf": _NEED_NO_DENSITY}}, {"required": part.pop("required")}
-    if of is Protocol:
-        relax_schema(described)
-        items = described["$defs"]["Questionnaire"]["properties"]["items"]["items"]
-        items["anyOf"] = items.pop("oneOf")  # a statement, which has no kind, is a text too, whose kind has a default
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **described}
+    if model is Protocol:
+        relax_schema(document)
+        items = document["$defs"]["Questionnaire"]["properties"]["items"]["items"]
+        items["anyOf"] = items.pop("oneOf")  # a statement without a kind also matches a text, whose kind has a default
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **document}
 
 
 def editor_schema() -> dict[str, Any]:
-    """Return the JSON Schema for editors with completion and checks.
+    """Return the JSON Schema for text editors with completion and checks.
 
-    Unlike `schema` it requires complete questions only if no instrument supplies the missing parts.
+    Unlike `schema`, it permits incomplete questions if an instrument supplies the missing parts.
     """
-    described = deepcopy(schema())
-    tables = described["$defs"]
+    document = deepcopy(schema())
+    tables = document["$defs"]
     questions = tables["Questionnaire"]
     items = questions["properties"]["items"]["items"]
-    whole = items["anyOf"]
-    partial = [{**tables[kind["$ref"].rsplit("/", 1)[-1]], "required": ["id"]} for kind in whole]
-    items["anyOf"] = [*whole, *partial]
-    questions["then"]["properties"] = {"items": {"items": {"anyOf": whole}}}
-    return described
+    complete = items["anyOf"]
+    incomplete = [{**tables[kind["$ref"].rsplit("/", 1)[-1]], "required": ["id"]} for kind in complete]
+    items["anyOf"] = [*complete, *incomplete]
+    questions["then"]["properties"] = {"items": {"items": {"anyOf": complete}}}
+    return document
 
 
 _Node: TypeAlias = Mapping[str, Any]
@@ -137,9 +137,9 @@ def _models(node: _Node, place: str) -> Iterator[tuple[str, str]]:
         yield from _models(branch, place)
     if isinstance(node.get("items"), Mapping):
         yield from _models(node["items"], f"{place}[]")
-    for below in (*node.get("patternProperties", {}).values(), node.get("additionalProperties")):
-        if isinstance(below, Mapping):
-            yield from _models(below, f"{place}.NAME")
+    for inner in (*node.get("patternProperties", {}).values(), node.get("additionalProperties")):
+        if isinstance(inner, Mapping):
+            yield from _models(inner, f"{place}.NAME")
 
 
 def _headings(root: _Node, places: Mapping[str, list[str]]) -> dict[str, str]:
@@ -186,24 +186,24 @@ def _alternatives(node: _Node, headings: Mapping[str, str]) -> Iterator[str]:
     elif node.get("type") == "array":
         yield _list_text(node, headings)
     elif node.get("type") == "object":
-        below = [*node.get("patternProperties", {}).values(), node.get("additionalProperties")]
-        inside = [_values_text(node, headings) for node in below if isinstance(node, Mapping)]
+        inner_nodes = [*node.get("patternProperties", {}).values(), node.get("additionalProperties")]
+        inner_texts = [_values_text(node, headings) for node in inner_nodes if isinstance(node, Mapping)]
         yield (
-            f"tables by name, each {inside[0]}"
+            f"tables by name, each {inner_texts[0]}"
             if "patternProperties" in node
-            else f"table keyed by language or by name: {inside[0]}"
+            else f"table keyed by language or by name: {inner_texts[0]}"
         )
     elif node.get("type") != "null":
         yield ", ".join((_TYPES.get(node.get("type", ""), "any"), *_bound_texts(node)))
 
 
 def _list_text(node: _Node, headings: Mapping[str, str]) -> str:
-    inside = node.get("items")
-    of = _values_text(inside, headings) if isinstance(inside, Mapping) else ""
+    entry = node.get("items")
+    values = _values_text(entry, headings) if isinstance(entry, Mapping) else ""
     if "prefixItems" in node:
-        of = ", ".join(dict.fromkeys(_values_text(part, headings) for part in node["prefixItems"]))
-        return f"list of {len(node['prefixItems'])}: {of}"
-    return ", ".join((f"list of: {of}", *_bound_texts(node)))
+        values = ", ".join(dict.fromkeys(_values_text(part, headings) for part in node["prefixItems"]))
+        return f"list of {len(node['prefixItems'])}: {values}"
+    return ", ".join((f"list of: {values}", *_bound_texts(node)))
 
 
 def _bound_texts(node: _Node) -> Iterator[str]:
@@ -228,8 +228,8 @@ def _default_text(key: str, part: _Node, node: _Node) -> str:
 def _description(part: _Node, root: _Node) -> str:
     """Return the description of a key, of its only alternative to null, or of its only nested model."""
     alternatives = [branch for branch in part.get("anyOf", ()) if branch.get("type") != "null"]
-    meant = (part, *alternatives) if len(alternatives) == 1 else (part,)
-    described = next((meaning for meaning in meant if "description" in meaning), None)
+    candidates = (part, *alternatives) if len(alternatives) == 1 else (part,)
+    described = next((candidate for candidate in candidates if "description" in candidate), None)
     models = list(dict.fromkeys(name for name, _ in _models(part, "")))
     if described or len(models) != 1:
         return str((described or {}).get("description", ""))

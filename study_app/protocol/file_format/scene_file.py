@@ -1,4 +1,4 @@
-"""A scene written as the file that ``load.load_scene`` reads: the one writer of ``[scene]`` and ``[liquids.*]``."""
+"""The writer of scene files, with the tables ``[scene]`` and ``[liquids.*]``, which ``load.load_scene`` reads."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ _COMMENT_LETTERS: Final = 110
 
 
 def scene_text(scene: Scene, *, said: Sequence[str] = (), notes: Mapping[_Place, str] | None = None) -> str:
-    """Return a scene as a scene file; known velocities cannot be stated in it.
+    """Return the text of a scene file; the estimator "given" is omitted, since a file cannot state it.
 
-    Paragraphs ``said`` precede it as comments; ``notes`` are comments on single keys by their path, such as
+    The paragraphs ``said`` precede it as comments; ``notes`` are comments on single keys by path, such as
     ``("liquids", "water", "density_kg_m3")``.
     """
-    comments = [f"# {line}" for it in said for line in textwrap.wrap(it, _COMMENT_LETTERS)]
+    comments = [f"# {line}" for paragraph in said for line in textwrap.wrap(paragraph, _COMMENT_LETTERS)]
     head = [*comments, *([""] if comments else []), f"format = {FORMAT}"]
-    left_out = {"liquids", "link"} | ({"velocity"} if isinstance(scene.velocity, Given) else set())
-    left_out |= {"fade_s"} if scene.fade_s == FADE_S else set()
-    of_scene = scene.model_dump(exclude_none=True, exclude=left_out)
-    lines = [*head, *_table_lines(("scene",), of_scene, notes or {})]
+    omitted = {"liquids", "link"} | ({"velocity"} if isinstance(scene.velocity, Given) else set())
+    omitted |= {"fade_s"} if scene.fade_s == FADE_S else set()
+    scene_table = scene.model_dump(exclude_none=True, exclude=omitted)
+    lines = [*head, *_table_lines(("scene",), scene_table, notes or {})]
     for liquid in scene.liquids:
         lines += _table_lines(("liquids", liquid.id), _liquid_table(liquid), notes or {})
     return "\n".join(lines) + "\n"
@@ -40,13 +40,13 @@ def with_default_estimator(scene: Scene) -> Scene:
 
 def _liquid_table(liquid: Liquid) -> Mapping[str, Any]:
     """Return a liquid's table for a scene file, without tables that have no effect."""
-    idle = {
+    unused_tables = {
         effect.name
         for effect in EFFECTS
         if effect.default is not None and not effect.with_liquid and effect.name not in liquid.effects
         if getattr(liquid, effect.name) == effect.default
     }
-    return liquid.model_dump(exclude_none=True, exclude={"id", *idle})
+    return liquid.model_dump(exclude_none=True, exclude={"id", *unused_tables})
 
 
 def _table_lines(place: _Place, table: Mapping[str, Any], notes: Mapping[_Place, str]) -> Iterator[str]:
@@ -63,5 +63,5 @@ def _table_lines(place: _Place, table: Mapping[str, Any], notes: Mapping[_Place,
 
 def _toml_value(value: object) -> str:
     if isinstance(value, tuple):
-        return f"[{', '.join(_toml_value(it) for it in value)}]"
+        return f"[{', '.join(_toml_value(entry) for entry in value)}]"
     return json.dumps(value, ensure_ascii=False) if isinstance(value, str | bool) else repr(value)

@@ -40,7 +40,7 @@ class Group(Table):
     sequences: Sequences = later(default=(), min_length=1, description="The group's steps in sessions 1, 2 and so on.")
 
     @model_validator(mode="after")
-    def _one_of(self) -> Self:
+    def _check_sequence_keys(self) -> Self:
         if self.sequence and self.sequences:
             message = "specify either sequence or sequences, not both"
             raise invalid(message, "sequences")

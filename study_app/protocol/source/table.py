@@ -179,7 +179,7 @@ class Table(BaseModel):
     """Keys that are given, and the keys that do not belong to the table then; the first pair that applies counts."""
 
     @model_validator(mode="after")
-    def _gives_one_of_two(self) -> Self:
+    def _check_alternative_keys(self) -> Self:
         for first, other in self.ONE_OF:
             given: list[Any] = [getattr(self, name) for name in (first, other)]
             if sum(value is not None and value != () for value in given) != 1:

@@ -320,7 +320,7 @@ class Stimulus(Table):
         )
 
     @model_validator(mode="after")
-    def _levels_ascend(self) -> Self:
+    def _check_levels(self) -> Self:
         low, high = self.levels
         if not low < high:
             raise invalid(f"{low:g} is not less than {high:g}: the first level must be the smaller one", "levels")
@@ -335,7 +335,7 @@ class Stimulus(Table):
         return self
 
     @model_validator(mode="after")
-    def _standards_make_sense(self) -> Self:
+    def _check_standards(self) -> Self:
         if self.level_kind == "weber" and any(standard == 0 for standard in self.standards):
             raise invalid("the Weber fraction is not defined for a standard of 0", "level", 'level = "difference"')
         if len(set(self.standards)) < len(self.standards):

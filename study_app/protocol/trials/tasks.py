@@ -135,7 +135,7 @@ class Explore(Task):
         return self.model_copy(update={"min_s": most_s, "max_s": most_s})
 
     @model_validator(mode="after")
-    def _least_before_most(self) -> Self:
+    def _check_durations(self) -> Self:
         if self.min_s > self.max_s:
             raise invalid(f"min_s = {self.min_s:g} is more than max_s = {self.max_s:g}", "min_s")
         return self
@@ -278,7 +278,7 @@ class Reach(Task):
         return self.model_copy(update={"count": None, "duration_s": most_s, "timeout_s": most_s})
 
     @model_validator(mode="after")
-    def _ends_before_its_timeout(self) -> Self:
+    def _check_timeout(self) -> Self:
         if self.duration_s is not None and self.duration_s > self.timeout_s:
             raise invalid(
                 f"duration_s = {self.duration_s:g} is longer than timeout_s = {self.timeout_s:g}", "duration_s"
@@ -286,7 +286,7 @@ class Reach(Task):
         return self
 
     @model_validator(mode="after")
-    def _time_for_every_target(self) -> Self:
+    def _check_dwell_time(self) -> Self:
         limit, targets = self.duration_s or self.timeout_s, self.count or 1
         if targets * self.dwell_s >= limit:
             subject = "a target" if targets == 1 else f"each of {targets} targets"
@@ -295,7 +295,7 @@ class Reach(Task):
         return self
 
     @model_validator(mode="after")
-    def _targets_apart(self) -> Self:
+    def _check_target_distances(self) -> Self:
         for index, (target, other) in enumerate(pairwise((*self.targets_mm, self.targets_mm[0])), start=1):
             distance = math.dist(target, other)
             if distance <= 2 * self.radius_mm:
