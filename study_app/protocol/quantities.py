@@ -1,6 +1,6 @@
-"""Quantities by name, in words and with units: the one table that lab, reports and figures read.
+"""Quantities by name, with labels and units: the table that lab, reports and figures share.
 
-Names are ``table.field``, as ``haptics.model.overrides`` takes them; the parameters of an effect are in its descriptor.
+Names are ``table.field``, as in ``haptics.model.overrides``; the parameters of an effect are in its descriptor.
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ from study_app.number_text import exact_text
 
 MAX_FORCE_N: Final = 8.0
 _P = Parameter
-_OF_THE_SCENE: Final = {
-    it.name: it
-    for it in (
+_SCENE_QUANTITIES: Final = {
+    parameter.name: parameter
+    for parameter in (
         _P("condition.delay_ms", "Visual delay", unit="ms"),
         _P("condition.force_delay_ms", "Force delay", unit="ms"),
         _P("condition.force_jitter_ms", "Force jitter", unit="ms"),
@@ -81,76 +81,81 @@ _OF_THE_SCENE: Final = {
         _P("motion.acceleration_mps2", "Hardest", unit="m/s²", least=0.1, most=200.0, logarithmic=True, decimals=1),
     )
 }
-_OF_A_SESSION: Final = frozenset({"scene", "velocity", "knee", "accuracy", "motion"})
-"""Tables whose numbers hold for all liquids."""
-QUANTITIES: Final = _OF_THE_SCENE | {it.name: it for effect in EFFECTS for it in effect.controls}
+_SESSION_TABLES: Final = frozenset({"scene", "velocity", "knee", "accuracy", "motion"})
+"""Tables whose numbers apply to all liquids."""
+QUANTITIES: Final = _SCENE_QUANTITIES | {
+    parameter.name: parameter for effect in EFFECTS for parameter in effect.controls
+}
 
 
 def quantity(name: str) -> Parameter:
-    """Return the varied quantity: ``table.field``, or a field of the first table that has it."""
-    for known, row in QUANTITIES.items():
+    """Return a quantity by name: ``table.field``, or a field, which means that of the first table that has it.
+
+    Raises KeyError if there is none.
+    """
+    for known, parameter in QUANTITIES.items():
         if name in {known, known.partition(".")[2]}:
-            return row
+            return parameter
     raise KeyError(name)
 
 
 def can_vary(name: str) -> bool:
-    """Return whether a number belongs to a condition: to its liquid, region, ball or delay."""
+    """Return whether a number belongs to a condition (its liquid, region, ball or delays), so that it can be varied."""
     return any(
-        name in {known, known.partition(".")[2]} for known in QUANTITIES if _table_name(known) not in _OF_A_SESSION
+        name in {known, known.partition(".")[2]} for known in QUANTITIES if _table_name(known) not in _SESSION_TABLES
     )
 
 
 def quantity_words(name: str) -> str:
     """Return the name of a quantity for use within a sentence, such as "viscosity" or "wake scaling"."""
-    row = quantity(name)
-    effect = NAMED.get(_table_name(row.name))
-    label = row.label if effect is None or effect.with_liquid else f"{effect.label} {row.label}"
+    parameter = quantity(name)
+    effect = NAMED.get(_table_name(parameter.name))
+    label = parameter.label if effect is None or effect.with_liquid else f"{effect.label} {parameter.label}"
     return label.lower()
 
 
 def liquid_words(liquid: Mapping[str, Any]) -> str:
-    """Return the density, the effects and all parameters that are not defaults of a liquid, from its JSON table."""
+    """Return the text on a liquid's density, effects and parameters other than defaults, from its JSON table."""
     damping, viscosity, effects = liquid["drag"].get("damping_nspm"), liquid.get("viscosity_pa_s"), liquid["effects"]
-    words = [f"{liquid['density_kg_m3']:g} kg/m³"] if damping is None else [f"damping {damping:g} N·s/m at the hand"]
-    words += [] if viscosity is None else [f"{viscosity:g} Pa·s"]
+    phrases = [f"{liquid['density_kg_m3']:g} kg/m³"] if damping is None else [f"damping {damping:g} N·s/m at the hand"]
+    phrases += [] if viscosity is None else [f"{viscosity:g} Pa·s"]
     for effect in EFFECTS:
         if effect.name == "drag":
-            words += [f"drag law: {liquid['drag']['law']}"] if effect.name in effects else []
+            phrases += [f"drag law: {liquid['drag']['law']}"] if effect.name in effects else []
             continue
         is_named, table = effect.name in effects, liquid.get(effect.name)
         values = ""
         if table is not None and (is_named or (effects == "auto" and effect.automatic)):
-            values = ", ".join(_parameter_words(effect.name, table, effect.model))
+            values = ", ".join(_parameter_texts(effect.name, table, effect.model))
         if is_named or values:
-            words.append(f"{effect.label[0].lower()}{effect.label[1:]}{f' ({values})' if values else ''}")
+            phrases.append(f"{effect.label[0].lower()}{effect.label[1:]}{f' ({values})' if values else ''}")
     region = liquid.get("region") or {"kind": "everywhere"}
     if region["kind"] != "everywhere":
-        words.append(f"in a {region['kind']} ({', '.join(_parameter_words('region', region))})")
+        phrases.append(f"in a {region['kind']} ({', '.join(_parameter_texts('region', region))})")
     if body := liquid.get("body"):
-        words.append(f"with its own ball ({', '.join(_parameter_words('body', body))})")
-    return ", ".join([*words, *(["effects selected automatically by size"] if effects == "auto" else [])])
+        phrases.append(f"with its own ball ({', '.join(_parameter_texts('body', body))})")
+    return ", ".join([*phrases, *(["effects selected automatically by size"] if effects == "auto" else [])])
 
 
-def _parameter_words(table: str, values: Mapping[str, Any], defaults: Any = None) -> Iterator[str]:
-    """Yield the name, value and SI unit of each parameter in a table that is not the default of its model.
+def _parameter_texts(table: str, values: Mapping[str, Any], defaults: Any = None) -> Iterator[str]:
+    """Yield name, value and SI unit of each parameter in a table that is not the default of its model.
 
-    Tables of one of several kinds are given in full, and the exponent of a wake always.
+    Tables with a kind are listed completely, and an exponent is always listed.
     """
     for name, value in values.items():
-        row = QUANTITIES.get(f"{table}.{name}")
-        if row is None or value is None:
+        parameter = QUANTITIES.get(f"{table}.{name}")
+        if parameter is None or value is None:
             continue
         is_default = defaults is not None and "kind" not in values and defaults.model_fields[name].default == value
         if is_default and name != "exponent":
             continue
-        if row.choices:
-            text = dict(row.choices).get(value, str(value))
+        if parameter.choices:
+            text = dict(parameter.choices).get(value, str(value))
         elif isinstance(value, list | tuple):
             text = f"({', '.join(map(exact_text, value))})"
         else:
             text = exact_text(value)
-        yield f"{row.label[0].lower()}{row.label[1:]} {text} {row.unit}".rstrip()
+        yield f"{parameter.label[0].lower()}{parameter.label[1:]} {text} {parameter.unit}".rstrip()
 
 
 def _table_name(name: str) -> str:

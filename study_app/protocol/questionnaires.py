@@ -1,4 +1,4 @@
-"""Questionnaires: questions that are answered together, standard ones, and the scores computed from the answers."""
+"""Questionnaires: questions that are answered together, standard questionnaires, and scores of the answers."""
 
 from __future__ import annotations
 
@@ -55,8 +55,8 @@ class Score(Table):
     ) -> float | None:
         """Return a score; None if a required answer is missing.
 
-        ``answers`` are by item the number it was answered with, or the option that was chosen; ``bounds`` its smallest
-        and largest answer, for reversed items.
+        ``answers`` has the number or the chosen option of each item, ``bounds`` its smallest and largest answer, which
+        reversed items need.
         """
         if any(name not in answers for name in (*self.items, *self.weights_from)):
             return None
@@ -79,7 +79,7 @@ class Score(Table):
     def range_of(self, bounds: Mapping[str, tuple[float, float] | None]) -> tuple[float, float] | None:
         """Return the lowest and the highest possible score; None if an item or a weighted sum has no bounds.
 
-        ``bounds`` are each item's smallest and largest answer.
+        ``bounds`` has the smallest and the largest answer of each item.
         """
         ends = [bounds.get(name) for name in self.items]
         known = [pair for pair in ends if pair is not None]
@@ -123,7 +123,7 @@ class Questionnaire(Table):
         return tuple(item for item in self.items if isinstance(item, Statement))
 
     def item(self, item_id: str) -> Question:
-        """Return the item with an id (KeyError if there is none)."""
+        """Return the item with an ID; raise KeyError if there is none."""
         return self._items_by_id[item_id]
 
     @cached_property
@@ -157,12 +157,12 @@ class Instrument(NamedTuple):
 
     @property
     def table(self) -> Mapping[str, Any]:
-        """The content of its file (OSError if there is none)."""
+        """The content of its file; raises OSError if there is none."""
         return _instrument_table(self.name)
 
     @property
     def published_name(self) -> str:
-        """The name under which it is published, which is its heading where it has no title."""
+        """The name under which it was published, which is also the default heading."""
         return self.name.upper().removesuffix("-WEIGHTED")
 
     def scale_name(self, scale: str) -> str:
@@ -170,10 +170,10 @@ class Instrument(NamedTuple):
         return f"{self.name.replace('-', '_')}_{scale}"
 
     def tables_in(self, languages: tuple[str, ...]) -> tuple[dict[str, Any], dict[str, Any]]:
-        """Return the table and scales that a study needs for it, in full if texts are missing."""
+        """Return the table and the scales to add to a study; they include its texts if a language lacks some."""
         table: dict[str, Any] = {"instrument": self.name}
-        filled, lacking = _fill_in((), table, languages, {})
-        if not lacking:
+        filled, faults = _fill_in((), table, languages, {})
+        if not faults:
             return table, {}
         scales = {
             self.scale_name(name): _merge_table({"labels": scale.get("labels", {})}, {}, languages)
@@ -186,24 +186,24 @@ class Instrument(NamedTuple):
 def with_instruments(document: Mapping[str, Any]) -> tuple[dict[str, Any], list[Fault]]:
     """Return a study's document with standard questionnaires filled in, and faults for missing parts.
 
-    The study's own keys and texts override the known ones, key by key and language by language.
+    The study's own keys and texts override those of the instrument, key by key and language by language.
     """
     completed, faults = dict(document), list[Fault]()
     tables = document.get("questionnaires")
     if not isinstance(tables, Mapping):
         return completed, faults
     languages = tuple(name for _, name in entries(document, "study.languages.*") if isinstance(name, str))
-    written = document.get("scales", {})
-    filled, scales = dict(tables), dict(written) if isinstance(written, Mapping) else {}
+    stated_scales = document.get("scales", {})
+    filled, scales = dict(tables), dict(stated_scales) if isinstance(stated_scales, Mapping) else {}
     for name, table in tables.items():
         if not isinstance(table, Mapping) or "instrument" not in table:
             continue
         if table["instrument"] in Instrument.names():
-            filled[name], lacking = _fill_in(("questionnaires", name), table, languages, scales)
-            faults += lacking
+            filled[name], missing_faults = _fill_in(("questionnaires", name), table, languages, scales)
+            faults += missing_faults
         else:
-            path, wrong = ("questionnaires", name, "instrument"), str(table["instrument"])
-            faults.append(unknown_name(path, f'there is no instrument "{wrong}"', wrong, Instrument.names()))
+            path, unknown = ("questionnaires", name, "instrument"), str(table["instrument"])
+            faults.append(unknown_name(path, f'there is no instrument "{unknown}"', unknown, Instrument.names()))
     return {**completed, "questionnaires": filled, **({"scales": scales} if scales else {})}, faults
 
 
@@ -211,97 +211,101 @@ def _fill_in(
     place: Path, table: Mapping[str, Any], languages: tuple[str, ...], scales: dict[str, Any]
 ) -> tuple[dict[str, Any], list[Fault]]:
     """Return a questionnaire completed from its instrument, and faults; its scales are added to ``scales``."""
-    of = str(table["instrument"])
-    standard = Instrument(of)
+    instrument = str(table["instrument"])
+    standard = Instrument(instrument)
     source = standard.table
     known = {item["id"]: item for item in source["items"]}
-    own = _tables_by_id(table, "items")
+    own_items = _tables_by_id(table, "items")
     faults = [
-        unknown_name((*place, *path, "id"), f'"{name}" is not an item of {of}', name, known)
-        for name, (path, _) in own.items()
+        unknown_name((*place, *path, "id"), f'"{name}" is not an item of {instrument}', name, known)
+        for name, (path, _) in own_items.items()
         if name not in known
     ]
-    unwritten = {language: list[tuple[str, str]]() for language in languages}  # the missing texts and their owners
+    # (key, owner) of texts that neither has
+    missing_by_language = {language: list[tuple[str, str]]() for language in languages}
 
-    def ask(path: Path | None, thing: str, made: Mapping[str, Any], *keys: str) -> None:
-        """Record the languages in which texts of a table are missing, at the table's place in the study."""
+    def note_missing_texts(path: Path | None, owner: str, part: Mapping[str, Any], *keys: str) -> None:
+        """Record the languages that lack texts of a table; ``path`` is None for a table of the instrument."""
         for key in keys:
-            text = made.get(key, {})
-            lacking = [code for code in languages if code not in text] if isinstance(text, Mapping) else []
+            text = part.get(key, {})
+            missing_codes = [code for code in languages if code not in text] if isinstance(text, Mapping) else []
             if path is None:
-                for language in lacking:
-                    unwritten[language].append((key, thing))
-            elif len(lacking) == len(languages):
+                for language in missing_codes:
+                    missing_by_language[language].append((key, owner))
+            elif len(missing_codes) == len(languages):
                 faults.append(Fault((*place, *path, key), "is missing", kind="missing"))
             else:
-                faults.extend(missing_text((*place, *path, key), language) for language in lacking)
+                faults.extend(missing_text((*place, *path, key), language) for language in missing_codes)
 
-    made = _merge_table({key: source[key] for key in ("title", "intro") if key in source}, table, languages)
-    if "title" not in table and set(made.get("title", ())) != set(languages):
-        made["title"] = dict.fromkeys(languages, standard.published_name)
-    ask(() if "intro" in table else None, of, made, "intro")
+    completed = _merge_table({key: source[key] for key in ("title", "intro") if key in source}, table, languages)
+    if "title" not in table and set(completed.get("title", ())) != set(languages):
+        completed["title"] = dict.fromkeys(languages, standard.published_name)
+    note_missing_texts(() if "intro" in table else None, instrument, completed, "intro")
     items = []
     for name, item in known.items():
-        path, written = own.get(name, (None, {}))
-        whole = _merge_table(item, written, languages)
-        if isinstance(short := whole.get("short", {}), Mapping):
-            whole["short"] = {**dict.fromkeys(languages, name.replace("_", " ").capitalize()), **short}
-        if "scale" in item and "scale" not in written:
-            whole["scale"] = standard.scale_name(item["scale"])
+        path, own_item = own_items.get(name, (None, {}))
+        merged_item = _merge_table(item, own_item, languages)
+        if isinstance(short := merged_item.get("short", {}), Mapping):
+            merged_item["short"] = {**dict.fromkeys(languages, name.replace("_", " ").capitalize()), **short}
+        if "scale" in item and "scale" not in own_item:
+            merged_item["scale"] = standard.scale_name(item["scale"])
         kind = item.get("kind", STATEMENT)
-        if whole.get("kind", kind) != kind:
-            fault = f'must be "{kind}", as in {of}'
+        if merged_item.get("kind", kind) != kind:
+            fault = f'must be "{kind}", as in {instrument}'
             faults.append(Fault((*place, *(path or ()), "kind"), fault, kind="surplus"))
-            whole["kind"] = kind
+            merged_item["kind"] = kind
         fields = KINDS[kind].model_fields
-        ask(path, name, whole, *(key for key in ("text", "low", "high") if key in fields))
-        if "options" in item and isinstance(written.get("options", ()), list | tuple):
-            choices, possible = _tables_by_id(written, "options"), [option["id"] for option in item["options"]]
+        note_missing_texts(path, name, merged_item, *(key for key in ("text", "low", "high") if key in fields))
+        if "options" in item and isinstance(own_item.get("options", ()), list | tuple):
+            own_options, option_ids = _tables_by_id(own_item, "options"), [option["id"] for option in item["options"]]
             faults += [
                 unknown_name(
-                    (*place, *(path or ()), *where, "id"),
+                    (*place, *(path or ()), *option_path, "id"),
                     f'"{option_id}" is not an option of {name}',
                     option_id,
-                    possible,
+                    option_ids,
                 )
-                for option_id, (where, _) in choices.items()
-                if option_id not in possible
+                for option_id, (option_path, _) in own_options.items()
+                if option_id not in option_ids
             ]
-            whole["options"] = tuple(
-                _merge_table(option, choices.get(option["id"], ((), {}))[1], languages) for option in item["options"]
+            merged_item["options"] = tuple(
+                _merge_table(option, own_options.get(option["id"], ((), {}))[1], languages)
+                for option in item["options"]
             )
-            for option in whole["options"]:
-                if path is not None and option["id"] in choices:
-                    ask((*path, *choices[option["id"]][0]), name, option, "text")
+            for option in merged_item["options"]:
+                if path is not None and option["id"] in own_options:
+                    note_missing_texts((*path, *own_options[option["id"]][0]), name, option, "text")
                 else:
-                    ask(None, name, {"options": option.get("text", {})}, "options")
-        items.append(whole)
-    for scale, labelled in source.get("scales", {}).items():
+                    note_missing_texts(None, name, {"options": option.get("text", {})}, "options")
+        items.append(merged_item)
+    for scale, scale_table in source.get("scales", {}).items():
         own_name = standard.scale_name(scale)
-        known_labels = _merge_table({key: labelled[key] for key in ("labels",) if key in labelled}, {}, languages)
+        known_labels = _merge_table({key: scale_table[key] for key in ("labels",) if key in scale_table}, {}, languages)
         if own_name in scales and isinstance(scales[own_name], Mapping):
             scales[own_name] = {**scales[own_name], **_merge_table(known_labels, scales[own_name], languages)}
         elif set(known_labels.get("labels", ())) == set(languages):
             scales[own_name] = known_labels
         else:
-            ask(None, f"the {labelled['points']} points of [scales.{own_name}]", known_labels, "labels")
+            note_missing_texts(
+                None, f"the {scale_table['points']} points of [scales.{own_name}]", known_labels, "labels"
+            )
     faults += [
-        _unpublished_fault((*place, "instrument"), of, language, lacks)
-        for language, lacks in unwritten.items()
-        if lacks
+        _unpublished_fault((*place, "instrument"), instrument, language, missing)
+        for language, missing in missing_by_language.items()
+        if missing
     ]
     scores = {name: dict(score) for name, score in source["scores"].items()}
-    return {"scores": scores, **made, "items": tuple(items)}, faults
+    return {"scores": scores, **completed, "items": tuple(items)}, faults
 
 
-def _merge_table(known: Mapping[str, Any], own: Mapping[str, Any], languages: tuple[str, ...]) -> dict[str, Any]:
-    """Return the known part of a table in these languages, overridden by the study's own keys."""
-    made = dict(known)
-    for key in made.keys() & set(_TEXTS):
-        made[key] = {language: known[key][language] for language in languages if language in known[key]}
+def _merge_table(published: Mapping[str, Any], own: Mapping[str, Any], languages: tuple[str, ...]) -> dict[str, Any]:
+    """Return an instrument's table in these languages, overridden by the study's own keys."""
+    merged = dict(published)
+    for key in merged.keys() & set(_TEXTS):
+        merged[key] = {language: published[key][language] for language in languages if language in published[key]}
     for key, value in own.items():
-        made[key] = {**made.get(key, {}), **value} if key in _TEXTS and isinstance(value, Mapping) else value
-    return {key: value for key, value in made.items() if value or key not in _TEXTS}
+        merged[key] = {**merged.get(key, {}), **value} if key in _TEXTS and isinstance(value, Mapping) else value
+    return {key: value for key, value in merged.items() if value or key not in _TEXTS}
 
 
 def _tables_by_id(table: Mapping[str, Any], key: str) -> dict[str, tuple[Path, Mapping[str, Any]]]:
@@ -313,23 +317,26 @@ def _tables_by_id(table: Mapping[str, Any], key: str) -> dict[str, tuple[Path, M
     }
 
 
-def _unpublished_fault(path: Path, of: str, language: str, lacks: Sequence[tuple[str, str]]) -> Fault:
-    """Return the fault that texts exist neither in the program nor in the study in a language."""
+def _unpublished_fault(path: Path, instrument: str, language: str, missing: Sequence[tuple[str, str]]) -> Fault:
+    """Return the fault that texts in a language exist neither in the program nor in the study."""
     keys: dict[str, list[str]] = {}
-    for key, thing in dict.fromkeys(lacks):
-        keys.setdefault(thing, []).append(key)
-    same = {tuple(texts): [thing for thing, other in keys.items() if other == texts] for texts in keys.values()}
+    for key, owner in dict.fromkeys(missing):
+        keys.setdefault(owner, []).append(key)
+    owners_by_keys = {
+        tuple(texts): [owner for owner, other in keys.items() if other == texts] for texts in keys.values()
+    }
     listed = "; ".join(
-        f"{', '.join(texts)} of {', '.join(names)}".removesuffix(f" of {of}") for texts, names in same.items()
+        f"{', '.join(texts)} of {', '.join(names)}".removesuffix(f" of {instrument}")
+        for texts, names in owners_by_keys.items()
     )
-    source = Instrument(of).table
+    source = Instrument(instrument).table
     translation = source.get("published", {}).get(language)
     published = f", although a translation has been published ({translation})" if translation else ""
-    why = (
-        f"the program does not include {of} in {language_name(language)}{published}"
+    reason = (
+        f"the program does not include {instrument} in {language_name(language)}{published}"
         if source["languages"]
-        else f"the licence of {of} does not permit its texts to be included"
+        else f"the licence of {instrument} does not permit its texts to be included"
     )
-    message = f"{why}: write {listed}"
+    message = f"{reason}: write {listed}"
     hint = f'items = [{{ id = "{source["items"][0]["id"]}", text = {{ {language} = "…" }} }}, …]'
     return Fault(path, message, hint, missing_language=language)

@@ -28,7 +28,7 @@ from study_app.protocol.source.table import (
 from study_app.protocol.wording.languages import language_name
 
 POINTS = 7
-"""Of the scale of statements."""
+"""Number of points of the scale for statements."""
 
 FEWEST_POINTS, MOST_POINTS = 2, 11
 
@@ -47,13 +47,13 @@ class Scale(Table):
     @classmethod
     def _check_label_counts(cls, labels: Any) -> Any:
         """Reject a language with fewer labels than another one."""
-        listed = labels.items() if isinstance(labels, Mapping) else ()
-        tuples = {code: texts for code, texts in listed if isinstance(texts, tuple)}
-        most = max(map(len, tuples.values()), default=0)
+        items = labels.items() if isinstance(labels, Mapping) else ()
+        tuples = {code: texts for code, texts in items if isinstance(texts, tuple)}
+        count = max(map(len, tuples.values()), default=0)
         for code, texts in tuples.items():
-            if len(texts) < most:
-                written = sum(isinstance(text, str) and bool(text.strip()) for text in texts)
-                message = f"lacks {most - written} of {most} labels in {language_name(code)}"
+            if len(texts) < count:
+                filled = sum(isinstance(text, str) and bool(text.strip()) for text in texts)
+                message = f"lacks {count - filled} of {count} labels in {language_name(code)}"
                 raise invalid(message, code, hint="the scale must have the same number of points in every language")
         return labels
 
@@ -63,7 +63,7 @@ class Scale(Table):
 
 
 Value: TypeAlias = int | float | str | tuple[str, ...] | None
-"""An answer: a number, a text, an option or several; None where the participant could not judge."""
+"""An answer: a number, a text, one option or several; None if the participant could not judge."""
 
 
 class ShowIf(Table):
@@ -80,7 +80,7 @@ class ShowIf(Table):
 
     @property
     def permitted(self) -> tuple[int | float | str, ...]:
-        """The answers that show the question; empty if bounds do."""
+        """The answers for which the question is shown; empty if it has bounds instead."""
         return self.values if isinstance(self.values, tuple) else () if self.values is None else (self.values,)
 
     def holds(self, answer: Value) -> bool:
@@ -93,14 +93,14 @@ class ShowIf(Table):
 
     @model_validator(mode="after")
     def _check_rule(self) -> Self:
-        bounded = self.at_least is not None or self.at_most is not None
-        if (self.values is not None) == bounded:
+        has_bounds = self.at_least is not None or self.at_most is not None
+        if (self.values is not None) == has_bounds:
             raise invalid('needs the key "is", or one or both of "at_least" and "at_most"', "is")
         return self
 
 
 def shown_questions(items: Iterable[Question | ItemView], answers: Mapping[str, Value]) -> tuple[str, ...]:
-    """Return the ids of the shown items in order; ``answers`` are those given so far.
+    """Return the IDs of the shown items in order; ``answers`` are the current answers by item.
 
     Answers to hidden items are ignored.
     """
@@ -115,24 +115,24 @@ def shown_questions(items: Iterable[Question | ItemView], answers: Mapping[str, 
 Draw: TypeAlias = Callable[[], float]
 ValueType: TypeAlias = Literal["integer", "number", "text"]
 
-_MOST_LETTERS: Final = 5000
-"""No answer is longer."""
+_MAX_CHARACTERS: Final = 5000
+"""Greatest number of characters of an answer."""
 POSITIVE: Final = 1e-9
-"""The smallest number of a question whose numbers are above 0."""
+"""The minimum of a question that permits only numbers above 0."""
 
-_MOST: Final = 1e12
-"""No greater number can be given as an answer."""
-_Bound: TypeAlias = Annotated[float, within(-_MOST, _MOST, "answers cannot be larger")]
+_MAX_NUMBER: Final = 1e12
+"""Greatest number that an answer can be."""
+_Bound: TypeAlias = Annotated[float, within(-_MAX_NUMBER, _MAX_NUMBER, "answers cannot be larger")]
 
 _OPINION_POINTS = 7
-"""Opinions of the simulated observer go from 1 to so many points."""
+"""A simulated observer's opinions range from 1 to this number."""
 
 
 @dataclass(frozen=True, slots=True)
 class ItemView:
     """One question of a form as shown: ``number`` counts from 1 in the order of presentation.
 
-    ``show_if`` says when it is shown, None always.
+    ``show_if`` is the condition under which it is shown, None for always.
     """
 
     widget: ClassVar[str] = ""
@@ -153,13 +153,13 @@ class ItemView:
         raise NotImplementedError
 
     def nearby(self, answer: Value) -> Value:
-        """Return the initial answer of a person who then changes it to ``answer``; the same if there is no other."""
+        """Return an answer that a person might give before ``answer``; the same one if there is no other."""
         return answer
 
 
 @dataclass(frozen=True, slots=True)
 class Context:
-    """The context of a question: the protocol's scales, its questionnaire's own, and the participant's language."""
+    """The context of a question: the protocol's scales, the questionnaire's scale, and the participant's language."""
 
     scales: Mapping[str, Scale]
     scale: str | None
@@ -199,7 +199,7 @@ class Question(Table):
         raise NotImplementedError
 
     def problem(self, answer: Value, context: Context) -> str | None:
-        """Return why a value is not a valid answer, as a sentence; None if it is."""
+        """Return a sentence on why a value is not a valid answer; None if it is valid."""
         raise NotImplementedError
 
     def bounds(self, context: Context) -> tuple[float, float] | None:
@@ -207,51 +207,51 @@ class Question(Table):
         return None
 
     def levels(self, context: Context) -> dict[str, str]:
-        """Return all possible answers in order, if there are few: table value and label."""
+        """Return all possible answers in order, as table value and label; empty if there are too many."""
         return {}
 
     @property
     def names_several(self) -> bool:
-        """Whether one table cell contains several of `levels`, separated by spaces."""
+        """Whether a table cell may contain several of the `levels`, separated by spaces."""
         return False
 
     def counted(self, response: str) -> tuple[str, ...]:
-        """Return the `levels` that an answer counts for; for a ranking only the first, for example."""
+        """Return the `levels` for which an answer counts; a ranking may count only for the first one."""
         return tuple(response.split()) if self.names_several else (response,)
 
-    def _shown(self, kind: type[_V], number: int, context: Context, **own: Any) -> _V:
-        """Return its view with the common fields and those of its kind."""
-        return kind(self.id, number, context.text(self.text), self.required, show_if=self.show_if, **own)
+    def _make_view(self, kind: type[_V], number: int, context: Context, **fields: Any) -> _V:
+        """Return the view of a kind with the common fields and its own ones."""
+        return kind(self.id, number, context.text(self.text), self.required, show_if=self.show_if, **fields)
 
 
 def plain_number(value: float) -> int | float:
-    """Return a number without binary rounding digits; whole numbers as integers."""
+    """Return a number rounded to nine decimals, as an integer if it is whole."""
     rounded = round(value, 9)
     return int(rounded) if rounded == int(rounded) else rounded
 
 
 def answer_problem(question: Question, answer: Value, context: Context) -> str | None:
-    """Return why a value is not a valid answer, as a sentence; None if it is."""
+    """Return a sentence on why a value is not a valid answer; None if it is valid."""
     if isinstance(answer, bool):
         return f"answer {answer} is neither a number nor text: specify a number or text"
     texts = answer if isinstance(answer, tuple) else (answer,) if isinstance(answer, str) else ()
-    if (letters := sum(map(len, texts))) > _MOST_LETTERS:
+    if (letters := sum(map(len, texts))) > _MAX_CHARACTERS:
         return (
-            f"an answer to {question.kind_id} {question.id} has {letters:,} characters: at most {_MOST_LETTERS:,} are "
-            "permitted"
+            f"an answer to {question.kind_id} {question.id} has {letters:,} characters: "
+            f"at most {_MAX_CHARACTERS:,} are permitted"
         )
     return question.problem(answer, context)
 
 
 def kind_id(kind: type[Question]) -> str:
-    """Return the id of a kind; a question without ``kind`` is a statement."""
+    """Return the ID of a kind of question; a question without a kind is a statement."""
     field_ = kind.model_fields.get("kind")
     return "statement" if field_ is None else str(field_.default)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RatingView(ItemView):
-    """A rating as shown: ``labels`` name the points, lowest first; ``cannot_judge`` the answer off the scale."""
+    """A rating as shown: ``labels`` are those of the points, lowest first; ``cannot_judge`` is the other answer."""
 
     widget: ClassVar[str] = "rating"
 
@@ -264,8 +264,8 @@ class RatingView(ItemView):
 
     def simulated(self, opinion: float, draw: Draw) -> Value:
         points = len(self.labels)
-        place = opinion if points == _OPINION_POINTS else 1 + (opinion - 1) * (points - 1) / (_OPINION_POINTS - 1)
-        return min(points, max(1, math.floor(place + 0.5)))
+        position = opinion if points == _OPINION_POINTS else 1 + (opinion - 1) * (points - 1) / (_OPINION_POINTS - 1)
+        return min(points, max(1, math.floor(position + 0.5)))
 
     def nearby(self, answer: Value) -> Value:
         if not isinstance(answer, int):
@@ -288,7 +288,7 @@ class Rated(Question):
         scale = self.scale_of(context)
         off_scale = None if scale.cannot_judge is None else context.text(scale.cannot_judge)
         labels = scale.labels[context.language]
-        return self._shown(RatingView, number, context, labels=labels, cannot_judge=off_scale)
+        return self._make_view(RatingView, number, context, labels=labels, cannot_judge=off_scale)
 
     def problem(self, answer: Value, context: Context) -> str | None:
         scale = self.scale_of(context)
@@ -385,7 +385,7 @@ class Choice(Question):
 
     def view(self, number: int, context: Context) -> ItemView:
         options = tuple(self.levels(context).items())
-        return self._shown(ChoiceView, number, context, options=options, several=self.several)
+        return self._make_view(ChoiceView, number, context, options=options, several=self.several)
 
     def problem(self, answer: Value, context: Context) -> str | None:
         ids = [option.id for option in self.options]
@@ -419,7 +419,7 @@ class NumberView(ItemView):
         return (
             (self.least is None or number >= self.least)
             and (self.most is None or number <= self.most)
-            and abs(number) <= _MOST
+            and abs(number) <= _MAX_NUMBER
             and (not self.whole or number == math.floor(number))
         )
 
@@ -427,8 +427,8 @@ class NumberView(ItemView):
         """Return a number within its bounds, or within 0 to 100 without bounds."""
         least = self.least if self.least is not None else min(0.0, self.most if self.most is not None else 0.0)
         most = self.most if self.most is not None else least + 100.0
-        share = min(1.0, max(0.0, (opinion - 1) / (_OPINION_POINTS - 1)))
-        number = least + share * (most - least)
+        fraction = min(1.0, max(0.0, (opinion - 1) / (_OPINION_POINTS - 1)))
+        number = least + fraction * (most - least)
         if self.whole:
             return min(math.floor(most), max(math.ceil(least), round(number)))
         return plain_number(min(most, max(least, round(number, 3))))
@@ -463,7 +463,7 @@ class Number(Question):
     def view(self, number: int, context: Context) -> NumberView:
         unit = "" if self.unit is None else context.text(self.unit)
         limits = {"least": self.least, "most": self.most, "whole": self.whole}
-        return self._shown(NumberView, number, context, unit=unit, **limits)
+        return self._make_view(NumberView, number, context, unit=unit, **limits)
 
     def problem(self, answer: Value, context: Context) -> str | None:
         if isinstance(answer, int | float) and self.view(0, context).permits(answer):
@@ -476,7 +476,7 @@ class Number(Question):
         return None if self.least is None or self.most is None else (self.least, self.most)
 
 
-_MOST_STEPS = 10_000
+_MAX_STEPS = 10_000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -502,8 +502,8 @@ class SliderView(ItemView):
         return plain_number(self.least + step * self.step)
 
     def simulated(self, opinion: float, draw: Draw) -> Value:
-        share = min(1.0, max(0.0, (opinion - 1) / (_OPINION_POINTS - 1)))
-        return self.at(round(share * self.steps))
+        fraction = min(1.0, max(0.0, (opinion - 1) / (_OPINION_POINTS - 1)))
+        return self.at(round(fraction * self.steps))
 
 
 class Slider(Question):
@@ -528,8 +528,8 @@ class Slider(Question):
         if self.most <= self.least:
             raise invalid(f"{self.most:g} must be greater than from = {self.least:g}", "to")
         steps = (self.most - self.least) / self.step
-        if abs(steps - round(steps)) > 1e-6 or not 1 <= round(steps) <= _MOST_STEPS:
-            permitted = f"a whole number from 1 to {_MOST_STEPS}"
+        if abs(steps - round(steps)) > 1e-6 or not 1 <= round(steps) <= _MAX_STEPS:
+            permitted = f"a whole number from 1 to {_MAX_STEPS}"
             raise invalid(
                 f"is {self.step:g}, which gives {steps:g} steps from end to end; this number must be {permitted}",
                 "step",
@@ -539,7 +539,7 @@ class Slider(Question):
     def view(self, number: int, context: Context) -> ItemView:
         ends = {"low": context.text(self.low), "high": context.text(self.high)}
         numbers = {"least": self.least, "most": self.most, "step": self.step}
-        return self._shown(SliderView, number, context, **ends, **numbers)
+        return self._make_view(SliderView, number, context, **ends, **numbers)
 
     def problem(self, answer: Value, context: Context) -> str | None:
         if isinstance(answer, int | float) and self.least <= answer <= self.most:
@@ -578,10 +578,10 @@ class Text(Question):
 
     kind: Literal["text"] = "text"
     lines: int = Field(default=1, ge=1, le=10, description="Height of the field, in lines.")
-    longest: int = Field(default=500, ge=1, le=_MOST_LETTERS, description="Maximum number of characters.")
+    longest: int = Field(default=500, ge=1, le=_MAX_CHARACTERS, description="Maximum number of characters.")
 
     def view(self, number: int, context: Context) -> ItemView:
-        return self._shown(TextView, number, context, lines=self.lines, longest=self.longest)
+        return self._make_view(TextView, number, context, lines=self.lines, longest=self.longest)
 
     def problem(self, answer: Value, context: Context) -> str | None:
         if not isinstance(answer, str) or not answer.strip():
@@ -608,7 +608,7 @@ class RecordedQuestion(Question):
         return self.kind
 
     def view(self, number: int, context: Context) -> ItemView:
-        return self._shown(TextView, number, context)
+        return self._make_view(TextView, number, context)
 
     def problem(self, answer: Value, context: Context) -> str | None:
         return None
@@ -626,7 +626,7 @@ KINDS: Final = Registry[type[Question]](
         "problem": Returns("a sentence or None", lambda value: value is None or isinstance(value, str)),
     },
 )
-"""Every kind by its id; a question of a protocol file is of one of these."""
+"""The kinds of questions by ID."""
 
 
 def _kind_of(value: Any) -> str:
@@ -651,9 +651,9 @@ else:
 
 
 def question_of(table: Mapping[str, Any]) -> Question:
-    """Return a receipt's question (KeyError: unknown kind, ValueError: invalid for its kind).
+    """Return a receipt's question; one of a plug-in that is not installed is a `RecordedQuestion`.
 
-    A question of a plug-in that is not installed is a `RecordedQuestion`.
+    Raises KeyError if its kind is unknown, and ValueError if it is invalid.
     """
     kind = _kind_of(table)
     return (RecordedQuestion if ":" in kind and kind not in KINDS else KINDS[kind]).model_validate(table)

@@ -1,19 +1,19 @@
-"""SIMULATED answers: people who know what was felt and seen in a trial, never which condition or level it was.
+"""SIMULATED answers of people who know the forces and delays of a trial, but never its condition or level.
 
 For rehearsals, power analysis and validation; never evidence about people, and marked as simulated wherever stored.
 
-*Statements* are answered by a `Rater`, who turns a few features of the trial into an opinion from 1 to 7 for the
-statements it knows, and adds the person's own leaning and some noise. To others it answers near the middle. Where the
-thesis reports something (Rek 2024, §5: honey and water recognised, honey confused with tar, light oil not recognised;
-delays noticed from about 125 ms) the opinions agree with it.
+*Statements* are answered by a `Rater`, who forms an opinion from 1 to 7 on known statements from a few features of the
+trial, and adds response bias and noise. Answers to other statements are near the middle. Opinions agree with the
+results of the thesis where it reports any (Rek 2024, §5: honey and water recognised, honey confused with tar, light oil
+not recognised; delays noticed from about 125 ms).
 
-*Trials of intervals* are answered by an `Observer`, who compares resistances (mean force over speed) or delays, with
-Gaussian noise: in proportion to the resistance (Weber's law), of constant spread for a delay. Observers are people, who
-differ in more than their threshold (`people.Person`). Estimates follow a power law with exponent 1/2 (Stevens 1957,
-Psychological Review 64, 153) unless another is planted.
+*Trials of intervals* are answered by an `Observer`, who compares resistances (mean force over speed) or delays with
+Gaussian noise: proportional to the resistance (Weber's law), constant for a delay. Observers are people, who differ in
+more than their threshold (`people.Person`). Estimates follow a power law with exponent 1/2 (Stevens 1957, Psychological
+Review 64, 153), unless another exponent is set.
 
 Shapes and constants are plausible, not measured **[choice]**. Only sums, products, quotients and square roots of
-uniform numbers are used, but for exponents, so that answers are the same on every machine.
+uniform numbers are used, except for exponents, so that answers are the same on every machine.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ from study_app.psychophysics.people import ASSUMED, UNIFORM, Person, draw_person
 _NO_OPINION: Final = 4.0
 _LEAST_SPEED_MPS: Final = 0.01
 _MODULUS: Final = 10.0
-"""The number that the first stimulus is given."""
+"""The number assigned to the first stimulus."""
 _Z_75: Final = 0.6745
 
 
@@ -99,9 +99,9 @@ LEAST_NOISE, NOISE_RANGE, MEAN_NOISE = 0.5, 0.3, 0.65
 
 
 def rater(draw: Draw, participants: SimulatedParticipants = REHEARSED) -> Rater:
-    """Return one of the participants, drawn with ``draw`` (uniform numbers in [0, 1)).
+    """Return a random participant, drawn with ``draw`` (uniform numbers in [0, 1)).
 
-    Their noise is uniformly distributed from 77 % to 123 % of the mean.
+    The noise of participants is uniformly distributed from 77 % to 123 % of the mean.
     """
     return Rater(
         leaning=participants.bias_sd * normal(draw),
@@ -113,15 +113,15 @@ def rater(draw: Draw, participants: SimulatedParticipants = REHEARSED) -> Rater:
 
 def rate(items: Iterable[str], trial: TrialFeatures, person: Rater, draw: Draw) -> dict[str, int]:
     """Return an answer from 1 to 7 for each item id, in the given order."""
-    judged = judgements(items, trial, person, draw)
-    return {item: min(POINTS, max(1, math.floor(points + 0.5))) for item, points in judged.items()}
+    points_by_item = judgements(items, trial, person, draw)
+    return {item: min(POINTS, max(1, math.floor(points + 0.5))) for item, points in points_by_item.items()}
 
 
 def judgements(items: Iterable[str], trial: TrialFeatures, person: Rater, draw: Draw) -> dict[str, float]:
     """Return a person's unrounded answer to each item id, in the given order: from 1 to 7, or slightly beyond."""
-    asked = tuple(items)
-    thought = zip(asked, _opinions(asked, trial, person), strict=True)
-    return {item: opinion + person.leaning + person.noise * normal(draw) for item, opinion in thought}
+    item_ids = tuple(items)
+    opinions_by_item = zip(item_ids, _opinions(item_ids, trial, person), strict=True)
+    return {item: opinion + person.leaning + person.noise * normal(draw) for item, opinion in opinions_by_item}
 
 
 def _opinions(items: Iterable[str], trial: TrialFeatures, person: Rater) -> list[float]:
@@ -146,14 +146,14 @@ class _Impression:
 
 
 def _rise(value: float, middle: float, width: float) -> float:
-    """Return 0 … 1, one half at ``middle``, and 0.15 and 0.85 one ``width`` away from it."""
+    """Return a sigmoid from 0 to 1: one half at ``middle``, 0.15 and 0.85 one ``width`` below and above it."""
     x = (value - middle) / width
     return 0.5 + 0.5 * x / math.sqrt(1 + x * x)
 
 
 def _impression(trial: TrialFeatures, person: Rater) -> _Impression:
     force = trial.force_mean_n * person.strength
-    resistance = force / max(trial.speed_rms_mps, _LEAST_SPEED_MPS) ** 2  # quadratic drag: the same at any speed
+    resistance = force / max(trial.speed_rms_mps, _LEAST_SPEED_MPS) ** 2  # independent of speed for quadratic drag
     peak = trial.force_peak_n / max(trial.force_mean_n, 0.05)
     return _Impression(
         present=_rise(force, 0.15, 0.1),
@@ -169,7 +169,7 @@ def _impression(trial: TrialFeatures, person: Rater) -> _Impression:
 
 
 OPINIONS: Final[dict[str, Callable[[_Impression], float]]] = {
-    # what was felt
+    # statements about the force
     "feels_liquid": lambda trial: 2.0 + 3.8 * trial.present - 1.5 * trial.rough,
     "immersive": lambda trial: 3.0 + 2.4 * trial.present - 1.5 * trial.rough,
     "strength": lambda trial: 2.5 + 3.0 * trial.present - 0.8 * trial.abrupt - 0.5 * trial.rough,
@@ -179,14 +179,14 @@ OPINIONS: Final[dict[str, Callable[[_Impression], float]]] = {
     "like_slime": lambda trial: 2.2 + 1.8 * trial.thick,
     "like_oil": lambda trial: 2.6 + 1.2 * (1 - trial.thick),
     "like_tar": lambda trial: 1.4 + 3.4 * trial.thick * (1 - trial.carried),
-    # what was seen
+    # statements about the delay
     "different": lambda trial: 1.8 + 4.4 * trial.noticed,
     "harder": lambda trial: 1.7 + 3.8 * trial.bothered,
     "detracts": lambda trial: 1.7 + 3.2 * trial.bothered,
     "unusable": lambda trial: 1.4 + 2.6 * trial.lost,
     "comfortable": lambda trial: 6.0 - 1.4 * trial.lost - 0.4 * trial.bothered,
 }
-"""Item id → the opinion from 1 to 7; statements that people add get `_NO_OPINION`."""
+"""The opinion from 1 to 7 on each known item, by ID; other statements get `_NO_OPINION`."""
 
 
 def simulate_ratings(
@@ -212,13 +212,16 @@ def simulate_ratings(
     tuple of array
         Opinions, and noise, both (repetitions, conditions, items) [points].
     """
-    drawn = random.random((repetitions, len(trials))).tolist()
-    thought = [
-        [_opinions(items, known[int(len(known) * part)], person) for known, part in zip(trials, parts, strict=True)]
-        for parts in drawn
+    random_numbers = random.random((repetitions, len(trials))).tolist()
+    opinions = [
+        [
+            _opinions(items, condition_trials[int(len(condition_trials) * number)], person)
+            for condition_trials, number in zip(trials, numbers, strict=True)
+        ]
+        for numbers in random_numbers
     ]
     noise = random.random((repetitions, len(trials), len(items), UNIFORM)).sum(axis=-1) - UNIFORM / 2
-    return np.array(thought), person.noise * noise
+    return np.array(opinions), person.noise * noise
 
 
 @dataclass(frozen=True, slots=True)
@@ -315,31 +318,34 @@ class Comparison:
 
     def choose(self, design: Design, sensed: Sequence[float], mean: float, draw: Draw, course: Course = _MIDDLE) -> str:
         """Return the answer of a design with choices to the sensed values; ``mean`` is that of the block so far."""
-        taken: Sequence[float] = [self.noisy(one, draw) for one in self._apart(sensed, course)]
+        perceived: Sequence[float] = [self.noisy(value, draw) for value in self._scale_to_width_one(sensed, course)]
         if draw() < self.observer.person.lapse:
             return design.answers[int(len(design.answers) * draw())]
         if isinstance(design, ForcedChoice):
-            taken = self._add_biases(design, taken, course)
-        return design.simulated(taken, mean, self)
+            perceived = self._add_biases(design, perceived, course)
+        return design.simulated(perceived, mean, self)
 
-    def _apart(self, sensed: Sequence[float], course: Course) -> Sequence[float]:
-        """Return the values that an observer of width one would sense, one of which is the least."""
-        person, least = self.observer.person, (max if self.smallest else min)(sensed)
-        if (person.width, person.change) == (1.0, 1.0) or (least == 0.0 and not self.delays):
+    def _scale_to_width_one(self, sensed: Sequence[float], course: Course) -> Sequence[float]:
+        """Return the values that an observer with width 1 would have to sense to give the answers of this observer."""
+        person, smallest_value = self.observer.person, (max if self.smallest else min)(sensed)
+        if (person.width, person.change) == (1.0, 1.0) or (smallest_value == 0.0 and not self.delays):
             return sensed
-        threshold = self.observer.delay_jnd_s if self.delays else self.observer.weber_fraction * abs(least)
-        shares = [(one - least) / threshold for one in sensed]
-        return [least + threshold * math.copysign(person.sensed(abs(share), course.done), share) for share in shares]
+        threshold = self.observer.delay_jnd_s if self.delays else self.observer.weber_fraction * abs(smallest_value)
+        distances = [(value - smallest_value) / threshold for value in sensed]
+        return [
+            smallest_value + threshold * math.copysign(person.sensed(abs(distance), course.done), distance)
+            for distance in distances
+        ]
 
-    def _add_biases(self, design: Design, taken: Sequence[float], course: Course) -> Sequence[float]:
+    def _add_biases(self, design: Design, perceived: Sequence[float], course: Course) -> Sequence[float]:
         """Return the perceived values after biases towards the first interval and the last answer."""
         person, noise = self.observer.person, self.observer.delay_noise_s
         if not self.delays:
-            noise = self.observer.resistance_noise * sum(taken) / len(taken)
+            noise = self.observer.resistance_noise * sum(perceived) / len(perceived)
         unit = -math.sqrt(2) * noise if self.smallest else math.sqrt(2) * noise
         return [
-            one + unit * (person.criterion * (place == 0) + person.repeats * (answer == course.last))
-            for place, (answer, one) in enumerate(zip(design.answers, taken, strict=True))
+            value + unit * (person.criterion * (position == 0) + person.repeats * (answer == course.last))
+            for position, (answer, value) in enumerate(zip(design.answers, perceived, strict=True))
         ]
 
     def answer(
@@ -355,23 +361,23 @@ class Comparison:
 
         ``sensed`` is the compared quantity in each interval, ``before`` that in the block's previous trials.
         """
-        known = [*before, *sensed]
-        mean, first = sum(known) / len(known), known[0]
+        all_sensed = [*before, *sensed]
+        mean, first = sum(all_sensed) / len(all_sensed), all_sensed[0]
         if design.reply == "choice":
             return self.choose(design, sensed, mean, draw, course)
         if isinstance(design, Rated):
-            taken, points = self._perceive_last_interval(sensed, draw), protocol.scales[design.scale].points
-            ratio = taken / mean if mean > 0 and first > 0 else 1.0
+            perceived, points = self._perceive_last_interval(sensed, draw), protocol.scales[design.scale].points
+            ratio = perceived / mean if mean > 0 and first > 0 else 1.0
             return min(points, max(1, math.floor((points + 1) / 2 + (ratio - 1) * (points - 1) + 0.5)))
         if self.observer.estimates is not None and first > 0 and sensed[-1] > 0:
             exponent, spread = self.observer.estimates
             return _MODULUS * math.exp(exponent * math.log(sensed[-1] / first) + spread * normal(draw))
-        taken = self._perceive_last_interval(sensed, draw)
-        return _MODULUS * math.sqrt(max(taken / first if mean > 0 and first > 0 else 1.0, 0.0))
+        perceived = self._perceive_last_interval(sensed, draw)
+        return _MODULUS * math.sqrt(max(perceived / first if mean > 0 and first > 0 else 1.0, 0.0))
 
     def _perceive_last_interval(self, sensed: Sequence[float], draw: Draw) -> float:
         """Return the perceived value of the last interval; noise is drawn for every interval."""
-        return [self.noisy(one, draw) for one in sensed][-1]
+        return [self.noisy(value, draw) for value in sensed][-1]
 
 
 class SimulatedTrial(NamedTuple):
@@ -395,19 +401,19 @@ class SimulatedTrial(NamedTuple):
 
 
 def as_requested(presented: Stimulated) -> float:
-    """Return the compared quantity if the requested number is presented exactly: a delay [s], or the number."""
+    """Return the compared quantity of an interval that presents exactly the requested number: a delay [s], or it."""
     return presented.value / 1000 if presented.vary in DELAYS else presented.value
 
 
 def courses_of(schedule: Schedule) -> dict[int, float]:
-    """Return, by trial number, the fraction of its block that is done by then, from 0 to 1."""
+    """Return, by trial number, the fraction of the block (0 to 1) that is done at the trial."""
     blocks: dict[str, list[int]] = {}
     for trial in schedule.trials:
         blocks.setdefault(trial.block, []).append(trial.number)
     return {
-        number: place / (len(numbers) - 1) if len(numbers) > 1 else 0.5
+        number: position / (len(numbers) - 1) if len(numbers) > 1 else 0.5
         for numbers in blocks.values()
-        for place, number in enumerate(numbers)
+        for position, number in enumerate(numbers)
     }
 
 
@@ -437,35 +443,37 @@ def simulate_study(
     key = Key(draw_key(protocol, random), draw_secret(random))
     for person, observer in people.items():
         schedule = build_schedule(protocol, person, seed)
-        heard: dict[str, list[TrialResult]] = {}
+        results_by_block: dict[str, list[TrialResult]] = {}
         sensed_in: dict[str, list[float]] = {}
         courses = courses_of(schedule)
-        said: dict[str, str | int | float] = {}
+        last_answers: dict[str, str | int | float] = {}
         for trial in schedule.trials:
             block = protocol.blocks[trial.block]
             if block.stimulus is None:
                 continue
-            answered, before = heard.setdefault(block.id, []), sensed_in.setdefault(block.id, [])
-            if (due := next_level(protocol, key, schedule, trial, answered)) is None:
+            results, earlier_sensed = results_by_block.setdefault(block.id, []), sensed_in.setdefault(block.id, [])
+            if (presentation := next_level(protocol, key, schedule, trial, results)) is None:
                 continue
-            design, sensed = protocol.design_of(block), [sense(interval) for interval in due.intervals]
+            design, sensed = protocol.design_of(block), [sense(interval) for interval in presentation.intervals]
             draw = stream(int.from_bytes(key.secret[:4], "big"), f"observer/{person}/{trial.number}").random
-            course = Course(courses[trial.number], said.get(block.id))
-            given = Comparison.of(protocol, block, observer).answer(protocol, design, sensed, before, draw, course)
-            said[block.id] = given
-            before += sensed
-            what = (trial.number, trial.code, due.level, due.arrangement, str(given))
-            answered.append(trial_result(protocol, block, *what, catch=due.catch))
+            course = Course(courses[trial.number], last_answers.get(block.id))
+            answer = Comparison.of(protocol, block, observer).answer(
+                protocol, design, sensed, earlier_sensed, draw, course
+            )
+            last_answers[block.id] = answer
+            earlier_sensed += sensed
+            identity = (trial.number, trial.code, presentation.level, presentation.arrangement, str(answer))
+            results.append(trial_result(protocol, block, *identity, catch=presentation.catch))
             yield SimulatedTrial(
                 participant=person,
                 block=block.id,
                 code=trial.code,
                 track=key.codes[block.id][trial.code],
                 trial=trial.number,
-                catch=due.catch,
-                arrangement=design.arrangement_text(due.arrangement),
-                standard=due.standard,
-                level=due.level,
-                answer=given,
-                success=answered[-1].success,
+                catch=presentation.catch,
+                arrangement=design.arrangement_text(presentation.arrangement),
+                standard=presentation.standard,
+                level=presentation.level,
+                answer=answer,
+                success=results[-1].success,
             )

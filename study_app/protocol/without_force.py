@@ -1,7 +1,7 @@
-"""The shipped studies' sentences about force and feeling, as they read with a device that gives no force.
+"""Replacements of the shipped studies' sentences about force and feeling, for devices without force.
 
-A study's file stays as it is, and so do its hash, its receipt and its key: only pages differ, and only in sentences
-that are word for word one of these. The statements that are rated are never changed: they are the instrument.
+Only the displayed pages change, and only where a sentence is word for word one of these; the study's file, hash,
+receipt and key do not change. Rated statements are never changed, because they are the instrument.
 """
 
 from __future__ import annotations
@@ -16,7 +16,8 @@ from study_app.protocol.model import Protocol
 
 SENTENCES: Final[Mapping[str, str]] = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
 _PATTERNS: Final = tuple(
-    (re.compile(r"\s+".join(map(re.escape, pattern.split()))), seen) for pattern, seen in SENTENCES.items()
+    (re.compile(r"\s+".join(map(re.escape, pattern.split()))), replacement)
+    for pattern, replacement in SENTENCES.items()
 )
 
 
@@ -25,22 +26,22 @@ def without_force(protocol: Protocol) -> Protocol:
 
     It is for display only and must not be saved or hashed.
     """
-    reworded = {"pages": "body", "questionnaires": "intro", "tasks": "instruction"}
+    key_by_table = {"pages": "body", "questionnaires": "intro", "tasks": "instruction"}
     tables = {
         table: {
             name: entry.model_copy(update={key: _without_force_sentences(getattr(entry, key))})
-            for name, entry in given.items()
+            for name, entry in entries.items()
         }
-        for table, key in reworded.items()
-        for given in (getattr(protocol, table),)
+        for table, key in key_by_table.items()
+        for entries in (getattr(protocol, table),)
     }
     return protocol.model_copy(update=tables)
 
 
 def _without_force_sentences(text: Any) -> Any:
-    """Return a localised text without its sentences about force."""
+    """Return a localised text with its sentences about force replaced."""
     if isinstance(text, Mapping):
         return {language: _without_force_sentences(sentence) for language, sentence in text.items()}
-    for pattern, seen in _PATTERNS if isinstance(text, str) else ():
-        text = pattern.sub(seen, text)
+    for pattern, replacement in _PATTERNS if isinstance(text, str) else ():
+        text = pattern.sub(replacement, text)
     return text

@@ -1,8 +1,8 @@
-"""How even the orders of many participants are, before anyone is invited: positions and first-order carry-over.
+"""The balance of the orders of many participants, computed before recruitment: positions and first-order carry-over.
 
 ``liquid-study design`` prints it.
 
-Codes are counted, not conditions: a study draws once which condition each code means, which changes no evenness.
+Codes are counted, not conditions: the condition of a code is drawn once per study, which does not affect the balance.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ _Table: TypeAlias = tuple[tuple[int, ...], ...]
 class Evenness:
     """Counts over the orders of one set of codes.
 
-    ``positions`` count how often each code (column) has each position (row), ``follows`` how often it directly follows
-    each code (row), regardless of breaks and repetitions. ``shortest_distance`` is None if each code occurs once.
+    ``positions`` counts how often each code (column) has each position (row), ``follows`` how often it directly follows
+    each code (row), regardless of breaks and repetitions. ``shortest_distance`` is None if each code occurs only once.
     """
 
     codes: tuple[str, ...]
@@ -54,11 +54,13 @@ class Evenness:
     @property
     def after_another(self) -> tuple[int, ...]:
         """The counts of how often each code follows every other code."""
-        return tuple(count for at, line in enumerate(self.follows) for then, count in enumerate(line) if at != then)
+        return tuple(
+            count for row, counts in enumerate(self.follows) for column, count in enumerate(counts) if row != column
+        )
 
     @property
     def follows_even(self) -> bool:
-        """Whether each code follows each other one equally often."""
+        """Whether each code follows every other code equally often."""
         return len({*self.after_another}) <= 1
 
     @property
@@ -69,7 +71,7 @@ class Evenness:
 
 @dataclass(frozen=True, slots=True)
 class BlockBalance:
-    """A block's evenness and order settings; ``unnumbered`` are participants whose ID has no number."""
+    """A block's evenness and order settings; ``unnumbered`` are the participants whose ID has no number."""
 
     id: str
     title: str
@@ -80,7 +82,7 @@ class BlockBalance:
 
     @property
     def rows(self) -> int | None:
-        """The number of participants in a full round of its square; None without one."""
+        """The number of participants in a full round of its square; None without a square."""
         return row_count(self.order, len(self.evenness.codes)) if self.order in ("williams", "latin") else None
 
 
@@ -103,27 +105,29 @@ def numbered_participants(count: int, first: str = "P001") -> tuple[str, ...]:
             f"{first!r} cannot be the first participant: specify an ID of letters and digits that ends in a number, "
             "such as P061"
         )
-    return tuple(f"{match[1]}{int(match[2]) + more:0{len(match[2])}d}" for more in range(count))
+    return tuple(f"{match[1]}{int(match[2]) + offset:0{len(match[2])}d}" for offset in range(count))
 
 
 def evenness(codes: Sequence[str], orders: Iterable[Sequence[str]]) -> Evenness:
-    """Count positions and successions in ``orders`` of ``codes``, planned or run, all of the same length."""
-    place = {code: index for index, code in enumerate(codes)}
-    shown = [[place[code] for code in order] for order in orders]
-    positions = [[0] * len(place) for _ in range(max(map(len, shown), default=0))]
-    follows = [[0] * len(place) for _ in place]
-    for order in shown:
+    """Return the counts of positions and successions in ``orders`` of ``codes``, all of the same length."""
+    index_of = {code: index for index, code in enumerate(codes)}
+    sequences = [[index_of[code] for code in order] for order in orders]
+    positions = [[0] * len(index_of) for _ in range(max(map(len, sequences), default=0))]
+    follows = [[0] * len(index_of) for _ in index_of]
+    for order in sequences:
         for position, code in enumerate(order):
             positions[position][code] += 1
         for first, then in pairwise(order):
             follows[first][then] += 1
     return Evenness(
         codes=tuple(codes),
-        orders=len(shown),
+        orders=len(sequences),
         positions=tuple(map(tuple, positions)),
         follows=tuple(map(tuple, follows)),
-        longest_run=max(map(longest_run, shown), default=0),
-        shortest_distance=min((near for near in map(shortest_distance, shown) if near is not None), default=None),
+        longest_run=max(map(longest_run, sequences), default=0),
+        shortest_distance=min(
+            (distance for distance in map(shortest_distance, sequences) if distance is not None), default=None
+        ),
     )
 
 
@@ -133,26 +137,30 @@ def balance(
     """Return how balanced the orders of ``participants`` (IDs) are for ``seed``.
 
     In a real study each session has its own seed; orders from a square do not depend on the seed. With ``in_group`` the
-    participants are those of one group, whose number within the group assigns the rows of squares. Without participants
-    it raises StudyError.
+    participants are those of one group, and their numbers within the group assign the rows of squares.
+
+    Raises StudyError without participants.
     """
     if not participants:
         raise StudyError("a design needs at least one participant")
     orders = orders_of(protocol)
-    places = [place if in_group else enrolment_number(who) for place, who in enumerate(participants, start=1)]
-    unnumbered = tuple(who for who, place in zip(participants, places, strict=True) if place is None)
-    placed = [*zip(participants, places, strict=True)]
+    numbers = [
+        number if in_group else enrolment_number(participant)
+        for number, participant in enumerate(participants, start=1)
+    ]
+    unnumbered = tuple(participant for participant, number in zip(participants, numbers, strict=True) if number is None)
+    numbered = [*zip(participants, numbers, strict=True)]
     blocks = []
     for block in orders.blocks:
         if len(block.codes) > 1:
             title = protocol.text(protocol.blocks[block.id].title, protocol.study.languages[0])
-            shown = [codes_of(orders.study, block, who, seed, place) for who, place in placed]
-            counted = evenness(block.codes, shown)
-            blocks.append(BlockBalance(block.id, title, block.order, block.repetitions, counted, unnumbered))
+            code_orders = [codes_of(orders.study, block, participant, seed, number) for participant, number in numbered]
+            block_evenness = evenness(block.codes, code_orders)
+            blocks.append(BlockBalance(block.id, title, block.order, block.repetitions, block_evenness, unnumbered))
     if orders.block_order != "fixed" and sum(block.phase == "main" for block in orders.blocks) > 1:
         order: CodeOrder = "williams" if orders.block_order == "balanced" else "shuffled"
-        of_blocks = _block_evenness(orders, placed, seed)
-        blocks.append(BlockBalance("", "The main blocks", order, 1, of_blocks, unnumbered))
+        evenness_of_blocks = _block_evenness(orders, numbered, seed)
+        blocks.append(BlockBalance("", "The main blocks", order, 1, evenness_of_blocks, unnumbered))
     return Balance(orders.study, session, len(participants), seed, tuple(blocks))
 
 
@@ -163,13 +171,13 @@ def balances(protocol: Protocol, participants: Sequence[str], seed: int) -> Iter
     """
     members: dict[str | None, list[str]] = {group: [] for group in protocol.groups or (None,)}
     secret = draw_secret(stream(seed, "blinding").random)
-    for entry, who in enumerate(participants, start=1):
+    for entry, participant in enumerate(participants, start=1):
         group = None
         if protocol.randomises:
             group = group_of(protocol.shares, secret, entry)
         elif protocol.groups:
             group = next_group(protocol.shares, {name: len(members[name]) for name in protocol.groups})
-        members[group].append(who)
+        members[group].append(participant)
     for variant in variants(protocol):
         if members[variant.group] or variant.group is None:
             yield balance(
@@ -179,8 +187,8 @@ def balances(protocol: Protocol, participants: Sequence[str], seed: int) -> Iter
 
 def block_balance(protocol: Protocol, block_id: str, count: int) -> BlockBalance | None:
     """Return the balance of a block for ``count`` participants of a rehearsal; None if it has only one code."""
-    judged = balances(protocol, numbered_participants(count), 1)
-    return next((block for session in judged for block in session.blocks if block.id == block_id), None)
+    session_balances = balances(protocol, numbered_participants(count), 1)
+    return next((block for session in session_balances for block in session.blocks if block.id == block_id), None)
 
 
 def planned_participants(protocol: Protocol, group: str | None) -> int | None:
@@ -213,55 +221,60 @@ def block_order_words(protocol: Protocol, planned: int | None, *, in_group: bool
     if orders.block_order == "fixed":
         return "fixed: the same order for all participants"
     if orders.block_order == "random":
-        of = (
+        per_group = (
             ""
             if planned is None
             else f" (each block in each position for {planned / blocks:.3g} of {planned} participants)"
         )
-        return f"random: a new order is drawn for each session, so the order is balanced only on average{of}"
+        return f"random: a new order is drawn for each session, so the order is balanced only on average{per_group}"
     order_evenness = _block_evenness(orders, [("", place) for place in range(1, planned + 1)], 1) if planned else None
     rows = row_count("williams", blocks)
-    by, of = ("position in the group", " per group") if in_group else ("number in the participant's ID", "")
-    text = f"balanced: {rows} orders, assigned by the {by}"
+    assigned_by, per_group = (
+        ("position in the group", " per group") if in_group else ("number in the participant's ID", "")
+    )
+    text = f"balanced: {rows} orders, assigned by the {assigned_by}"
     if planned is None or order_evenness is None:
-        return f"{text}; balanced for any multiple of {rows} participants{of}"
+        return f"{text}; balanced for any multiple of {rows} participants{per_group}"
     counts = [count for line in order_evenness.positions for count in line]
-    even = _times_text(counts[0]) if order_evenness.positions_even else _range_text(counts)
+    frequency = _times_text(counts[0]) if order_evenness.positions_even else _range_text(counts)
     balanced = planned + -planned % rows
-    more = "" if order_evenness.balanced else f"; the order would be balanced with {balanced} participants{of}"
-    return f"{text}; with {planned} participants{of}, each block occurs in each position {even}{more}"
+    advice = "" if order_evenness.balanced else f"; the order would be balanced with {balanced} participants{per_group}"
+    return f"{text}; with {planned} participants{per_group}, each block occurs in each position {frequency}{advice}"
 
 
-def _block_evenness(orders: Orders, placed: Iterable[tuple[str, int | None]], seed: int) -> Evenness:
-    """Return the evenness of the main blocks' orders; ``placed`` are ids with the numbers that assign their rows."""
+def _block_evenness(orders: Orders, numbered: Iterable[tuple[str, int | None]], seed: int) -> Evenness:
+    """Return the evenness of the main blocks' orders.
+
+    ``numbered`` are participant IDs, each with the number that assigns its row.
+    """
     names = [block.id for block in orders.blocks if block.phase == "main"]
-    shown = (blocks_in_order(orders, who, seed, place) for who, place in placed)
-    return evenness(names, ([names[number] for number in order] for order in shown))
+    block_orders = (blocks_in_order(orders, participant, seed, row_number) for participant, row_number in numbered)
+    return evenness(names, ([names[number] for number in order] for order in block_orders))
 
 
-def describe_balance(judged: Balance) -> str:
-    """Return the tables of every block with their interpretation."""
-    people = "1 participant" if judged.participants == 1 else f"{judged.participants} participants"
-    whose = f", {judged.session}" if judged.session else ""
-    head = f"{judged.study}{whose}: orders for {people}, each with seed {judged.seed}"
-    if not judged.blocks:
+def describe_balance(result: Balance) -> str:
+    """Return the tables of every block, with their interpretation, as text."""
+    people = "1 participant" if result.participants == 1 else f"{result.participants} participants"
+    session = f", {result.session}" if result.session else ""
+    head = f"{result.study}{session}: orders for {people}, each with seed {result.seed}"
+    if not result.blocks:
         return f"{head}\n\nAll blocks have only one code, so there is nothing to balance."
-    return "\n\n".join((head, *("\n".join(_block_lines(block)) for block in judged.blocks)))
+    return "\n\n".join((head, *("\n".join(_block_lines(block)) for block in result.blocks)))
 
 
 def _block_lines(block: BlockBalance) -> Iterator[str]:
-    counted = block.evenness
+    counts = block.evenness
     times = "" if block.repetitions == 1 else f", each {block.repetitions} times"
     if block.id:
-        yield f"{block.title} (block {block.id}): {len(counted.codes)} codes{times}, order {block.order}"
+        yield f"{block.title} (block {block.id}): {len(counts.codes)} codes{times}, order {block.order}"
     else:
         yield f"{block.title}: {'balanced' if block.order == 'williams' else 'random'}"
     yield ""
-    yield from _count_lines("position", range(1, len(counted.positions) + 1), counted.codes, counted.positions)
+    yield from _count_lines("position", range(1, len(counts.positions) + 1), counts.codes, counts.positions)
     yield ""
-    yield from _count_lines("after", counted.codes, counted.codes, counted.follows)
+    yield from _count_lines("after", counts.codes, counts.codes, counts.follows)
     yield ""
-    yield from (f"  {sentence}" for sentence in (*_verdict_lines(counted), *_advice(block)))
+    yield from (f"  {sentence}" for sentence in (*_verdict_lines(counts), *_advice(block)))
 
 
 def _count_lines(corner: str, names: Sequence[object], codes: Sequence[str], counts: _Table) -> Iterator[str]:
@@ -273,24 +286,24 @@ def _count_lines(corner: str, names: Sequence[object], codes: Sequence[str], cou
         yield f"  {name!s:<{first}}  {'  '.join(f'{count:>{width}}' for count in line)}"
 
 
-def _verdict_lines(counted: Evenness) -> Iterator[str]:
-    cells = [count for line in counted.positions for count in line]
-    if counted.positions_even:
+def _verdict_lines(counts: Evenness) -> Iterator[str]:
+    cells = [count for line in counts.positions for count in line]
+    if counts.positions_even:
         yield f"Positions are balanced: each code occurs in each position {_times_text(cells[0])}."
     else:
         yield f"Positions are not balanced: each code occurs in each position {_range_text(cells)}."
-    after = counted.after_another
-    if counted.follows_even:
-        yield f"Carry-over is balanced: each code follows every other code {_times_text(after[0])}."
+    carry_over = counts.after_another
+    if counts.follows_even:
+        yield f"Carry-over is balanced: each code follows every other code {_times_text(carry_over[0])}."
     else:
-        yield f"Carry-over is not balanced: each code follows every other code {_range_text(after)}."
-    if counted.shortest_distance is not None:
-        least = f"the minimum distance between repeats is {counted.shortest_distance}"
-        yield f"At most {counted.longest_run} presentations of a condition occur in a row; {least}."
+        yield f"Carry-over is not balanced: each code follows every other code {_range_text(carry_over)}."
+    if counts.shortest_distance is not None:
+        shortest = f"the minimum distance between repeats is {counts.shortest_distance}"
+        yield f"At most {counts.longest_run} presentations of a condition occur in a row; {shortest}."
 
 
 def _advice(block: BlockBalance) -> Iterator[str]:
-    """Yield the guarantees of the order, and possible improvements."""
+    """Yield the properties of the order, and possible improvements."""
     codes, repetitions = len(block.evenness.codes), block.repetitions
     match block.order:
         case "fixed":
@@ -306,7 +319,7 @@ def _advice(block: BlockBalance) -> Iterator[str]:
         case "williams" | "latin" as square:
             yield from _round_lines(block, row_count(square, codes))
             if square == "williams" and not has_even_borders(codes, repetitions):
-                enough = next(more for more in count(repetitions) if has_even_borders(codes, more))
+                enough = next(number for number in count(repetitions) if has_even_borders(codes, number))
                 yield (
                     f"Carry-over cannot be balanced with this number of repetitions, but it can be with {enough} "
                     "repetitions."
@@ -316,7 +329,7 @@ def _advice(block: BlockBalance) -> Iterator[str]:
 
 
 def _round_lines(block: BlockBalance, rows: int) -> Iterator[str]:
-    """Yield whether the participants complete rounds of rows, and how many would."""
+    """Yield whether the participants complete rounds of rows, and the number that would."""
     codes, people = len(block.evenness.codes), block.evenness.orders
     if block.unnumbered:
         yield (
@@ -336,11 +349,11 @@ def _round_lines(block: BlockBalance, rows: int) -> Iterator[str]:
         )
     else:
         enough = people + -people % rows
-        then = f"each code would occur in each position {_times_text(enough // codes)}"
+        result = f"each code would occur in each position {_times_text(enough // codes)}"
         if block.order == "williams" and has_even_borders(codes, block.repetitions):
             follows = enough * (codes * block.repetitions - 1) // (codes * (codes - 1))
-            then += f" and follow every other code {_times_text(follows)}"
-        yield f"A full round consists of {rows} participants. With {enough} participants, {then}."
+            result += f" and follow every other code {_times_text(follows)}"
+        yield f"A full round consists of {rows} participants. With {enough} participants, {result}."
 
 
 def _times_text(number: int) -> str:

@@ -1,4 +1,4 @@
-"""Exactly what scheduling needs to know of a study: no conditions, no texts, no tasks."""
+"""The part of a study that scheduling needs, without conditions, texts and tasks."""
 
 from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias
@@ -9,7 +9,7 @@ from study_app.protocol.orders.tracks import tracks_of
 from study_app.protocol.trials.methods import TrackOrder
 
 CodeOrder: TypeAlias = Literal[Order, TrackOrder]
-"""How the codes of a block are ordered: conditions, or the tracks of a design."""
+"""The order rule of a block's codes, which stand for conditions or for the tracks of a design."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -66,7 +66,7 @@ class Orders:
 
     @property
     def blocks(self) -> tuple[BlockOrder, ...]:
-        """The blocks alone, in order."""
+        """The blocks in session order."""
         return tuple(step for step in self.steps if isinstance(step, BlockOrder))
 
     @property
@@ -88,11 +88,11 @@ def block_codes(protocol: Protocol, block: Block) -> tuple[str, ...]:
 def orders_of(protocol: Protocol) -> Orders:
     """Return the part of a protocol that scheduling needs."""
     steps: dict[str, BlockOrder | FormOrder] = {
-        name: FormOrder(name, **_items(form)) for name, form in protocol.forms.items()
+        name: FormOrder(name, **_question_fields(form)) for name, form in protocol.forms.items()
     }
     steps |= {name: order_of(protocol, block) for name, block in protocol.blocks.items()}
-    in_order = tuple(steps.get(step, step) for step in protocol.steps)
-    return Orders(protocol.study.name, in_order, protocol.study.block_order)
+    ordered_steps = tuple(steps.get(step, step) for step in protocol.steps)
+    return Orders(protocol.study.name, ordered_steps, protocol.study.block_order)
 
 
 def order_of(protocol: Protocol, block: Block) -> BlockOrder:
@@ -103,14 +103,14 @@ def order_of(protocol: Protocol, block: Block) -> BlockOrder:
         order = "interleaved" if block.stimulus is None else protocol.method_of(block).order
         slots = tuple(track.slots for track in tracks_of(protocol, block))
     keys = ("phase", "part", "max_repeats", "min_distance", "repetitions", "break_every", "break_page")
-    same = {key: getattr(block, key) for key in keys}
+    block_fields = {key: getattr(block, key) for key in keys}
     questions = protocol.questionnaire_of(block.id)
-    codes, about = block_codes(protocol, block), same | _items(questions)
-    return BlockOrder(id=block.id, codes=codes, order=order, slots=slots, **about)
+    codes, fields = block_codes(protocol, block), block_fields | _question_fields(questions)
+    return BlockOrder(id=block.id, codes=codes, order=order, slots=slots, **fields)
 
 
-def _items(questions: Questionnaire | None) -> dict[str, Any]:
-    """Return the ids of the questions, and their order rule."""
+def _question_fields(questions: Questionnaire | None) -> dict[str, Any]:
+    """Return the fields of `BlockOrder` and `FormOrder` on questions: their IDs and their order rule."""
     if questions is None:
         return {"items": (), "item_order": "fixed"}
     return {"items": tuple(item.id for item in questions.items), "item_order": questions.item_order}

@@ -1,4 +1,4 @@
-"""The kinds of sessions of a study, and how long each will take: reading, answering, tasks, breaks."""
+"""The kinds of sessions of a study, and their expected durations: reading, answering, tasks, breaks."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from study_app.protocol.trials.tasks import AnyTask
 
 @dataclass(frozen=True, slots=True)
 class Variant:
-    """One kind of session of a study: of a group (None: all participants), with a number (None: any)."""
+    """One kind of session: its group (None for all participants), its number (None for any), and its protocol."""
 
     group: str | None
     session: int | None
@@ -22,8 +22,8 @@ class Variant:
     @property
     def name(self) -> str:
         """The group and the session as text; "" if all sessions are alike."""
-        named = [f"group {self.group}"] if self.group is not None else []
-        return ", ".join([*named, f"session {self.session}"] if self.session is not None else named)
+        parts = [f"group {self.group}"] if self.group is not None else []
+        return ", ".join([*parts, f"session {self.session}"] if self.session is not None else parts)
 
 
 def variants(protocol: Protocol) -> Iterator[Variant]:
@@ -31,48 +31,49 @@ def variants(protocol: Protocol) -> Iterator[Variant]:
     for group in protocol.groups or (None,):
         count = protocol.session_count(group)
         for session in range(1, (count or 1) + 1):
-            own = protocol.for_session(group, session)
-            yield Variant(group, session if count is not None else None, own)
+            session_protocol = protocol.for_session(group, session)
+            yield Variant(group, session if count is not None else None, session_protocol)
 
 
 _READING_WORDS_PER_S = 3.0
 _PAGE_S = 5.0
-"""How long people take, for the expected duration [choice]: read (180 words a minute) and turn a page."""
+"""Reading speed (180 words a minute) and time to turn a page [s], for the expected duration. [choice]"""
 
 
 def expected_duration_s(protocol: Protocol, *steps: str) -> float:
-    """Return the expected duration of some steps, or of a session [s], between the shortest and the longest."""
+    """Return the expected duration of some steps, or of a whole session [s]."""
     return sum(_step_duration_s(protocol, step) for step in steps or protocol.steps)
 
 
 def duration_range_s(protocol: Protocol) -> tuple[float, float]:
-    """Return the shortest and the longest duration of a session [s], since tasks may end before their limit."""
+    """Return the shortest and the longest duration of a session [s]; tasks may end before their limit."""
 
-    def session_s(own: Protocol, task_s: Callable[[AnyTask], float]) -> float:
-        return sum(_step_duration_s(own, step, task_s) for step in own.steps)
+    def session_s(session_protocol: Protocol, task_s: Callable[[AnyTask], float]) -> float:
+        return sum(_step_duration_s(session_protocol, step, task_s) for step in session_protocol.steps)
 
-    kinds = [variant.protocol for variant in variants(protocol)]
+    protocols = [variant.protocol for variant in variants(protocol)]
     least_s = min(
-        session_s(session, lambda task: task.expected_s if task.least_s is None else task.least_s) for session in kinds
+        session_s(session, lambda task: task.expected_s if task.least_s is None else task.least_s)
+        for session in protocols
     )
-    return least_s, max(session_s(session, lambda task: task.limit_s) for session in kinds)
+    return least_s, max(session_s(session, lambda task: task.limit_s) for session in protocols)
 
 
-def _step_duration_s(protocol: Protocol, step: str, of_task: Callable[[AnyTask], float] | None = None) -> float:
-    """Return the duration of a page, form or block [s]; ``of_task`` is that of a task if it is not the expected one."""
+def _step_duration_s(protocol: Protocol, step: str, task_duration_s: Callable[[AnyTask], float] | None = None) -> float:
+    """Return the duration of a page, form or block [s]; ``task_duration_s`` replaces the expected duration of tasks."""
     if step in protocol.pages:
         return _reading_s(protocol, step)
     if step in protocol.forms:
         return _answering_s(protocol.forms[step])
-    return _block_duration_s(protocol, protocol.blocks[step], of_task)
+    return _block_duration_s(protocol, protocol.blocks[step], task_duration_s)
 
 
 def recordings_of(protocol: Protocol) -> Iterator[tuple[int, float]]:
-    """Yield the number of a block's recordings in a session and the expected duration of each [s]."""
+    """Yield for each block the number of its recordings in a session, and the expected duration of each [s]."""
     for block in (protocol.blocks[step] for step in protocol.steps if step in protocol.blocks):
         intervals = 1 if block.design is None else protocol.design_of(block).intervals
-        longer_s = 0.0 if block.stimulus is None else protocol.method_of(block).setting_s
-        yield order_of(protocol, block).trials * intervals, protocol.tasks[block.task].expected_s + longer_s
+        setting_s = 0.0 if block.stimulus is None else protocol.method_of(block).setting_s
+        yield order_of(protocol, block).trials * intervals, protocol.tasks[block.task].expected_s + setting_s
 
 
 def _answering_s(questionnaire: Questionnaire) -> float:
@@ -87,18 +88,18 @@ def _reading_s(protocol: Protocol, page_id: str) -> float:
     return max(_PAGE_S + len(words) / _READING_WORDS_PER_S, page.min_s or 0.0)
 
 
-def _block_duration_s(protocol: Protocol, block: Block, of_task: Callable[[AnyTask], float] | None) -> float:
+def _block_duration_s(protocol: Protocol, block: Block, task_duration_s: Callable[[AnyTask], float] | None) -> float:
     questionnaire = protocol.questionnaire_of(block.id)
-    answering = 0.0 if questionnaire is None else _answering_s(questionnaire)
+    answering_s = 0.0 if questionnaire is None else _answering_s(questionnaire)
     order = order_of(protocol, block)
-    resting = 0.0 if block.break_page is None else order.breaks * _reading_s(protocol, block.break_page)
+    breaks_s = 0.0 if block.break_page is None else order.breaks * _reading_s(protocol, block.break_page)
     task = protocol.tasks[block.task]
-    task_s = task.expected_s if of_task is None else of_task(task)
+    task_s = task.expected_s if task_duration_s is None else task_duration_s(task)
     if block.design is not None:
         design = protocol.design_of(block)
         feedback_s = design.feedback_s * design.shows_feedback(block.phase == "practice")
-        answering = design.answer_s + design.between_s + feedback_s
+        answering_s = design.answer_s + design.between_s + feedback_s
         task_s = design.intervals * task_s + (design.intervals - 1) * design.pause_s
         if block.stimulus is not None and (setting_s := protocol.method_of(block).setting_s):
-            task_s, answering = task_s + setting_s, design.between_s
-    return order.trials * (task_s + answering) + resting
+            task_s, answering_s = task_s + setting_s, design.between_s
+    return order.trials * (task_s + answering_s) + breaks_s

@@ -1,25 +1,25 @@
-"""What comes when: protocol, participant and seed give the session's steps, the same on every machine.
+"""The schedule: protocol, participant and seed determine the steps of a session, which are the same on every machine.
 
 Orders are orders of codes; what a code stands for is drawn once per study by :func:`draw_key` and sealed. So a schedule
-gives nothing away.
+does not reveal conditions.
 
 ==============  ========================================================================================================
 order           the codes of a block
 ==============  ========================================================================================================
-fixed           as written, again in each repetition
-shuffled        in a random order, another in each repetition; from stream "order/PARTICIPANT/BLOCK/REPETITION"
+fixed           as written, repeated in each repetition
+shuffled        in a new random order in each repetition; from stream "order/PARTICIPANT/BLOCK/REPETITION"
 constrained     all trials in one random order within max_repeats and min_distance (see `sequences`); from stream
                 "order/PARTICIPANT/BLOCK"
-interleaved     of a block with a design: every round presents each track once, in a random order of its own, from
-                stream "order/PARTICIPANT/BLOCK/ROUND"
-blocked         of a block with a design: one track after another, in random order, from stream
+interleaved     in a block with a design: every round presents each track once, in a new random order; from stream
+                "order/PARTICIPANT/BLOCK/ROUND"
+blocked         in a block with a design: one track after another, in random order; from stream
                 "order/PARTICIPANT/BLOCK"
-williams latin  a row of a square, assigned by the number in the participant's id or the place in the group, not by the
-                seed (`sequences`)
+williams latin  a row of a square, assigned by the number in the participant's ID or by the position in the group, not
+                by the seed (`sequences`)
 ==============  ========================================================================================================
 
-Main blocks take each other's places in a row of a square if their order is balanced, and in an order from stream
-"blocks/PARTICIPANT" if it is random.
+Main blocks are permuted by a row of a square if their order is balanced, and by stream "blocks/PARTICIPANT" if it is
+random.
 """
 
 from __future__ import annotations
@@ -107,16 +107,16 @@ class Schedule:
     seed: int
     steps: tuple[Step, ...]
 
-    @cached_property  # each trial of a track needs them
+    @cached_property  # used for each trial of a track
     def trials(self) -> tuple[Trial, ...]:
-        """The trials alone, in order."""
+        """The trials in order."""
         return tuple(step for step in self.steps if isinstance(step, Trial))
 
 
 def build_schedule(protocol: Protocol | Orders, participant: str, seed: int, place: int | None = None) -> Schedule:
-    """Return the session of ``participant``: a pure function of its arguments.
+    """Return the schedule of ``participant``; it depends only on the arguments.
 
-    ``place`` is the number that assigns rows of squares (from 1); None: the number in the participant's id.
+    ``place`` is the number that assigns rows of squares (from 1); None for the number in the participant's ID.
     """
     orders = orders_of(protocol) if isinstance(protocol, Protocol) else protocol
     steps: list[Step] = []
@@ -127,8 +127,8 @@ def build_schedule(protocol: Protocol | Orders, participant: str, seed: int, pla
             continue
         if isinstance(step, FormOrder):
             times[step.id] += 1
-            again = "" if times[step.id] == 1 else f"/{times[step.id]}"
-            items = _shuffle_questions(step, seed, f"{participant}/form/{step.id}{again}")
+            suffix = "" if times[step.id] == 1 else f"/{times[step.id]}"
+            items = _shuffle_questions(step, seed, f"{participant}/form/{step.id}{suffix}")
             steps.append(FormStep(step.id, items, after, times[step.id]))
             continue
         after = step.id
@@ -156,13 +156,15 @@ def build_schedule(protocol: Protocol | Orders, participant: str, seed: int, pla
 def _steps_in_order(
     orders: Orders, participant: str, seed: int, place: int | None
 ) -> tuple[str | BlockOrder | FormOrder, ...]:
-    """Return the steps with the main blocks in the participant's order; part numbers stay at their positions."""
-    places = [at for at, step in enumerate(orders.steps) if isinstance(step, BlockOrder) and step.phase == "main"]
+    """Return the steps with the main blocks in the participant's order; part numbers keep their positions."""
+    positions = [
+        position for position, step in enumerate(orders.steps) if isinstance(step, BlockOrder) and step.phase == "main"
+    ]
     steps = list(orders.steps)
-    for at, number in zip(places, blocks_in_order(orders, participant, seed, place), strict=True):
-        target, block = orders.steps[at], orders.steps[places[number]]
+    for position, number in zip(positions, blocks_in_order(orders, participant, seed, place), strict=True):
+        target, block = orders.steps[position], orders.steps[positions[number]]
         if isinstance(target, BlockOrder) and isinstance(block, BlockOrder):
-            steps[at] = replace(block, part=target.part)
+            steps[position] = replace(block, part=target.part)
     return tuple(steps)
 
 
@@ -173,39 +175,45 @@ def blocks_in_order(orders: Orders, participant: str, seed: int, place: int | No
         return shuffle(range(count), stream(seed, f"blocks/{participant}").random)
     if orders.block_order == "fixed" or count < 2:
         return tuple(range(count))
-    taken = assigned_row(orders.study, "block order", row_count("williams", count), participant, place)
-    return row("williams", count, taken)
+    row_number = assigned_row(orders.study, "block order", row_count("williams", count), participant, place)
+    return row("williams", count, row_number)
 
 
 def codes_of(study: str, block: BlockOrder, participant: str, seed: int, place: int | None = None) -> tuple[str, ...]:
     """Return the codes of a block's trials in the order of ``participant``."""
-    codes, times = block.codes, block.repetitions
+    codes, repetitions = block.codes, block.repetitions
     match block.order:
         case "fixed":
-            return codes * times
+            return codes * repetitions
         case "shuffled":
-            streams = [stream(seed, f"order/{participant}/{block.id}/{number}") for number in range(1, times + 1)]
-            return tuple(code for drawn in streams for code in shuffle(codes, drawn.random))
+            streams = [stream(seed, f"order/{participant}/{block.id}/{number}") for number in range(1, repetitions + 1)]
+            return tuple(code for draws in streams for code in shuffle(codes, draws.random))
         case "constrained":
             constraint = Constraint(block.max_repeats, block.min_distance)
-            return draw_order(codes, times, constraint, stream(seed, f"order/{participant}/{block.id}").random)
+            return draw_order(codes, repetitions, constraint, stream(seed, f"order/{participant}/{block.id}").random)
         case "interleaved":
             rounds = range(1, max(block.slots) + 1)
-            left = [tuple(code for code, slots in zip(codes, block.slots, strict=True) if slots >= n) for n in rounds]
-            drawn = [stream(seed, f"order/{participant}/{block.id}/{number}").random for number in rounds]
-            return tuple(code for some, draw in zip(left, drawn, strict=True) for code in shuffle(some, draw))
+            codes_by_round = [
+                tuple(code for code, slots in zip(codes, block.slots, strict=True) if slots >= n) for n in rounds
+            ]
+            draws = [stream(seed, f"order/{participant}/{block.id}/{number}").random for number in rounds]
+            return tuple(
+                code
+                for round_codes, draw in zip(codes_by_round, draws, strict=True)
+                for code in shuffle(round_codes, draw)
+            )
         case "blocked":
             tracks = shuffle(
                 zip(codes, block.slots, strict=True), stream(seed, f"order/{participant}/{block.id}").random
             )
             return tuple(code for code, slots in tracks for _ in range(slots))
         case "williams" | "latin" as square:
-            taken = assigned_row(study, block.id, row_count(square, len(codes)), participant, place)
-            return tuple(codes[number] for number in row(square, len(codes), taken, times))
+            row_number = assigned_row(study, block.id, row_count(square, len(codes)), participant, place)
+            return tuple(codes[number] for number in row(square, len(codes), row_number, repetitions))
 
 
 def _shuffle_questions(step: BlockOrder | FormOrder, seed: int, name: str) -> tuple[str, ...]:
-    """Return the ids of the questions in the order of presentation."""
+    """Return the IDs of the questions in the order of presentation."""
     return step.items if step.item_order == "fixed" else shuffle(step.items, stream(seed, f"items/{name}").random)
 
 
@@ -225,14 +233,14 @@ def draw_key(protocol: Protocol, draw: Draw) -> _Key:
     return key
 
 
-_TOLD = ("block", "phase", "part", "index", "of", "code")
+_COMPARED_FIELDS = ("block", "phase", "part", "index", "of", "code")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RecordedTrial:
-    """One recorded attempt at a trial; ``items`` in the order shown, None if nothing was answered.
+    """One recorded attempt at a trial; ``items`` are in the order shown, None if nothing was answered.
 
-    ``may_hide`` tells whether answers may have hidden some of the items, which are then not recorded.
+    ``may_hide`` says that answers may have hidden some of the items, which are then not recorded.
     """
 
     number: int
@@ -262,29 +270,33 @@ def reproduce(
     """
     planned = {trial.number: trial for trial in build_schedule(protocol, participant, seed, place).trials}
     attempts = tuple(recorded)
-    run = [trial for trial in attempts if isinstance(trial, RecordedTrial)]
-    differences = [sentence for trial in run for sentence in _trial_differences(planned.get(trial.number), trial)]
+    recorded_trials = [trial for trial in attempts if isinstance(trial, RecordedTrial)]
+    differences = [
+        sentence for trial in recorded_trials for sentence in _trial_differences(planned.get(trial.number), trial)
+    ]
     numbers = [trial if isinstance(trial, int) else trial.number for trial in attempts]
     differences += _progress_differences(numbers, planned, complete=complete, blocks=protocol.study.resume == "block")
     return tuple(dict.fromkeys(differences))
 
 
-def _trial_differences(planned: Trial | None, run: RecordedTrial) -> Iterator[str]:
+def _trial_differences(planned: Trial | None, recorded: RecordedTrial) -> Iterator[str]:
     """Yield the differences between a recorded trial and the planned one with its number."""
     if planned is None:
-        yield f"trial {run.number} was recorded, but the seed does not produce this trial"
+        yield f"trial {recorded.number} was recorded, but the seed does not produce this trial"
         return
-    for name in _TOLD:
-        ours, theirs = getattr(planned, name), getattr(run, name)
-        if ours != theirs:
-            said, given = ("none" if value is None else value for value in (theirs, ours))
-            yield f"trial {run.number}: the recorded {name} is {said}, but the seed gives {given}"
-    if run.items is None:
+    for name in _COMPARED_FIELDS:
+        expected_value, recorded_value = getattr(planned, name), getattr(recorded, name)
+        if expected_value != recorded_value:
+            recorded_text, expected_text = (
+                "none" if value is None else value for value in (recorded_value, expected_value)
+            )
+            yield f"trial {recorded.number}: the recorded {name} is {recorded_text}, but the seed gives {expected_text}"
+    if recorded.items is None:
         return
-    expected = tuple(item for item in planned.items if item in run.items) if run.may_hide else planned.items
-    if run.items != expected:
-        said, given = (", ".join(items) or "none" for items in (run.items, planned.items))
-        yield f"trial {run.number}: the recorded items are {said}, but the seed gives {given}"
+    expected = tuple(item for item in planned.items if item in recorded.items) if recorded.may_hide else planned.items
+    if recorded.items != expected:
+        recorded_text, expected_text = (", ".join(items) or "none" for items in (recorded.items, planned.items))
+        yield f"trial {recorded.number}: the recorded items are {recorded_text}, but the seed gives {expected_text}"
 
 
 def _progress_differences(
@@ -294,16 +306,16 @@ def _progress_differences(
 
     With ``blocks`` a resumed session repeats the interrupted block from its first trial.
     """
-    before = 0
+    previous = 0
     first = {trial.block: number for number, trial in reversed(planned.items())}
     for number in numbers:
-        due = {before, before + 1}
-        again = {first[planned[number].block] for number in due & planned.keys()} if blocks else set()
-        if number not in due | again:
-            after = f"after trial {before}" if before else "first"
-            yield f"trial {number} was presented {after}, but trial {before + 1} was due"
-        before = number
+        due_numbers = {previous, previous + 1}
+        repeated = {first[planned[number].block] for number in due_numbers & planned.keys()} if blocks else set()
+        if number not in due_numbers | repeated:
+            position = f"after trial {previous}" if previous else "first"
+            yield f"trial {number} was presented {position}, but trial {previous + 1} was due"
+        previous = number
     last = len(planned)
-    if complete and before < last:
-        missing = f"trial {last} was" if before + 1 == last else f"trials {before + 1} to {last} were"
+    if complete and previous < last:
+        missing = f"trial {last} was" if previous + 1 == last else f"trials {previous + 1} to {last} were"
         yield f"{missing} not recorded, although the session is complete"

@@ -1,4 +1,4 @@
-"""The tracks of a block with a design: what its codes stand for, and how many slots each has."""
+"""The tracks of a block with a design, for which its codes stand, and their numbers of slots."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class Track:
     Its code stands for ``name``: the standard and a number ("8/1", "/1" without a standard), or a condition.
     ``comparison`` is the condition that is compared with the block's standard, None if a number is varied; ``number``
     counts the tracks of its standard from 1; ``catch`` has, for each catch trial, the range of slots (from 0) from
-    which its own is drawn.
+    which its slot is drawn.
     """
 
     name: str
@@ -33,9 +33,13 @@ def tracks_of(protocol: Protocol, block: Block) -> tuple[Track, ...]:
         return tuple(Track(name, None, name, block.repetitions) for name in block.conditions if name != block.standard)
     stimulus, method = protocol.stimulus_of(block), protocol.method_of(block)
     comparisons = method.presentations(stimulus)
-    others = comparisons + design.noise(comparisons) + (design.first is not None)
-    catch = () if (rule := block.catch) is None else tuple(rule.stretch(number) for number in range(rule.count(others)))
-    slots = others + len(catch)
+    other_slots = comparisons + design.noise(comparisons) + (design.first is not None)
+    catch = (
+        ()
+        if (rule := block.catch) is None
+        else tuple(rule.stretch(number) for number in range(rule.count(other_slots)))
+    )
+    slots = other_slots + len(catch)
     return tuple(
         Track(f"{'' if standard is None else f'{standard:.17g}'}/{number}", standard, None, slots, number, catch)
         for standard in protocol.standards_of(block)

@@ -1,4 +1,4 @@
-"""Groups of participants and sessions that differ: whose steps a session has."""
+"""Groups of participants, and the steps of sessions that differ."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from study_app.protocol.source.table import Id, Table, invalid
 GroupAssignment: TypeAlias = Literal["randomised", "pre-existing"]
 ASSIGNMENT: Final = ("study", "group_assignment")
 EACH_GROUP: Final = "*"
-"""In place of a group's name, which is an ID: figures compare all groups."""
+"""Stands for all groups in place of a group's name; not a valid ID."""
 _MOST_SHARE: Final = 20
 SEQUENCES: Final = ("sequence", "sequences.*", "groups.*.sequence", "groups.*.sequences.*")
-"""Places of lists of steps in a document, as patterns."""
+"""Patterns of the lists of steps in a document."""
 
 Steps: TypeAlias = tuple[Id, ...]
 Sequences: TypeAlias = tuple[Annotated[Steps, Field(min_length=1)], ...]
@@ -48,7 +48,7 @@ class Group(Table):
 
 
 def sequences_in(document: Any) -> Iterator[tuple[Path, tuple[Any, ...]]]:
-    """Yield every list of steps of a document (of a file or a receipt) with its path."""
+    """Yield every list of steps in the document of a file or a receipt, with its path."""
     for pattern in SEQUENCES:
         for path, steps in entries(document, pattern):
             if isinstance(steps, tuple):
@@ -84,16 +84,16 @@ class Sessions:
 
     @property
     def exchanged_blocks(self) -> tuple[str, ...]:
-        """The blocks whose order differs between participants: the main ones, unless their order is fixed."""
+        """The blocks whose order differs between participants: the main blocks, unless their order is fixed."""
         main = (name for name, block in self.blocks.items() if block.phase == "main")
         return () if self.study.block_order == "fixed" else tuple(main)
 
     def session_count(self, group: str | None) -> int | None:
-        """Return the number of sessions of a participant in a group; None: unlimited, all with the same steps."""
+        """Return the number of sessions of a participant in a group; None for any number of equal sessions."""
         return len(self._sequences_of(group)) or None
 
     def session_steps(self, group: str | None, session: int) -> Steps:
-        """Return the steps of a participant's session (from 1) in a group; StudyError if there are fewer sessions."""
+        """Return the steps of a participant's session (from 1) in a group; raise StudyError if there are fewer."""
         sequences = self._sequences_of(group)
         if not sequences:
             own = () if group is None else self.groups[group].sequence
@@ -105,9 +105,9 @@ class Sessions:
     def check_session_number(self, session: int) -> None:
         """Raise StudyError if no group has this session."""
         counts = [self.session_count(group) for group in self.groups or (None,)]
-        known = [count for count in counts if count is not None]
-        if len(known) == len(counts) and session > max(known):
-            raise _session_number_error(session, max(known))
+        limited = [count for count in counts if count is not None]
+        if len(limited) == len(counts) and session > max(limited):
+            raise _session_number_error(session, max(limited))
 
     def every_session(self) -> Iterator[Steps]:
         """Yield the steps of each session of each group."""
@@ -120,29 +120,35 @@ class Sessions:
 
     def blocks_before(self, form: str, steps: Steps) -> Iterator[str | None]:
         """Yield the last block before each use of a form in a session, None before the first block."""
-        before: str | None = None
+        previous: str | None = None
         for step in steps:
             if step == form:
-                yield before
-            before = step if step in self.blocks else before
+                yield previous
+            previous = step if step in self.blocks else previous
 
     def follows(self, form: str) -> tuple[str | None, ...]:
-        """Return the blocks before each use of a form, None before the first; empty if no session has it twice.
+        """Return the blocks that precede a form, None for the start; empty unless a session has the form repeatedly.
 
-        If main blocks are exchanged, any of them that a session has can precede the form.
+        If the order of the main blocks varies, any of those in the session can precede the form.
         """
         preceding: dict[str | None, None] = {}
-        again, exchanged = False, self.exchanged_blocks
+        is_repeated, exchanged = False, self.exchanged_blocks
         for steps in self.every_session():
-            again |= steps.count(form) > 1
-            for before in self.blocks_before(form, steps):
-                exchange = [block for block in steps if block in exchanged] if before in exchanged else [before]
-                preceding |= dict.fromkeys(exchange)
-        return tuple(preceding) if again else ()
+            is_repeated |= steps.count(form) > 1
+            for previous in self.blocks_before(form, steps):
+                possible_blocks = (
+                    [block for block in steps if block in exchanged] if previous in exchanged else [previous]
+                )
+                preceding |= dict.fromkeys(possible_blocks)
+        return tuple(preceding) if is_repeated else ()
 
     def _sequences_of(self, group: str | None) -> Sequences:
-        own = None if group is None else self.groups[group]
-        return self.sequences if own is None or not (own.sequence or own.sequences) else own.sequences
+        own_group = None if group is None else self.groups[group]
+        return (
+            self.sequences
+            if own_group is None or not (own_group.sequence or own_group.sequences)
+            else own_group.sequences
+        )
 
     def _steps_of_group(self, group: str | None) -> Steps:
         return sum(self._sequences_of(group) or (self.session_steps(group, 1),), ())

@@ -1,8 +1,8 @@
 """How simulated participants answer statements: noise, response bias, spread of slopes, lapses.
 
-The three kinds of people that ``power`` compares have values from published ratings, in points of a seven-point scale,
-as residual SD, SD of random intercepts and SD of random slopes of a linear mixed model of each attribute: ratings by
-the mean of the other assessors. ``tests/benchmarks/analysis/rating_data.py`` computes them from the data:
+The three kinds of participants that ``power`` compares have values from published ratings, in points of a scale of
+seven points: residual SD, SD of random intercepts and SD of random slopes of a linear mixed model of each attribute, in
+which the mean of the other assessors predicts a rating. ``tests/benchmarks/analysis/rating_data.py`` computes them:
 
 - consistent: a trained panel. `TVbo`, R package lmerTest 3.1-3 (Kuznetsova, Brockhoff & Christensen 2017, Journal of
   Statistical Software 82(13)): 8 assessors, 12 products, 2 replicates, scale 0 to 15; medians over 15 attributes.
@@ -20,7 +20,7 @@ from study_app.haptics.model.ranges import within
 from study_app.protocol.source.table import Table
 
 LAPSE_POINTS: Final = 3.0
-"""An answer given in error is so many points higher than the answer model says. [choice]"""
+"""Points by which an erroneous answer exceeds that of the answer model. [choice]"""
 
 
 class SimulatedParticipants(Table):
@@ -58,7 +58,7 @@ class SimulatedParticipants(Table):
 
 
 REHEARSED: Final = SimulatedParticipants(noise_sd=0.65, bias_sd=0.4, slope_sd=0)
-"""Participants of rehearsals of a study that does not describe them. [choice]"""
+"""The participants of rehearsals if the study does not describe them. [choice]"""
 
 CONSISTENT, TYPICAL, NOISY, STATED = "consistent", "typical", "noisy", "as in the study file"
 PUBLISHED: Final[Mapping[str, SimulatedParticipants]] = {
@@ -69,6 +69,6 @@ PUBLISHED: Final[Mapping[str, SimulatedParticipants]] = {
 
 
 def compared_kinds(stated: SimulatedParticipants | None) -> dict[str, SimulatedParticipants]:
-    """Return the kinds of participants whose power is compared: the stated or typical one first."""
+    """Return the kinds of participants for which power is compared, first the stated or the typical one."""
     first = {TYPICAL: PUBLISHED[TYPICAL]} if stated is None else {STATED: stated}
     return first | {kind: PUBLISHED[kind] for kind in (CONSISTENT, NOISY)}

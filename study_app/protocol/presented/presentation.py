@@ -1,4 +1,4 @@
-"""What the intervals of a trial present to hand and eye: which level is due, and what a journal says of it."""
+"""The content of a trial's intervals for hand and eye: the next presentation, and one recorded in a journal."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from study_app.protocol.trials.stimuli import DELAY, Stimulated
 
 
 def link_descriptions(delay_ms: float = 0.0, jitter_ms: float = 0.0, loss: float = 0.0) -> Iterator[str]:
-    """Yield phrases for a condition's unusual force link: delay [ms], jitter [ms], losses."""
+    """Yield phrases on the delay [ms], jitter [ms] and loss of a condition's force link, omitting zeros."""
     if delay_ms:
         yield f"force delayed by {delay_ms:g} ms"
     if jitter_ms:
@@ -33,24 +33,25 @@ def link_seed(schedule_seed: int, participant: str, trial: int, attempt: int, in
 
 
 def longest_delay_s(protocol: Protocol, block: Block) -> float:
-    """Return the longest delay that a block can present [s]; it is equal in all its trials, so that it reveals none."""
+    """Return the longest delay that a block can present [s], the same for all its trials, so that it reveals none."""
     if block.stimulus is not None and (stimulus := protocol.stimulus_of(block)).vary == DELAY:
         standards = protocol.standards_of(block)
-        compared = [stimulus.comparison(standard, level) for standard in standards for level in stimulus.levels]
-        return max(*compared, *(standard for standard in standards if standard is not None)) / 1000
+        delays_ms = [stimulus.comparison(standard, level) for standard in standards for level in stimulus.levels]
+        return max(*delays_ms, *(standard for standard in standards if standard is not None)) / 1000
     return max(protocol.delay_s(name) for name in protocol.conditions_in(block.id))
 
 
 _STANDARD_ALONE: Final = 1
-"""The arrangement of a noise trial, in a design that has any."""
+"""The arrangement of a noise trial, in a design with noise trials."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Presentation:
     """The content of a trial; never printed.
 
-    ``level`` is 0 if only the standard is presented, None if conditions are compared; ``arrangement`` is the index
-    among the design's, ``intervals`` the content of each interval. A ``catch`` trial presents the largest level.
+    ``level`` is 0 if only the standard is presented, None if conditions are compared. ``arrangement`` is an index into
+    the design's arrangements, ``intervals`` has the content of each interval. A ``catch`` trial presents the largest
+    level.
     """
 
     level: float | None
@@ -63,10 +64,10 @@ class Presentation:
 def next_level(
     protocol: Protocol, key: Key, schedule: Schedule, trial: Trial, heard: Sequence[TrialResult]
 ) -> Presentation | None:
-    """Return a trial's presentation; None to skip it, after the end of its track or the criterion of its block.
+    """Return a trial's presentation; None to skip it, if its track has ended or the block's criterion is met.
 
-    The trial belongs to a block with a design; participant and seed of the schedule select the random streams. Of the
-    answered trials ``heard``, in any order, only earlier ones are used.
+    The trial belongs to a block with a design; participant and seed of the schedule select the random streams. Only
+    earlier trials among the answered trials ``heard``, in any order, are used.
     """
     block = protocol.blocks[trial.block]
     track = track_of(protocol, block, key.codes[block.id][trial.code])
@@ -79,10 +80,10 @@ def next_level(
     design = protocol.design_of(block)
     if design.first is not None:
         if trial.index == 1:
-            return _presentation_of(protocol, block, track, 0, design.first.level)
+            return _make_presentation(protocol, block, track, 0, design.first.level)
         slot -= 1
     if track.comparison is not None:  # conditions are compared
-        return _presentation_of(protocol, block, track, draws.arrangement(design, slot), None)
+        return _make_presentation(protocol, block, track, draws.arrangement(design, slot), None)
     method, stimulus = protocol.method_of(block), protocol.stimulus_of(block)
     setting = TrackSetting(stimulus, design, track.number)
     answered = sorted(
@@ -90,21 +91,21 @@ def next_level(
     )
     if method.ended(setting, answered):
         return None
-    catch = draws.catch(track.catch)
-    if slot in catch:
-        arrangement = draws.arrangement(design, catch.index(slot), "catch")
-        return _presentation_of(protocol, block, track, arrangement, stimulus.levels[1], catch=True)
-    slot -= sum(position < slot for position in catch)
-    noise = draws.noise(design.noise(method.presentations(stimulus)), track.slots - len(catch))
-    if slot in noise:
-        return _presentation_of(protocol, block, track, _STANDARD_ALONE, 0.0)
+    catch_slots = draws.catch(track.catch)
+    if slot in catch_slots:
+        arrangement = draws.arrangement(design, catch_slots.index(slot), "catch")
+        return _make_presentation(protocol, block, track, arrangement, stimulus.levels[1], catch=True)
+    slot -= sum(position < slot for position in catch_slots)
+    noise_slots = draws.noise(design.noise(method.presentations(stimulus)), track.slots - len(catch_slots))
+    if slot in noise_slots:
+        return _make_presentation(protocol, block, track, _STANDARD_ALONE, 0.0)
     rounds = draws.rounds(method.rounds(stimulus))
-    level = method.level(setting, slot - sum(position < slot for position in noise), answered, rounds)
-    return _presentation_of(protocol, block, track, draws.arrangement(design, slot), level)
+    level = method.level(setting, slot - sum(position < slot for position in noise_slots), answered, rounds)
+    return _make_presentation(protocol, block, track, draws.arrangement(design, slot), level)
 
 
 def is_criterion_met(block: Block, schedule: Schedule, heard: Sequence[TrialResult]) -> bool:
-    """Return whether enough of a block's last answers among ``heard`` are correct to end it."""
+    """Return whether enough of a block's last answers are correct to end it; ``heard`` are answered trials."""
     if block.until is None:
         return False
     numbers = {planned.number for planned in schedule.trials if planned.block == block.id}
@@ -116,24 +117,24 @@ def is_criterion_met(block: Block, schedule: Schedule, heard: Sequence[TrialResu
 
 @dataclass(frozen=True, slots=True, repr=False)
 class _Draws:
-    """The secret random draws of one track; each kind of draw has separate streams and does not affect the others."""
+    """The secret random draws of one track; each kind of draw has streams of its own."""
 
     secret: bytes
     track: str
 
-    def arrangement(self, design: Design, slot: int, among: str = "arrangement") -> int:
-        """Return the arrangement of a slot: each occurs twice in every 2 × arrangements slots of its own stream."""
+    def arrangement(self, design: Design, slot: int, stream_name: str = "arrangement") -> int:
+        """Return the arrangement of a slot; each one occurs twice in every 2 × arrangements slots of a stream."""
         if design.has_noise:
             return 0  # the other arrangement is the standard alone
         count = len(design.arrangements)
-        run, place = divmod(slot, 2 * count)
+        cycle, position = divmod(slot, 2 * count)
         twice: tuple[int, ...] = (*range(count), *range(count))
-        return shuffle(twice, secret_stream(self.secret, f"{among}/{self.track}/{run}").random)[place]
+        return shuffle(twice, secret_stream(self.secret, f"{stream_name}/{self.track}/{cycle}").random)[position]
 
-    def catch(self, stretches: Sequence[range]) -> tuple[int, ...]:
-        """Return the slots of the catch trials in ascending order: one in each stretch."""
+    def catch(self, ranges: Sequence[range]) -> tuple[int, ...]:
+        """Return the slots of the catch trials in ascending order, one in each of the ranges."""
         draw = secret_stream(self.secret, f"catch/{self.track}").random
-        return tuple(stretch[int(draw() * len(stretch))] for stretch in stretches)
+        return tuple(slots[int(draw() * len(slots))] for slots in ranges)
 
     def noise(self, count: int, slots: int) -> tuple[int, ...]:
         """Return the slots that present the standard alone, in ascending order."""
@@ -144,21 +145,24 @@ class _Draws:
         return [secret_stream(self.secret, f"round/{self.track}/{number}").random for number in range(count)]
 
 
-def _presentation_of(
+def _make_presentation(
     protocol: Protocol, block: Block, track: Track, arrangement: int, level: float | None, *, catch: bool = False
 ) -> Presentation:
-    """Return a track's presentation at a level (None: conditions are compared) in an arrangement."""
-    presented = protocol.design_of(block).arrangements[arrangement]
-    intervals = tuple(_interval(protocol, block, track, level if holds else None, holds) for holds in presented)
+    """Return a track's presentation in an arrangement; ``level`` is None if conditions are compared."""
+    contains_comparison = protocol.design_of(block).arrangements[arrangement]
+    intervals = tuple(
+        _interval(protocol, block, track, level if is_comparison else None, is_comparison)
+        for is_comparison in contains_comparison
+    )
     return Presentation(level, track.standard, arrangement, intervals, catch)
 
 
-def _interval(protocol: Protocol, block: Block, track: Track, level: float | None, comparison: bool) -> Stimulated:
+def _interval(protocol: Protocol, block: Block, track: Track, level: float | None, is_comparison: bool) -> Stimulated:
     if track.comparison is not None:
-        return Stimulated(track.comparison if comparison else str(block.standard))
+        return Stimulated(track.comparison if is_comparison else str(block.standard))
     stimulus = protocol.stimulus_of(block)
     condition = protocol.condition_of(stimulus)
-    if not comparison or level is None:
+    if not is_comparison or level is None:
         return Stimulated(condition, stimulus.vary, float(track.standard or 0.0))
     return Stimulated(condition, stimulus.vary, stimulus.comparison(track.standard, level))
 
@@ -168,13 +172,12 @@ def recorded_presentation(
 ) -> Presentation:
     """Return a recorded trial's presentation from its first journal line with opened sealed fields.
 
-    A line or key that does not fit the study raises KeyError, ValueError (its arrangement) or StopIteration (its
-    track).
+    Raises KeyError, ValueError (arrangement) or StopIteration (track) if the line or the key does not fit the study.
     """
     block = protocol.blocks[started["block"]]
     track = track_of(protocol, block, codes[block.id][started["code"]])
     arrangement = protocol.design_of(block).arrangement_of(started["arrangement"])
-    return _presentation_of(protocol, block, track, arrangement, started["level"], catch=started.get("catch", False))
+    return _make_presentation(protocol, block, track, arrangement, started["level"], catch=started.get("catch", False))
 
 
 def trial_result(
@@ -188,7 +191,7 @@ def trial_result(
     *,
     catch: bool = False,
 ) -> TrialResult:
-    """Return the answer to a trial of a block with a design at a level (None: conditions are compared)."""
+    """Return the result of an answered trial of a block with a design; ``level`` is None if conditions are compared."""
     design = protocol.design_of(block)
     stimulus = None if block.stimulus is None else protocol.stimulus_of(block)
     correct = design.is_correct(arrangement, answer) if design.can_be_correct(stimulus) else None

@@ -1,4 +1,4 @@
-"""The levels of a block as they are presented: force at the task's fastest point, and what the limits leave of it."""
+"""The levels of a block as presented: the force at the task's fastest point, before and after the limits."""
 
 from __future__ import annotations
 
@@ -21,22 +21,22 @@ from study_app.protocol.trials.stimuli import DELAY, OF_CONDITION, OF_LINK, Stim
 from study_app.psychophysics.families import Floats
 
 FASTER: Final = 1.2
-"""A hand exceeds the pace of its target by up to a fifth. [choice]"""
+"""Greatest ratio of a hand's speed to the pace of its target. [choice]"""
 UNPACED_MPS: Final = 0.3
-"""A hand that is free moves as fast. [choice]"""
+"""Speed of a hand without a paced target [m/s]. [choice]"""
 BEYOND: Final = (4.0, 2.0, 1.0)
-"""So far beyond the largest value a limit is looked for, less where a liquid cannot have such a number."""
+"""Multiples of the largest value up to which a limit is searched; smaller ones are for numbers with a maximum."""
 _STEPS: Final = 2**32
-"""Of the search for a limit."""
+"""Number of steps of the search for a limit."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Level:
     """One level of one standard (None if the level is the value itself); ``comparison`` is the varied number's value.
 
-    ``asked_n`` is its drag force at the task's fastest point, ``sent_n`` the part that limits permit [N], None for a
-    number of the condition; ``clipped_by`` is the "norm" (``device.force_limit_n``) or the "slope" limit of the loop
-    (`haptics.model.slope_limits`), ``damping_nspm`` that of a linear law, otherwise 0.
+    ``asked_n`` is its drag force at the task's fastest point, and ``sent_n`` the part that the limits permit [N]; both
+    are None for a number of the condition. ``clipped_by`` is "norm" for the force limit (``device.force_limit_n``),
+    "slope" for the slope limit of the loop (`haptics.model.slope_limits`). ``damping_nspm`` is 0 without a linear law.
     """
 
     standard: float | None
@@ -50,7 +50,7 @@ class Level:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LevelLimits:
-    """The highest unclipped values of the varied number for two limits; None: beyond the searched range.
+    """The highest unclipped values of the varied number for two limits; None if beyond the searched range.
 
     ``force`` is for the force limit, ``loop`` for the slope limit, both for a hand at ``hand_mps`` [m/s].
     """
@@ -61,7 +61,7 @@ class LevelLimits:
 
     @property
     def lowest(self) -> float | None:
-        """The value above which a limit clips the force; None without a limit."""
+        """The value above which either limit clips the force; None without a limit."""
         return min((limit for limit in (self.force, self.loop) if limit is not None), default=None)
 
 
@@ -85,7 +85,7 @@ class Clipping:
 
     @property
     def named(self) -> str:
-        """The standard as a text after a noun: " 52"; "" if it is the only one."""
+        """The standard as text to append to a noun: " 52"; "" if it is the only standard."""
         return f" {self.standard:g}" if self.others else ""
 
     def highest(self, stimulus: Stimulus) -> float:
@@ -102,22 +102,22 @@ class Clipping:
 
 
 def levels(protocol: Protocol, block_id: str) -> tuple[Level, ...]:
-    """Return every level that a block with a stimulus can present, by standard, the smallest first."""
+    """Return every level that a block with a stimulus can present: by standard, and in ascending order."""
     block = protocol.blocks[block_id]
     if block.stimulus is None:
         return ()
     stimulus, method = protocol.stimulus_of(block), protocol.method_of(block)
-    asked = sorted({*(stimulus.grid if method.adaptive else ()), *method.levels_of(stimulus)})
+    requested_levels = sorted({*(stimulus.grid if method.adaptive else ()), *method.levels_of(stimulus)})
     scene, hand_mps = protocol.scene_for(protocol.condition_of(stimulus)), hand_mps_of(protocol, block)
     return tuple(
         _level(stimulus, scene, hand_mps, standard, level)
         for standard in protocol.standards_of(block)
-        for level in asked
+        for level in requested_levels
     )
 
 
 def standard_level(protocol: Protocol, block_id: str, standard: float) -> Level:
-    """Return a standard of a block as a level of 0."""
+    """Return the level 0 of a standard, at which the standard itself is presented."""
     block = protocol.blocks[block_id]
     stimulus = protocol.stimulus_of(block)
     scene = protocol.scene_for(protocol.condition_of(stimulus))
@@ -147,9 +147,14 @@ def level_limits(protocol: Protocol, block: Block) -> LevelLimits | None:
     if block.stimulus is None:
         return None
     stimulus, standards = protocol.stimulus_of(block), protocol.standards_of(block)
-    scene, asked = protocol.scene_for(protocol.condition_of(stimulus)), protocol.method_of(block).levels_of(stimulus)
-    most = max(stimulus.comparison(standard, level) for standard, level in product(standards, (0.0, *asked)))
-    if stimulus.vary in OF_CONDITION or len(scene.liquids) != 1 or most <= 0:
+    scene, requested_levels = (
+        protocol.scene_for(protocol.condition_of(stimulus)),
+        protocol.method_of(block).levels_of(stimulus),
+    )
+    largest = max(
+        stimulus.comparison(standard, level) for standard, level in product(standards, (0.0, *requested_levels))
+    )
+    if stimulus.vary in OF_CONDITION or len(scene.liquids) != 1 or largest <= 0:
         return None
     hand_mps = hand_mps_of(protocol, block)
 
@@ -161,32 +166,32 @@ def level_limits(protocol: Protocol, block: Block) -> LevelLimits | None:
         return steady_force(unlimited, hand_mps).limit is not None
 
     return LevelLimits(
-        force=_highest_within_limit(beyond_force, most),
-        loop=_highest_within_limit(beyond_loop, most),
+        force=_highest_unclipped_value(beyond_force, largest),
+        loop=_highest_unclipped_value(beyond_loop, largest),
         hand_mps=hand_mps,
     )
 
 
-def _highest_within_limit(beyond: Callable[[float], bool], most: float) -> float | None:
-    """Return the highest value up to a multiple of ``most`` that is within a limit; None if none is."""
+def _highest_unclipped_value(exceeds_limit: Callable[[float], bool], largest: float) -> float | None:
+    """Return the highest value within a limit, searched up to a multiple of ``largest``; None if it is beyond that."""
 
-    def holds(value: float) -> bool:
+    def is_beyond(value: float) -> bool:
         try:
-            return beyond(value)
-        except StudyError:  # a liquid cannot have such a value
+            return exceeds_limit(value)
+        except StudyError:  # the liquid cannot have this value
             return False
 
-    high = next((factor * most for factor in BEYOND if holds(factor * most)), None)
+    high = next((factor * largest for factor in BEYOND if is_beyond(factor * largest)), None)
     if high is None:
         return None
     step = high / _STEPS
-    return bisect_left(range(1, _STEPS), True, key=lambda number: holds(number * step)) * step
+    return bisect_left(range(1, _STEPS), True, key=lambda number: is_beyond(number * step)) * step
 
 
 def clipping(protocol: Protocol, block: Block, limits: LevelLimits | None = None) -> Clipping | None:
-    """Return the clipping of a block's levels; None if none are clipped, or if limits do not determine them.
+    """Return the clipping of a block's levels; None if no level is clipped, or `level_limits` finds no limit.
 
-    ``limits`` are those of `level_limits`, if they are known.
+    ``limits`` are those of `level_limits`, if already known.
     """
     if block.stimulus is None:
         return None
@@ -208,13 +213,13 @@ def hand_mps_of(protocol: Protocol, block: Block) -> float:
 
 
 def extreme_levels(protocol: Protocol, block: Block) -> Iterator[tuple[float | None, float, Scene]]:
-    """Yield standard, level and scene at the strongest and the weakest level of each standard, except for delays."""
+    """Yield standard, level and scene at the highest and the lowest level of each standard; nothing for delays."""
     stimulus = protocol.stimulus_of(block)
     if stimulus.vary == DELAY:
         return
-    asked = protocol.method_of(block).levels_of(stimulus)
+    requested_levels = protocol.method_of(block).levels_of(stimulus)
     scene = protocol.scene_for(protocol.condition_of(stimulus))
-    for standard, level in product(protocol.standards_of(block), (max(asked), min(asked))):
+    for standard, level in product(protocol.standards_of(block), (max(requested_levels), min(requested_levels))):
         varied = scene
         if stimulus.vary not in OF_LINK:
             varied = override_value(scene, stimulus.vary, stimulus.comparison(standard, level))

@@ -1,15 +1,16 @@
-"""Named random streams: every choice of a session has a name, and a draw more in one moves no other.
+"""Named random streams: each random choice of a session has a stream, so that further draws do not change others.
 
 A stream is a ``random.Random`` seeded by SHA-256 of (seed, name), of which only ``.random()`` is used (the one method
-Python promises never to change), under our own Fisher–Yates.
+that Python promises never to change), with our own Fisher–Yates shuffle.
 
-Streams that only the sealed key can repeat draw what would reveal what an interval presented. They are seeded by
-HMAC-SHA256 under a sub-key of the key's nonce, so that neither seed nor protocol tells their numbers (RFC 2104).
+Draws that would reveal the content of an interval come from streams that only the sealed key can reproduce. They are
+seeded by HMAC-SHA256 under a sub-key of the key's nonce, so that seed and protocol do not determine them (RFC 2104).
 
-**Groups** are allocated in permuted blocks. The participant with entry k of a folder is in the group at place k of
-permuted blocks. A permuted block holds every group as often as its share says, shuffled by a stream of the secret. So
-groups of share 1 never differ by more than one participant, and without the secret the next allocation cannot be
-predicted. The place of an entry in its group counts the entries of that group from 1; it assigns rows of squares.
+**Groups** are allocated in permuted blocks. The participant with entry k of a folder has the group at position k of the
+permuted blocks. A permuted block contains every group as often as its share states, shuffled by a stream of the secret.
+So the sizes of groups with share 1 never differ by more than one participant, and without the secret the next
+allocation cannot be predicted. An entry's position in its group counts the entries of that group from 1; it assigns
+rows of squares.
 """
 
 from __future__ import annotations
@@ -40,7 +41,7 @@ def study_stream(study: str, name: str) -> random.Random:
 def shuffle(items: Iterable[_T], draw: Draw) -> tuple[_T, ...]:
     """Return ``items`` in random order (Fisher–Yates, Durstenfeld's variant), with len(items) − 1 calls of ``draw``.
 
-    ``draw`` gives uniform numbers in [0, 1), as ``stream(…).random`` does.
+    ``draw`` returns uniform numbers in [0, 1), as ``stream(…).random`` does.
     """
     order = list(items)
     for last in range(len(order) - 1, 0, -1):
@@ -69,12 +70,12 @@ def draw_secret(draw: Draw) -> bytes:
 
 
 def _sub_key(secret: bytes, name: str) -> bytes:
-    """Return the sub-key of that name (32 bytes)."""
+    """Return the sub-key with a name (32 bytes)."""
     return hmac.digest(secret, name.encode(), "sha256")
 
 
 def secret_stream(secret: bytes, name: str) -> random.Random:
-    """Return the stream with a name; use only its ``.random()``."""
+    """Return the secret stream with a name; use only its ``.random()``."""
     return random.Random(int.from_bytes(_sub_key(_sub_key(secret, "levels"), name), "big"))  # noqa: S311 - seeded by a MAC
 
 
@@ -95,8 +96,8 @@ def group_of(shares: Mapping[str, int], secret: bytes, entry: int) -> str:
 
 
 def place_in_group(shares: Mapping[str, int], secret: bytes, entry: int) -> tuple[str, int]:
-    """Return the group of participant ``entry``, as `group_of`, and the participant's number in it, from 1."""
+    """Return the group of participant number ``entry``, like `group_of`, and the position in it, from 1."""
     groups = [name for name in sorted(shares) for _ in range(shares[name])]
-    block, at = divmod(entry - 1, len(groups))
-    drawn = shuffle(groups, secret_stream(secret, f"groups/{block + 1}").random)
-    return drawn[at], block * shares[drawn[at]] + drawn[: at + 1].count(drawn[at])
+    block, position = divmod(entry - 1, len(groups))
+    shuffled = shuffle(groups, secret_stream(secret, f"groups/{block + 1}").random)
+    return shuffled[position], block * shares[shuffled[position]] + shuffled[: position + 1].count(shuffled[position])

@@ -1,7 +1,7 @@
-"""A TOML document as ``tomllib`` reads it (arrays as tuples), and where in its text each key and value stands.
+"""A TOML document as ``tomllib`` reads it (arrays as tuples), and the positions of its keys and values in the text.
 
-The scan keeps character positions, which ``tomllib`` does not. It reads texts that ``tomllib`` has accepted, so it only
-has to follow structure, not to judge it.
+Unlike ``tomllib``, the scan records character positions. It assumes that ``tomllib`` has accepted the text, and does
+not validate it.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from typing import Any, Final, Literal, NamedTuple, TypeAlias
 
 Path: TypeAlias = tuple[str | int, ...]
 _TABLE: Final = (dict, Mapping)
-"""The first one is what is there nearly always, and found sooner."""
+"""Types of tables; ``dict`` comes first, because nearly all tables are of this type and the check is faster."""
 
 
 def has(node: Any, step: str | int) -> bool:
-    """Return whether ``node`` is a table with that key or an array with that index."""
+    """Return whether ``node`` is a table with the key ``step``, or an array with the index ``step``."""
     if isinstance(step, int):
         return isinstance(node, tuple) and step < len(node)
     return isinstance(node, _TABLE) and step in node
@@ -48,17 +48,17 @@ def entries(document: Any, pattern: str) -> Iterator[tuple[Path, Any]]:
 
 
 def _children(node: Any) -> Iterable[tuple[str | int, Any]]:
-    """Return the entries of a table or array with their keys or indices."""
+    """Return the entries of a table or array with keys or indices; none of other values."""
     return node.items() if isinstance(node, _TABLE) else enumerate(node) if isinstance(node, tuple) else ()
 
 
 def names(document: Any, section: str) -> tuple[str, ...]:
-    """Return the names of the tables of a section, valid or not."""
+    """Return the names of a section's tables, valid or not."""
     return tuple(str(path[1]) for path, _ in entries(document, f"{section}.*") if isinstance(path[1], str))
 
 
 def frozen(value: Any) -> Any:
-    """Return a ``tomllib`` value with arrays as tuples (ValueError: whole numbers beyond TOML's 64 bits)."""
+    """Return a ``tomllib`` value with arrays as tuples; raise ValueError for whole numbers beyond TOML's 64 bits."""
     if isinstance(value, list):
         return tuple(frozen(entry) for entry in value)
     if isinstance(value, dict):
@@ -86,11 +86,11 @@ Kind: TypeAlias = Literal["table", "array table", "key", "pair", "entry"]
 class Node(NamedTuple):
     """One header, key or array entry of a text; positions count characters from 0, ends are exclusive.
 
-    Its ``kind`` is "table" for a header ``[a.b]``, "array table" for ``[[a.b]]``, "key" for a key on its own lines,
+    The ``kind`` is "table" for a header ``[a.b]``, "array table" for ``[[a.b]]``, "key" for a key on its own lines,
     "pair" for a key of an inline table, "entry" for an entry of an array. The path consists of keys and, for array
-    entries, indices from 0: ``("blocks", "liquids", "conditions", 2)``; ``parts`` are the positions of the parts of its
-    key: ``a`` and ``"b c"`` of ``a . "b c"``. Its value begins at ``value`` (for a header: its end); it ends without a
-    comma or comment.
+    entries, indices from 0: ``("blocks", "liquids", "conditions", 2)``; ``parts`` are the positions of the parts of the
+    key: ``a`` and ``"b c"`` of ``a . "b c"``. The value begins at ``value`` (for a header, at its end); the node ends
+    before a comma or comment.
     """
 
     kind: Kind
@@ -112,69 +112,71 @@ class _Scan:
     def __init__(self, text: str) -> None:
         self.nodes: list[Node] = []
         self._text = text
-        self._at = 0
+        self._position = 0
         self._array_tables: dict[Path, int] = {}
         table: Path = ()
         while self._skip_blank():
-            table = self._read_header() if text.startswith("[", self._at) else self._read_assignment(table, "key")
+            table = self._read_header() if text.startswith("[", self._position) else self._read_assignment(table, "key")
 
     def _read_header(self) -> Path:
-        start = self._at
-        many = self._skip_mark("[[")
-        if not many:
+        start = self._position
+        is_array = self._skip_mark("[[")
+        if not is_array:
             self._skip_mark("[")
         keys, parts = self._read_key()
-        self._skip_mark("]]" if many else "]")
+        self._skip_mark("]]" if is_array else "]")
         path = self._resolve_array_tables(keys)
-        if many:
+        if is_array:
             index = self._array_tables.get(path, 0)
             self._array_tables[path] = index + 1
             path = (*path, index)
         self.nodes.append(
             Node(
-                kind="array table" if many else "table",
+                kind="array table" if is_array else "table",
                 path=path,
                 parts=parts,
                 start=start,
-                value=self._at,
-                end=self._at,
+                value=self._position,
+                end=self._position,
             )
         )
         return path
 
     def _resolve_array_tables(self, keys: Path) -> Path:
-        """Return the path that a header names; an array of tables on the way means its latest entry."""
+        """Return the path of a header's keys; an array of tables in the path stands for its last entry."""
         path: Path = ()
         for key in keys[:-1]:
             path = (*path, key)
             if path in self._array_tables:
                 path = (*path, self._array_tables[path] - 1)
-        return (*path, *keys[-1:])  # none while a header is typed
+        return (*path, *keys[-1:])  # a header that is being typed may have no key
 
     def _read_assignment(self, table: Path, kind: Kind) -> Path:
         """Read a key and its value; return the table to which they belong."""
-        start = self._at
+        start = self._position
         keys: Path
         parts: tuple[tuple[int, int], ...]
         if plain := _PLAIN_KEY.match(self._text, start):
-            keys, parts, self._at = (plain[1],), (plain.span(1),), plain.end()
+            keys, parts, self._position = (plain[1],), (plain.span(1),), plain.end()
         else:
             keys, parts = self._read_key()
             self._skip_blank()
             self._skip_mark("=")
             self._skip_blank()
-        value, path = self._at, table + keys
+        value, path = self._position, table + keys
         self._read_value(path)
-        self.nodes.append(Node(kind=kind, path=path, parts=parts, start=start, value=value, end=self._at))
+        self.nodes.append(Node(kind=kind, path=path, parts=parts, start=start, value=value, end=self._position))
         return table
 
     def _read_value(self, path: Path) -> None:
         if self._skip_mark("["):
             index = 0
             while self._skip_blank() and not self._skip_mark("]"):
-                start, entry = self._at, (*path, index)
-                self._read_value(entry)
-                self.nodes.append(Node(kind="entry", path=entry, parts=(), start=start, value=start, end=self._at))
+                start, entry_path = self._position, (*path, index)
+                self._read_value(entry_path)
+                self.nodes.append(
+                    Node(kind="entry", path=entry_path, parts=(), start=start, value=start, end=self._position)
+                )
                 index += 1
                 self._skip_blank()
                 self._skip_mark(",")
@@ -183,38 +185,38 @@ class _Scan:
                 self._read_assignment(path, "pair")
                 self._skip_blank()
                 self._skip_mark(",")
-        elif string := _STRING.match(self._text, self._at):
-            self._at = string.end()
-        elif scalar := _SCALAR.match(self._text, self._at):
-            self._at += len(scalar.group().rstrip(" \t"))
+        elif string := _STRING.match(self._text, self._position):
+            self._position = string.end()
+        elif scalar := _SCALAR.match(self._text, self._position):
+            self._position += len(scalar.group().rstrip(" \t"))
 
     def _read_key(self) -> tuple[Path, tuple[tuple[int, int], ...]]:
         keys: list[str] = []
         parts: list[tuple[int, int]] = []
         while True:
             self._skip_blank()
-            if bare := _BARE_KEY.match(self._text, self._at):
+            if bare := _BARE_KEY.match(self._text, self._position):
                 keys.append(bare.group())
                 parts.append(bare.span())
-                self._at = bare.end()
-            elif quoted := _STRING.match(self._text, self._at):
+                self._position = bare.end()
+            elif quoted := _STRING.match(self._text, self._position):
                 keys.append(str(tomllib.loads(f"key = {quoted.group()}")["key"]))
                 parts.append(quoted.span())
-                self._at = quoted.end()
+                self._position = quoted.end()
             self._skip_blank()
             if not self._skip_mark("."):
                 return tuple(keys), tuple(parts)
 
     def _skip_blank(self) -> bool:
         """Skip white space and comments; return False at the end of the text."""
-        if blank := _BLANK.match(self._text, self._at):
-            self._at = blank.end()
-        return self._at < len(self._text)
+        if blank := _BLANK.match(self._text, self._position):
+            self._position = blank.end()
+        return self._position < len(self._text)
 
     def _skip_mark(self, mark: str) -> bool:
         """Skip ``mark`` and return True if it comes next."""
-        if self._text.startswith(mark, self._at):
-            self._at += len(mark)
+        if self._text.startswith(mark, self._position):
+            self._position += len(mark)
             return True
         return False
 
@@ -233,7 +235,7 @@ class Places:
 
     @cached_property
     def _lines(self) -> dict[Path, int]:
-        """The lines by path; only texts with problems are scanned for them."""
+        """The line of each path; computed on first use, because only texts with problems need it."""
         line_starts = [0, *(match.end() for match in re.finditer("\n", self._source))]
         lines: dict[Path, int] = {}
         for node in scan_nodes(self._source):

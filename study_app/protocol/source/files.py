@@ -1,9 +1,10 @@
-"""Where protocol files are, and the files that a study names: liquid files and footage, both in the study's folder.
+"""Protocol files, and the files to which a study refers: liquid files and footage, both in the study's folder.
 
-``[liquids.syrup] file = "syrup.toml"`` names a scene file with one liquid, ``[conditions.seen] view = "waves.mp4"`` a
-video. A study's source is its file, followed by the SHA-256 of its footage in a table ``[footage_files]``, and by its
-liquid files as texts in a last table ``[liquid_files]``. So the source's hash covers all that is presented, and
-the lines of the study's own file keep their numbers. A file that names none of these is its own source, byte for byte.
+``[liquids.syrup] file = "syrup.toml"`` refers to a scene file with one liquid, ``[conditions.seen] view =
+"waves.mp4"`` to a video. A study's source is its file, followed by the SHA-256 of its footage in a table
+``[footage_files]``, and by its liquid files as texts in a last table ``[liquid_files]``. So the source's hash covers
+everything that is presented, and the lines of the study's own file keep their numbers. A file without such references
+is its own source.
 """
 
 from __future__ import annotations
@@ -28,10 +29,10 @@ TABLE: Final = "liquid_files"
 FOOTAGE_TABLE: Final = "footage_files"
 _FOOTAGE_HEADER: Final = f"\n\n# The SHA-256 of the footage of this study.\n[{FOOTAGE_TABLE}]\n".encode()
 _HEADER: Final = f"\n\n# The liquid files of this study, as they were read.\n[{TABLE}]\n".encode()
-_MOST_BYTES: Final = 1_000_000
-"""Size of a study with its liquid files [bytes]; one with 200 statements has 50,000."""
-_DRAWN_OR_LIVE: Final = ("tank", "camera")
-"""Views of a condition that are no file."""
+_MAX_BYTES: Final = 1_000_000
+"""Greatest size of a study with its liquid files [bytes]; a study with 200 statements has 50,000."""
+_VIEWS_WITHOUT_FILE: Final = ("tank", "camera")
+"""Views of a condition that are not files."""
 
 
 def without_byte_order_mark(content: bytes) -> bytes:
@@ -45,7 +46,7 @@ def is_utf16(content: bytes) -> bool:
 
 
 class StudySource(NamedTuple):
-    """A study's file, and by name the texts of the liquid files and the SHA-256 of the footage that it names."""
+    """A study's file, and by name the texts of its liquid files and the SHA-256 of its footage."""
 
     file: bytes
     liquids: Mapping[str, str] = MappingProxyType({})
@@ -59,20 +60,20 @@ class StudySource(NamedTuple):
         return cls(file, liquids, footage)
 
     def with_liquids(self, text_of: Callable[[str], str | None]) -> StudySource:
-        """Return it with other liquid files; ``text_of`` returns the text of one, None if it is missing."""
+        """Return the source with other liquid files; ``text_of`` returns the text of a file, None if it is missing."""
         names = _section_texts(self.file, "liquids", "file")
         return self._replace(liquids={name: text for name in names if (text := text_of(name)) is not None})
 
     @property
     def content(self) -> bytes:
-        """The study's file followed by the files that it names."""
+        """The source as bytes: the study's file, followed by the tables of footage and liquid files."""
         return self.file + _table_bytes(_FOOTAGE_HEADER, self.footage) + _table_bytes(_HEADER, self.liquids)
 
 
 def with_liquid_files(study: bytes, folder: Path) -> bytes:
-    """Return a study's source: its file without a byte order mark, and the liquid files that it names in ``folder``.
+    """Return a study's source: its file without a byte order mark, and its footage and liquid files in ``folder``.
 
-    Unreadable files are omitted; `load.parse` reports them. A source is returned unchanged.
+    Unreadable files are omitted; `load.parse` reports them. A file that is already a source is returned unchanged.
     """
     study = without_byte_order_mark(study)
     if _HEADER in study or _FOOTAGE_HEADER in study:
@@ -96,7 +97,7 @@ def _table_bytes(header: bytes, texts: Mapping[str, str]) -> bytes:
 
 
 def file_path_fault(path: str) -> str:
-    """Return why Windows cannot have a file that a study names, "" if it can."""
+    """Return the reason why a file path is not valid on Windows, or ""."""
     names = (part for part in PureWindowsPath(path).parts if part != PureWindowsPath(path).anchor)
     return next((f'"{name}" {fault}' for name in names if (fault := file_name_fault(name))), "")
 
@@ -108,27 +109,27 @@ def _footage_names(study: bytes) -> list[str]:
 
 def is_footage(view: object) -> bool:
     """Return whether a condition's view is a footage file."""
-    return isinstance(view, str) and view not in _DRAWN_OR_LIVE
+    return isinstance(view, str) and view not in _VIEWS_WITHOUT_FILE
 
 
 def file_hash(path: Path) -> str | None:
     """Return the SHA-256 of a file in hexadecimal; None if it cannot be read."""
     try:
-        held = path.stat()
-        return _hash_of_file(path, held.st_size, held.st_mtime_ns) if path.is_file() else None
+        status = path.stat()
+        return _hash_of_file(path, status.st_size, status.st_mtime_ns) if path.is_file() else None
     except (OSError, ValueError):
         return None
 
 
 @lru_cache(maxsize=64)
 def _hash_of_file(path: Path, size: int, changed_ns: int) -> str:
-    """Return the hash; ``size`` and ``changed_ns`` are cache keys that change with the file."""
+    """Return the SHA-256 of a file; ``size`` and ``changed_ns`` are cache keys that change with the file."""
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def _section_texts(study: bytes, section: str, key: str) -> list[str]:
-    """Return the sorted unique texts under a key in a section's tables; empty if the study is not TOML."""
+    """Return the distinct texts of a key in a section's tables, sorted; empty if the study is not TOML."""
     if not re.search(rf"""\b{key}["']?[ \t]*=""".encode(), study):
         return []
     try:
@@ -153,7 +154,7 @@ def _text_of_file(path: Path) -> str | None:
 
 
 _PACKAGE = Path(__file__).resolve().parents[2]
-# A checkout is offered as the workspace: then the folder of these protocols also holds the studies made there.
+# The names are listed, because the workspace may be a checkout, whose protocols folder also contains new studies.
 _SHIPPED = (
     "delaydetect",
     "delayjnd",
@@ -170,8 +171,8 @@ _SHIPPED = (
 
 def _shipped_folder() -> Path:
     """Return the protocols' folder in an installed package, or next to the package in a checkout."""
-    inside = _PACKAGE / "protocols"
-    return inside if inside.is_dir() else _PACKAGE.parent / "protocols"
+    packaged = _PACKAGE / "protocols"
+    return packaged if packaged.is_dir() else _PACKAGE.parent / "protocols"
 
 
 def shipped() -> dict[str, Path]:
@@ -196,7 +197,7 @@ def known_protocols() -> tuple[str, ...]:
 
 
 def protocol_file(name_or_path: str | Path) -> Path:
-    """Return the file of a protocol (ProtocolError if there is none)."""
+    """Return the file of a protocol; raise ProtocolError if there is none."""
     path = Path(name_or_path)
     if path.is_file():
         return path
@@ -232,17 +233,17 @@ def source_bytes(name_or_path: str | Path) -> bytes:
 
 
 def find_study_file(study: str, hashes: Iterable[str], footage: Mapping[str, str]) -> tuple[Path, StudySource] | None:
-    """Return the file of a study by its name, with one of these hashes of its source, among the known protocols.
+    """Return file and source of the known protocol with this study name and one of these hashes, or None.
 
-    ``footage`` has the SHA-256 of the study's footage by name, which may be elsewhere.
+    ``footage`` has the SHA-256 of the study's footage by name, because the footage may be elsewhere.
     """
     for name in known_protocols():
         try:
             file = protocol_file(name)
-            if not _is_of(study, file):  # the footage of other studies is not hashed: it may be large
+            if not _has_study_name(study, file):  # the footage of other studies, which may be large, is not hashed
                 continue
             source = StudySource.split(source_bytes(name))
-        except ProtocolError:  # possibly another study's; unreadable files cannot be shared
+        except ProtocolError:  # an unreadable file cannot be shared, and may be of another study
             continue
         content = source._replace(footage=footage).content
         if any(has_hash(content, digest) for digest in hashes):
@@ -250,19 +251,19 @@ def find_study_file(study: str, hashes: Iterable[str], footage: Mapping[str, str
     return None
 
 
-def _is_of(study: str, file: Path) -> bool:
-    """Return whether a protocol file belongs to the study of that name."""
+def _has_study_name(study: str, file: Path) -> bool:
+    """Return whether a protocol file has this study name."""
     try:
-        head = tomllib.loads(without_byte_order_mark(file.read_bytes()).decode()).get("study")
+        study_table = tomllib.loads(without_byte_order_mark(file.read_bytes()).decode()).get("study")
     except (OSError, ValueError, RecursionError):
         return False
-    return isinstance(head, dict) and head.get("name") == study
+    return isinstance(study_table, dict) and study_table.get("name") == study
 
 
 def check_size(source: bytes, name: str) -> None:
-    """Raise an error if a source is larger than any study, before it is parsed."""
-    if len(source) > _MOST_BYTES:
-        size = f"is {len(source) / 1e6:.1f} MB in size, but a study file may be at most {_MOST_BYTES / 1e6:g} MB"
+    """Raise ProtocolError if a source is too large to be a study, before it is parsed."""
+    if len(source) > _MAX_BYTES:
+        size = f"is {len(source) / 1e6:.1f} MB in size, but a study file may be at most {_MAX_BYTES / 1e6:g} MB"
         raise ProtocolError(name, (Problem("file", size, hint="check that it is a study file"),))
 
 

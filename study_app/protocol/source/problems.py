@@ -1,4 +1,4 @@
-"""What pydantic found wrong, as sentences for the author of the file: thing, value, what is permitted, what to do."""
+"""pydantic's errors as sentences for the author of the file: key, value, permitted values, and a hint."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ _FaultKind: TypeAlias = Literal[
     "", "missing", "unknown key", "unknown name", "surplus", "other language", "one language", "alike", "not a number",
     "not in sequence", "part", "no text",
 ]  # fmt: skip
-"""What is wrong, where a repair follows from it: "surplus" does not belong there, "other language" is a text in one
-that the study lacks, "one language" a plain text in a study of several, "alike" a text that repeats another one, "part"
-the number of a part of the session, "no text" a text that is missing in one of several languages; "" is anything
-else."""
+"""The kind of a fault, if it determines the repair: "surplus" is a key or entry that is not permitted here, "other
+language" a text in a language that the study does not have, "one language" a plain text in a study with several
+languages, "alike" a text that repeats another one, "part" the number of a part of the session, "no text" a text that is
+missing in a language; "" is any other fault."""
 
 
 class Fault(NamedTuple):
     """A problem before its line is known; indices in ``path`` count from 0.
 
     ``missing_language`` is the code of the language in which a text is missing, "" for other problems. ``use`` is a
-    place and a value that may repair the fault, for an unknown key the suggested key; ``permitted`` are the permitted
-    words if the value resembles none of them.
+    path and a value that may repair the fault, or for an unknown key the path and the suggested key; ``permitted`` are
+    the permitted words if the value resembles none of them.
     """
 
     path: Path
@@ -49,9 +49,9 @@ class Fault(NamedTuple):
         return self.missing_language in ("", language) and not (self.kind == "one language" and language == first)
 
     def located(self, places: Places) -> Problem:
-        """Return the problem with its line; in the displayed place, entries count from 1.
+        """Return the problem with its line; in its displayed path, entries count from 1.
 
-        What does not belong there is to be removed, which the designer offers as a repair.
+        The hint of a surplus key or entry also suggests removing it, as the designer does.
         """
         place = ".".join(str(step + 1) if isinstance(step, int) else step for step in self.path)
         hints = (self.hint, "remove it" if self.kind == "surplus" else "")
@@ -94,7 +94,7 @@ _BOUNDS = {
     "less_than_equal": ("le", "at most"),
 }
 _NO_BOUND: Final = 1e9
-"""Numbers so large are limits of the computer, which a message does not state as permitted values."""
+"""Bounds of at least this size are limits of the computer, which a message does not state."""
 _LENGTHS = {
     "too_short": "has too few entries ({actual_length}): it needs at least {min_length}",
     "too_long": "has too many entries ({actual_length}): it may have at most {max_length}",
@@ -103,7 +103,7 @@ _LENGTHS = {
 
 
 def shown_value(value: Any) -> str:
-    """Return a value in TOML, shortened."""
+    """Return a value as shortened TOML text."""
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, str):
@@ -114,12 +114,12 @@ def shown_value(value: Any) -> str:
 
 
 def rule_of(pattern: str) -> str:
-    """Return the rule of a pattern as text."""
+    """Return the text that describes a pattern's rule."""
     return _PATTERNS.get(pattern, "text in a different format")
 
 
 def did_you_mean(word: str, permitted: Iterable[str]) -> str:
-    """Return "did you mean …?" for the nearest permitted word, or the list of words if none is near."""
+    """Return "did you mean …?" with the nearest permitted word, or the list of words if none is near."""
     known = sorted(permitted)
     near = difflib.get_close_matches(word, known, n=1, cutoff=0.6)
     if near:
@@ -128,16 +128,16 @@ def did_you_mean(word: str, permitted: Iterable[str]) -> str:
 
 
 def unknown_name(path: Path, message: str, word: str, permitted: Iterable[str], cutoff: float = 0.0) -> Fault:
-    """Return the fault about an unknown name, with the nearest permitted name or the list of names."""
+    """Return the fault of an unknown name, with the nearest permitted name or the list of names."""
     known = sorted(permitted)
     nearest = difflib.get_close_matches(word, known, n=1, cutoff=cutoff)
     near = difflib.get_close_matches(word, known, n=1, cutoff=0.6)
-    use, others = (path, nearest[0]) if nearest else None, () if near else tuple(known)
-    return Fault(path, message, did_you_mean(word, known), use=use, kind="unknown name", permitted=others)
+    use, unlike = (path, nearest[0]) if nearest else None, () if near else tuple(known)
+    return Fault(path, message, did_you_mean(word, known), use=use, kind="unknown name", permitted=unlike)
 
 
 def _unknown_value(path: Path, value: Any, message: str, permitted: str) -> Fault:
-    """Return the fault about a value that is not among quoted words, with the nearest one."""
+    """Return the fault of a value that is not among the quoted words in ``permitted``, with the nearest word."""
     near = difflib.get_close_matches(str(value), re.findall('"([^"]*)"', permitted), n=1)
     return Fault(path, message, f'did you mean "{near[0]}"?', use=(path, near[0])) if near else Fault(path, message)
 
@@ -146,7 +146,7 @@ def faults_of(error: ValidationError, document: Mapping[str, Any], schema: Schem
     """Return pydantic's findings in ``document`` as faults; ``schema`` is its JSON Schema."""
     faults = [_fault(details, document, schema) for details in error.errors(include_url=False)]
     paths = [fault.path for fault in faults]
-    return [  # if an array has an invalid entry, pydantic counts only the valid ones
+    return [  # pydantic does not count invalid entries of an array, so that its length seems wrong
         fault
         for fault in faults
         if not (fault.counts_entries and any(path[:-1][: len(fault.path)] == fault.path for path in paths))
@@ -166,8 +166,8 @@ def _fault(details: ErrorDetails, document: Mapping[str, Any], schema: Schema) -
     if kind == "extra_forbidden":
         permitted = {key for node in _nodes_at(document, path[:-1], schema) for key in node.get("properties", {})}
         hint = did_you_mean(str(path[-1]), permitted)
-        meant = difflib.get_close_matches(str(path[-1]), sorted(permitted), n=1)
-        return Fault(path, "unknown key", hint, use=(path, meant[0]) if meant else None, kind="unknown key")
+        near_keys = difflib.get_close_matches(str(path[-1]), sorted(permitted), n=1)
+        return Fault(path, "unknown key", hint, use=(path, near_keys[0]) if near_keys else None, kind="unknown key")
     if kind == "union_tag_not_found":
         key = _tag_key(context)
         choices = (node.get("properties", {}).get(key, {}) for node in _nodes_at(document, path, schema))
@@ -196,8 +196,8 @@ def _fault(details: ErrorDetails, document: Mapping[str, Any], schema: Schema) -
     if kind == "string_pattern_mismatch":
         return Fault(path, f"{shown_value(value)} is not permitted: use {rule_of(str(context['pattern']))}")
     if kind in _LENGTHS:
-        about = {**context, "shown": shown_value(value)}
-        return Fault(path, _LENGTHS[kind].format(**about), counts_entries=kind == "too_short")
+        details_by_name = {**context, "shown": shown_value(value)}
+        return Fault(path, _LENGTHS[kind].format(**details_by_name), counts_entries=kind == "too_short")
     use = context.get("use")
     sentence = details["msg"].removeprefix("Value error, ")
     repair = ((*path[:-1], use[0]), use[1]) if use else None
@@ -209,13 +209,13 @@ def _tag_key(context: Mapping[str, Any]) -> str:
 
 
 def _path_in(document: Any, loc: tuple[str | int, ...], *, keep_last: bool) -> Path:
-    """Return ``loc`` without parts that are not in the document, such as union tags and validator names."""
+    """Return ``loc`` without the parts that are not in the document, such as union tags and validator names."""
     path: list[str | int] = []
     node = document
     tagged: Any = None
     for position, step in enumerate(loc):
         if node is not tagged and isinstance(node, Mapping) and node.get("kind") == step:
-            tagged = node  # the tag of a union, even where the table has a key of this name
+            tagged = node  # the step is the tag of a union, even if the table has a key with this name
             continue
         if has(node, step):
             node = node[step]
@@ -226,7 +226,7 @@ def _path_in(document: Any, loc: tuple[str | int, ...], *, keep_last: bool) -> P
 
 
 def _nodes_at(document: Any, path: Path, schema: Schema) -> list[Schema]:
-    """Return the schema nodes at ``path``: several if it permits alternatives."""
+    """Return the schema's alternatives for the value at ``path``."""
     nodes = list(_alternatives(schema, schema, document))
     for step in path:
         document = document[step]
@@ -241,9 +241,9 @@ def _nodes_at(document: Any, path: Path, schema: Schema) -> list[Schema]:
 
 def _children(node: Schema, step: str | int) -> Iterator[Schema]:
     if isinstance(step, int):
-        fixed = node.get("prefixItems", ())
-        if step < len(fixed):
-            yield fixed[step]
+        prefix_items = node.get("prefixItems", ())
+        if step < len(prefix_items):
+            yield prefix_items[step]
         elif "items" in node:
             yield node["items"]
     elif step in node.get("properties", {}):
@@ -253,7 +253,7 @@ def _children(node: Schema, step: str | int) -> Iterator[Schema]:
 
 
 def _alternatives(node: Schema, schema: Schema, value: Any) -> Iterator[Schema]:
-    """Follow references and unions; among several tables keep those whose fixed keys (kind, law) match the value."""
+    """Yield the alternatives of a node; of several tables, only those whose fixed keys (kind, law) match the value."""
     if "$ref" in node:
         yield from _alternatives(schema["$defs"][node["$ref"].rsplit("/", 1)[-1]], schema, value)
     elif branches := node.get("anyOf") or node.get("oneOf"):

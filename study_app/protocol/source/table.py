@@ -1,7 +1,7 @@
-"""The base of every table of a study file, and the texts in it that people read, in one language or in several.
+"""The base class of all tables of a study file, and its localised texts.
 
-A text is a string (a study in one language) or a table from language to string. Where lines break in the file does not
-matter: a blank line divides paragraphs, every other run of white space becomes one space.
+A text is a string (in a study with one language) or a table from language to string. Line breaks in the file do not
+matter: a blank line separates paragraphs, and any other white space becomes one space.
 """
 
 from __future__ import annotations
@@ -40,21 +40,21 @@ _MAX_BODY: Final = 20_000
 UNPRINTABLE: Final = ("Cc", "Cs", "Co", "Cn")  # control, surrogate, private use, unassigned
 VISIBLE: Final = "LNPS"  # letters, numbers, punctuation, symbols
 DIRECTIONS: Final = "\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069"
-"""Characters that change the direction of what follows, and so can make a text read as another one."""
+"""Characters that change the direction of the following text, so that it may look like another text."""
 
 
 _JOINER: Final = "\u200d"
-_MOST_JOINED: Final = 32  # code points; no letter of any script has as many
+_MAX_CLUSTER: Final = 32  # code points, more than any letter of any script has
 _ATTACHED: Final = ("Mn", "Mc", "Me")
-_REGIONS: Final = range(0x1F1E6, 0x1F200)  # of which two are a flag
-_TONES: Final = range(0x1F3FB, 0x1F400)  # of skin
-_TAGS: Final = range(0xE0020, 0xE0080)  # that follow a flag
+_REGIONS: Final = range(0x1F1E6, 0x1F200)  # regional indicators; two of them form a flag
+_TONES: Final = range(0x1F3FB, 0x1F400)  # skin tones
+_TAGS: Final = range(0xE0020, 0xE0080)  # tags, which follow a flag
 
 
 def characters(text: str) -> list[str]:
     """Return a text's user-perceived characters: letters with accents, whole emoji.
 
-    This is Unicode's rule for extended grapheme clusters without decomposed Korean letters.
+    These are Unicode's extended grapheme clusters, except for decomposed Korean letters.
 
     Examples
     --------
@@ -64,22 +64,24 @@ def characters(text: str) -> list[str]:
     clusters: list[str] = []
     for letter in text:
         code = ord(letter)
-        before = clusters[-1] if clusters else ""
-        attached = unicodedata.category(letter) in _ATTACHED or letter == _JOINER or code in _TONES or code in _TAGS
-        joins = before.endswith(_JOINER) or (code in _REGIONS and len(before) == 1 and ord(before) in _REGIONS)
-        if before not in {"", "\n"} and (attached or joins) and len(before) < _MOST_JOINED:
+        previous = clusters[-1] if clusters else ""
+        is_attached = unicodedata.category(letter) in _ATTACHED or letter == _JOINER or code in _TONES or code in _TAGS
+        is_joined = previous.endswith(_JOINER) or (
+            code in _REGIONS and len(previous) == 1 and ord(previous) in _REGIONS
+        )
+        if previous not in {"", "\n"} and (is_attached or is_joined) and len(previous) < _MAX_CLUSTER:
             clusters[-1] += letter
         else:
             clusters.append(letter)
     return clusters
 
 
-_APART: Final = re.compile(r"\n[ \t]*\n")
+_PARAGRAPH_BREAK: Final = re.compile(r"\n[ \t]*\n")
 
 
-def _tidy(text: str) -> str:
-    """Return ``text`` with single spaces, and one blank line between paragraphs."""
-    parts = _APART.split(text) if "\n" in text else (text,)
+def _normalise_spaces(text: str) -> str:
+    """Return a text with single spaces, and one blank line between paragraphs."""
+    parts = _PARAGRAPH_BREAK.split(text) if "\n" in text else (text,)
     return "\n\n".join(" ".join(part.split()) for part in parts if part.strip())
 
 
@@ -91,13 +93,13 @@ def _check_each_text(value: Any) -> Any:
     raise invalid('a text must be a string, or one string per language: {en = "…", nl = "…"}')
 
 
-@lru_cache(maxsize=16_384)  # saves 17 ms of each edit, after which a study is validated
+@lru_cache(maxsize=16_384)  # saves 17 ms of the validation after each edit in the designer
 def _checked_text(text: str) -> str:
-    return _tidy(_check_printable(text))
+    return _normalise_spaces(_check_printable(text))
 
 
 def unprintable_character(text: str, permitted: str = "") -> str | None:
-    """Return the first character that cannot be printed, or that hides or reorders others, except ``permitted``."""
+    """Return the first character that cannot be printed or changes the text direction, except ``permitted`` ones."""
     hidden = (
         character for character in text if unicodedata.category(character) in UNPRINTABLE or character in DIRECTIONS
     )
@@ -105,7 +107,7 @@ def unprintable_character(text: str, permitted: str = "") -> str | None:
 
 
 def _check_printable(text: str) -> str:
-    """Return ``text`` if it has visible characters and none that hides or reorders others."""
+    """Return ``text``; raise an error if it has no visible character, or one that cannot be printed."""
     if (letter := unprintable_character(text, "\t\n\r")) is not None:
         raise invalid(f"contains the character U+{ord(letter):04X}, which cannot be printed: remove it")
     if not any(unicodedata.category(letter)[0] in VISIBLE for letter in text):
@@ -113,14 +115,14 @@ def _check_printable(text: str) -> str:
     return text
 
 
-def _at_most_long(most: int) -> AfterValidator:
-    def checked(value: str | dict[str, str]) -> str | dict[str, str]:
+def _limit_length(max_length: int) -> AfterValidator:
+    def check_length(value: str | dict[str, str]) -> str | dict[str, str]:
         longest = max(map(len, value.values() if isinstance(value, dict) else (value,)))
-        if longest > most:
-            raise invalid(f"has {longest} characters, but at most {most} are permitted: shorten it")
+        if longest > max_length:
+            raise invalid(f"has {longest} characters, but at most {max_length} are permitted: shorten it")
         return value
 
-    return AfterValidator(checked)
+    return AfterValidator(check_length)
 
 
 Description: TypeAlias = Annotated[
@@ -129,21 +131,21 @@ Description: TypeAlias = Annotated[
 Brief: TypeAlias = Annotated[
     str, AfterValidator(lambda text: _check_printable(text) if text else text), StringConstraints(max_length=_MAX_TEXT)
 ]
-"""What may be left empty, and fits in a line or two."""
+"""A text of one or two lines, which may be empty."""
 Printable: TypeAlias = Annotated[str, AfterValidator(_check_printable), StringConstraints(max_length=_MAX_TEXT)]
 _Text: TypeAlias = Annotated[
     str | dict[str, str],
     BeforeValidator(_check_each_text),
     Field(description="A text: one string, or one string per language of the study."),
 ]
-Localised: TypeAlias = Annotated[_Text, _at_most_long(_MAX_TEXT)]
-"""A title, a statement, a label: what fits on a page with others."""
-Body: TypeAlias = Annotated[_Text, _at_most_long(_MAX_BODY), Field(json_schema_extra={"lines": "several"})]
-"""What fills a page or several; its schema says so to the study designer."""
+Localised: TypeAlias = Annotated[_Text, _limit_length(_MAX_TEXT)]
+"""A short text, such as a title, a statement or a label."""
+Body: TypeAlias = Annotated[_Text, _limit_length(_MAX_BODY), Field(json_schema_extra={"lines": "several"})]
+"""A text of one or more pages; its JSON Schema states this for the study designer."""
 
 
 def text_in(value: str | Mapping[str, str], language: str) -> str:
-    """Return a localised text in one of the study's languages (KeyError in any other)."""
+    """Return a localised text in one of the study's languages; raise KeyError for any other."""
     return value if isinstance(value, str) else value[language]
 
 
@@ -174,15 +176,15 @@ class Table(BaseModel):
     ONE_OF: ClassVar[tuple[tuple[str, str], ...]] = ()
     """Pairs of keys of which exactly one is given."""
     SECTIONS: ClassVar[tuple[tuple[str, tuple[str, ...]], ...]] = ()
-    """Headings of a form, each with its keys; keys in none come last."""
+    """Headings of the form, each with its keys; other keys come last."""
     NOT_WITH: ClassVar[tuple[tuple[tuple[str, ...], tuple[str, ...]], ...]] = ()
-    """Keys that are given, and the keys that do not belong to the table then; the first pair that applies counts."""
+    """Pairs of given keys, and keys that are not permitted with them; the first pair whose keys are given applies."""
 
     @model_validator(mode="after")
     def _check_alternative_keys(self) -> Self:
         for first, other in self.ONE_OF:
-            given: list[Any] = [getattr(self, name) for name in (first, other)]
-            if sum(value is not None and value != () for value in given) != 1:
+            values: list[Any] = [getattr(self, name) for name in (first, other)]
+            if sum(value is not None and value != () for value in values) != 1:
                 message = f"specify either {first} or {other}"
                 raise invalid(message, first)
         return self
@@ -198,13 +200,13 @@ class Table(BaseModel):
 
 _K = TypeVar("_K", bound=Table)
 RECORDED: Final = {"recorded": True}
-"""The context in which a recorded protocol is read: what a plug-in that is not here has added is kept as it stands."""
+"""The validation context of a recorded protocol, in which tables of missing plug-ins are kept unchanged."""
 
 
 class OfKinds(Generic[_K]):
-    """The annotation for the union of a table's built-in kinds; a kind with a colon belongs to a plug-in.
+    """The annotation of the union of a table's kinds; a kind with a colon belongs to a plug-in.
 
-    ``base`` is the common class, ``stand_in`` holds a recorded table of a plug-in that is not installed.
+    ``base`` is the common class, ``stand_in`` the class of recorded tables of plug-ins that are not installed.
     """
 
     def __init__(self, registry: Registry[type[_K]], base: type[_K], stand_in: type[_K]) -> None:
@@ -212,15 +214,17 @@ class OfKinds(Generic[_K]):
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         """Return the schema of the union, preceded by its validation function."""
-        written = core_schema.simple_ser_schema("any")  # each kind writes its own keys
-        return core_schema.with_info_wrap_validator_function(self._validate, handler(source), serialization=written)
+        serialization = core_schema.simple_ser_schema("any")  # each kind writes its own keys
+        return core_schema.with_info_wrap_validator_function(
+            self._validate, handler(source), serialization=serialization
+        )
 
-    def _validate(self, value: Any, own: ValidatorFunctionWrapHandler, info: ValidationInfo) -> Any:
+    def _validate(self, value: Any, validate_union: ValidatorFunctionWrapHandler, info: ValidationInfo) -> Any:
         if isinstance(value, self.base):
             return value
         kind = value.get("kind") if isinstance(value, Mapping) else None
         if not isinstance(kind, str) or ":" not in kind:
-            return own(value)
+            return validate_union(value)
         kind_model, recorded = self.registry.get(kind), info.context == RECORDED
         if kind_model is None and not recorded:
             message, hint = self.registry.missing(kind)
@@ -232,7 +236,7 @@ class OfKinds(Generic[_K]):
         node = handler(schema)
         for kind, kind_model in self.registry.others.items():
             part = handler(core_schema.definitions_schema(kind_model.__pydantic_core_schema__, []))
-            handler.resolve_ref_schema(part)["title"] = kind  # classes of several packages may have one name
+            handler.resolve_ref_schema(part)["title"] = kind  # classes of different packages may have the same name
             node["oneOf"].append(part)
             if "discriminator" in node:
                 node["discriminator"]["mapping"][kind] = part["$ref"]

@@ -24,13 +24,13 @@ from study_app.psychophysics.detection import Sensitivity
 _Feedback: TypeAlias = Literal["never", "practice", "always"]
 Reply: TypeAlias = Literal["choice", "rating", "number", "setting"]
 _Arrangement: TypeAlias = tuple[bool, ...]
-"""Per interval whether it presents the comparison, in the order of presentation."""
+"""For each interval, in the order of presentation, whether it presents the comparison."""
 _AnswerCounts: TypeAlias = Mapping[tuple[int, str], int]
-"""How often each answer was given to each arrangement."""
+"""The number of times that each answer was given to each arrangement."""
 Model: TypeAlias = Literal["differencing", "independent"]
 ANSWER_S: Final = 6.0
 _CHOICE_S: Final = 2.0
-"""How long people take to answer one statement and to choose an interval, for the expected duration. [choice]"""
+"""Time to answer a statement, and to choose an interval [s], for the expected duration. [choice]"""
 ORDINALS: Final = ("first", "second", "third", "fourth")
 
 
@@ -97,16 +97,16 @@ class Design(Table):
     arrangements: ClassVar[tuple[_Arrangement, ...]] = ((True,),)
     guess_rate: ClassVar[float | None] = None
     reply: ClassVar[Reply] = "choice"
-    has_standard: ClassVar[bool] = True  # else there is one interval, the level itself
+    has_standard: ClassVar[bool] = True  # otherwise there is one interval with the level itself
     has_correct_answer: ClassVar[bool] = True
     has_noise: ClassVar[bool] = False  # whether some slots present the standard alone
-    asks_for_more: ClassVar[bool] = False  # the interval with more, or less, is correct: levels on both sides have none
+    asks_for_more: ClassVar[bool] = False  # whether the interval with more (or less) is correct
     success_name: ClassVar[str] = "correct"  # the name of a success
-    adaptive: ClassVar[bool] = True  # whether answers can choose the next level; else the method must be "constant"
+    adaptive: ClassVar[bool] = True  # whether answers can determine the next level; otherwise the method is "constant"
     paper_name: ClassVar[str]
-    """What a paper calls it."""
+    """Its name in publications."""
     first: ClassVar[Modulus | None] = None
-    """What a block's first trial presents and names, before those that are analysed."""
+    """The level and the number of a block's first trial, which is not analysed."""
 
     @property
     def adjusts(self) -> bool:
@@ -115,7 +115,7 @@ class Design(Table):
 
     @property
     def answer_s(self) -> float:
-        """How long people take to answer [s]."""
+        """The expected time to answer [s]."""
         return _CHOICE_S if self.reply == "choice" else ANSWER_S
 
     @property
@@ -151,20 +151,20 @@ class Design(Table):
         A level that is a value may be above or below the standard: then an interval can still differ from the others,
         or be the same as another, but a forced choice between more and less has no correct answer.
         """
-        by_value = stimulus is not None and stimulus.level_kind == "value"
-        return self.has_correct_answer and not (by_value and self.asks_for_more)
+        is_value = stimulus is not None and stimulus.level_kind == "value"
+        return self.has_correct_answer and not (is_value and self.asks_for_more)
 
     def success_of(self, stimulus: Varied | None) -> str:
         """Return the name of a success: "correct", "yes", or "comparison chosen" if no answer is correct."""
-        unlike_others = self.has_correct_answer and not self.can_be_correct(stimulus)
-        return "comparison chosen" if unlike_others else self.success_name
+        has_no_correct_answer = self.has_correct_answer and not self.can_be_correct(stimulus)
+        return "comparison chosen" if has_no_correct_answer else self.success_name
 
     def arrangement_text(self, arrangement: int) -> str:
         """Return an arrangement for the journal: S for the standard, C for the comparison, such as "SC"."""
-        return "".join("C" if holds else "S" for holds in self.arrangements[arrangement])
+        return "".join("C" if is_comparison else "S" for is_comparison in self.arrangements[arrangement])
 
     def arrangement_of(self, text: str) -> int:
-        """Return the arrangement with this text in the journal (ValueError if there is none)."""
+        """Return the arrangement with this text in the journal; raise ValueError if there is none."""
         return self.arrangements.index(tuple(letter == "C" for letter in text))
 
     def correct_of(self, answers: _AnswerCounts) -> tuple[int, int]:
@@ -200,15 +200,15 @@ class Design(Table):
         return when == "always" or (when == "practice" and practice)
 
 
-def _counts(answers: _AnswerCounts, arrangements: Collection[int], answer: str) -> tuple[int, int]:
-    """Return how often an answer was given to some arrangements, and the total number of answers to them."""
+def _answer_counts(answers: _AnswerCounts, arrangements: Collection[int], answer: str) -> tuple[int, int]:
+    """Return how often an answer was given to some arrangements, and the number of all answers to them."""
     counts = {pair: count for pair, count in answers.items() if pair[0] in arrangements}
     return sum(count for (_, given), count in counts.items() if given == answer), sum(counts.values())
 
 
-def _one_differs(count: int, *, among: bool) -> tuple[_Arrangement, ...]:
-    """Return the arrangements of ``count`` intervals in which exactly one differs, as ``among``."""
-    return tuple(tuple((at == odd) is among for at in range(count)) for odd in range(count))
+def _odd_one_arrangements(count: int, *, odd_value: bool) -> tuple[_Arrangement, ...]:
+    """Return the arrangements of ``count`` intervals of which exactly one has the value ``odd_value``."""
+    return tuple(tuple((at == odd) is odd_value for at in range(count)) for odd in range(count))
 
 
 class ForcedChoice(Design):
@@ -222,17 +222,17 @@ class ForcedChoice(Design):
     asks_for_more: ClassVar = True
     paper_name = property(lambda self: f"{('two', 'three', 'four')[self.intervals - 2]}-interval forced choice")
     answers = property(lambda self: ORDINALS[: self.intervals])
-    arrangements = property(lambda self: _one_differs(int(self.kind[0]), among=True))
+    arrangements = property(lambda self: _odd_one_arrangements(int(self.kind[0]), odd_value=True))
     guess_rate = property(lambda self: 1 / self.intervals)
 
     def correct(self, arrangement: int) -> str:
         return ORDINALS[self.arrangements[arrangement].index(True)]
 
     def _sensitivity(self, answers: _AnswerCounts, model: Model) -> Sensitivity | None:
-        """Return d′ of the intervals, and of two intervals the criterion: above 0 the second is preferred."""
+        """Return d′, and for two intervals the criterion, which is positive if the second one is preferred."""
         if self.kind != "2ifc":
             return super()._sensitivity(answers, model)
-        return detection.two_intervals(*_counts(answers, {0}, "first"), *_counts(answers, {1}, "first"))
+        return detection.two_intervals(*_answer_counts(answers, {0}, "first"), *_answer_counts(answers, {1}, "first"))
 
     def simulated(self, perceived: Sequence[float], mean: float, attention: Attention) -> str:
         return ORDINALS[perceived.index(min(perceived) if attention.smallest else max(perceived))]
@@ -244,7 +244,7 @@ class Oddity(Design):
     kind: Literal["oddity"] = "oddity"
     paper_name: ClassVar = "oddity (triangle test)"
     answers: ClassVar = ORDINALS[:3]
-    arrangements: ClassVar = _one_differs(3, among=True) + _one_differs(3, among=False)
+    arrangements: ClassVar = _odd_one_arrangements(3, odd_value=True) + _odd_one_arrangements(3, odd_value=False)
     guess_rate: ClassVar = 1 / 3
 
     def correct(self, arrangement: int) -> str:
@@ -293,7 +293,7 @@ class SameDifferent(Design):
         return self.answers[first != second]
 
     def _sensitivity(self, answers: _AnswerCounts, model: Model) -> Sensitivity | None:
-        hits, false_alarms = _counts(answers, {2, 3}, "different"), _counts(answers, {0, 1}, "different")
+        hits, false_alarms = _answer_counts(answers, {2, 3}, "different"), _answer_counts(answers, {0, 1}, "different")
         return detection.same_different(*hits, *false_alarms, model)
 
     def simulated(self, perceived: Sequence[float], mean: float, attention: Attention) -> str:
@@ -328,7 +328,7 @@ class YesNo(Design):
         return answer == "yes"
 
     def _sensitivity(self, answers: _AnswerCounts, model: Model) -> Sensitivity | None:
-        return detection.yes_no(*_counts(answers, {0}, "yes"), *_counts(answers, {1}, "yes"))
+        return detection.yes_no(*_answer_counts(answers, {0}, "yes"), *_answer_counts(answers, {1}, "yes"))
 
     def simulated(self, perceived: Sequence[float], mean: float, attention: Attention) -> str:
         return "yes" if perceived[0] > mean else "no"
@@ -394,12 +394,12 @@ else:
 
 
 def default_design(kind: str) -> Design:
-    """Return a design of a kind with all its defaults (KeyError of an unknown kind)."""
+    """Return the design of a kind with all its defaults; raise KeyError for an unknown kind."""
     return DESIGN_KINDS[kind].model_validate({"kind": kind})
 
 
 def question_of(design: Design, languages: Sequence[str]) -> Questionnaire:
-    """Return the question of a design, with the program's own text if it has none."""
+    """Return the question of a design, by default with the program's own text."""
     text: Localised = design.question or {
         language: words_or_english(language).design_questions[design.wording] for language in languages
     }
@@ -410,15 +410,15 @@ def _item(design: Design, text: Localised, languages: Sequence[str]) -> Question
     short: Localised = {language: words_or_english(language).design_short for language in languages}
     if design.item is not None:
         short = design.item.replace("_", " ").capitalize()
-    about = {"id": design.name, "text": text, "short": short}
+    common = {"id": design.name, "text": text, "short": short}
     if design.reply == "rating":
-        return Rating(**about, scale=str(getattr(design, "scale", "")))
+        return Rating(**common, scale=str(getattr(design, "scale", "")))
     if design.reply == "number":
-        return Number(**about, least=POSITIVE)
+        return Number(**common, least=POSITIVE)
     if design.reply == "setting":
-        return Number(**about, whole=True, unit="steps")
-    named = {
+        return Number(**common, whole=True, unit="steps")
+    answer_texts = {
         answer: {language: words_or_english(language).design_answers[answer] for language in languages}
         for answer in design.answers
     }
-    return Choice(**about, options=tuple(Option(id=answer, text=said) for answer, said in named.items()))
+    return Choice(**common, options=tuple(Option(id=answer, text=label) for answer, label in answer_texts.items()))

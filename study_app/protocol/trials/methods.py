@@ -1,6 +1,6 @@
-"""Methods: how many trials a track has, and the level of each.
+"""Methods: the number of trials in a track, and the level of each trial.
 
-`Method` says what each kind must state; a kind is a subclass in `METHOD_KINDS`.
+`Method` is the base class of all kinds, which are in `METHOD_KINDS`.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from study_app.number_text import counted
 from study_app.protocol.randomization.streams import Draw, shuffle
 from study_app.protocol.source.table import OfKinds, Table
 from study_app.protocol.trials.designs import Design
-from study_app.protocol.trials.stimuli import CONSTANT_LEVELS, LAPSES, LEVELS_MOST, Assumed, Stimulus
+from study_app.protocol.trials.stimuli import CONSTANT_LEVELS, LAPSES, MAX_LEVELS, Assumed, Stimulus
 from study_app.psychophysics.adaptive import (
     RATIOS,
     Answers,
@@ -94,15 +94,15 @@ class Method(Table):
     tracks: Annotated[int, Field(ge=1, le=4)] = Field(default=1, description="Number of tracks for each standard.")
 
     adaptive: ClassVar[bool] = True
-    """Whether answers choose the next level."""
+    """Whether answers determine the next level."""
     adjusts: ClassVar[bool] = False
-    """Whether its levels are those at which settings start, so that the design must be "adjustment"."""
+    """Whether its levels are the starts of adjustments, which need the design "adjustment"."""
     target_percent: ClassVar[float | None] = None
-    """The percentage of successes at the mean of its reversals; None where it has no steps."""
+    """The percentage of successes to which its reversals converge; None without steps."""
 
     @property
     def setting_s(self) -> float:
-        """How long people take to set a level, in addition to the task [s]; 0 if they do not."""
+        """The expected time to set a level, in addition to the task [s]; 0 without settings."""
         return 0.0
 
     @property
@@ -131,7 +131,7 @@ class Method(Table):
         return stimulus.assumed(design)
 
     def ended(self, track: TrackSetting, heard: Sequence[TrialResult]) -> bool:
-        """Return whether a track ends with these answers, before its last trial."""
+        """Return whether a track ends early after these answers."""
         return False
 
     def faults(self, stimulus: Stimulus) -> Iterator[tuple[str, str, str]]:
@@ -143,7 +143,7 @@ class Method(Table):
         return iter(())
 
     def target(self, guess: float | None, success: str) -> str | None:
-        """Return the targeted share of successes (such as "correct") as text; None without one.
+        """Return the targeted share of successes as text, such as "correct"; None without a target.
 
         ``guess`` is the share of successes by guessing, 0 if no answer is correct; None: a free parameter.
         """
@@ -167,7 +167,7 @@ class Method(Table):
         draws = random.random((len(observers.thresholds), self.presentations(stimulus)))
         seeds = [random.integers(2**32, size=max(1, self.rounds(stimulus))) for _ in draws]
 
-        def chosen() -> Choice:
+        def choose_levels() -> Choice:
             heard: list[list[TrialResult]] = [[] for _ in draws]
             levels, running = np.zeros(len(draws)), np.ones(len(draws), bool)
             for number in count():
@@ -175,11 +175,13 @@ class Method(Table):
                     running[observer] = not self.ended(track, heard[observer])
                     sources = [np.random.default_rng(seed).random for seed in seeds[observer]]
                     levels[observer] = self.level(track, number, heard[observer], sources)
-                right = yield np.array([stimulus.coordinate(level) for level in levels]), running
-                for of_track, level, success in zip(heard, levels.tolist(), right.tolist(), strict=True):
-                    of_track.append(TrialResult(trial=number, code="", level=level, success=success, correct=success))
+                successes = yield np.array([stimulus.coordinate(level) for level in levels]), running
+                for track_results, level, success in zip(heard, levels.tolist(), successes.tolist(), strict=True):
+                    track_results.append(
+                        TrialResult(trial=number, code="", level=level, success=success, correct=success)
+                    )
 
-        return observers.answers(draws, chosen())
+        return observers.answers(draws, choose_levels())
 
     def rounds(self, stimulus: Stimulus) -> int:
         """Return the number of rounds of drawn levels in a track."""
@@ -190,7 +192,7 @@ Trials = Annotated[int, within(1, 1000, "no participant can complete more trials
 
 
 class _Adaptive(Method):
-    """A method that chooses each level from the answers to the levels before."""
+    """A method that chooses each level from the previous answers."""
 
     trials: Trials = Field(default=60, description="Maximum number of trials per standard, divided among the tracks.")
     begin: Annotated[tuple[float, ...], Field(max_length=4)] | float | None = Field(
@@ -208,16 +210,16 @@ class _Adaptive(Method):
             message = f"{self.trials} trials cannot be divided among {self.tracks} tracks"
             yield "trials", message, f"choose a multiple of {self.tracks}"
         least, most = stimulus.levels
-        begin = self.begin if isinstance(self.begin, tuple) else () if self.begin is None else (self.begin,)
+        first_levels = self.begin if isinstance(self.begin, tuple) else () if self.begin is None else (self.begin,)
         hint = f"specify one level per track, from {least:g} to {most:g}"
-        if isinstance(self.begin, tuple) and len(begin) != self.tracks:
-            yield "begin", f"{counted(len(begin), 'level')} for {counted(self.tracks, 'track')}", hint
-        for level in begin:
+        if isinstance(self.begin, tuple) and len(first_levels) != self.tracks:
+            yield "begin", f"{counted(len(first_levels), 'level')} for {counted(self.tracks, 'track')}", hint
+        for level in first_levels:
             if not least <= level <= most:
                 yield "begin", f"{level:g} is outside the stimulus's levels", hint
 
     def first(self, track: int) -> float | None:
-        """Return the first level of a track (from 1) as stated; None: the method's own."""
+        """Return the stated first level of a track (from 1); None for the method's own one."""
         return self.begin[track - 1] if isinstance(self.begin, tuple) else self.begin
 
     def level(self, track: TrackSetting, number: int, heard: Sequence[TrialResult], draws: Sequence[Draw]) -> float:
@@ -229,10 +231,10 @@ class _Adaptive(Method):
 
 
 _LOG_STEP: Final = "with logarithmic spacing a step must be a factor greater than 1"
-_STEPS: Final = 40
-"""Steps from the smallest level to the largest, by default."""
+_DEFAULT_STEPS: Final = 40
+"""Default number of steps from the smallest level to the largest."""
 _START_SHARE: Final = 0.125
-"""A setting starts within this share of the span from an end: the same number of steps is not right every time."""
+"""Greatest distance of a start from an end, as a share of the range; a fixed start would permit counting steps."""
 _ROUNDING: Final = 1e-9
 
 
@@ -273,8 +275,8 @@ class Adjustment(Method):
         """Return the start level of adjustment ``number``, which does not depend on earlier ones."""
         low, high = track.stimulus.domain
         first_at_low = draws[0]() < 0.5
-        away = _START_SHARE * (high - low) * draws[number]()
-        return track.stimulus.level_of(low + away if first_at_low is (number % 2 == 0) else high - away)
+        offset = _START_SHARE * (high - low) * draws[number]()
+        return track.stimulus.level_of(low + offset if first_at_low is (number % 2 == 0) else high - offset)
 
     def faults(self, stimulus: Stimulus) -> Iterator[tuple[str, str, str]]:
         low, high = stimulus.domain
@@ -298,15 +300,15 @@ class Adjustment(Method):
     def step(self, stimulus: Stimulus) -> float:
         """Return the size of a step in u."""
         low, high = stimulus.domain
-        return (high - low) / _STEPS if self.step_size is None else stimulus.coordinate(self.step_size)
+        return (high - low) / _DEFAULT_STEPS if self.step_size is None else stimulus.coordinate(self.step_size)
 
 
 @dataclass(frozen=True, slots=True, repr=False, kw_only=True)
 class Adjusting:
     """One adjustment: its start level and step; never printed, since it reveals the level.
 
-    A place is a number of steps from the ``start``, positive towards more of the varied number, and is limited by the
-    range of levels. ``step`` is the change of u per step, negative if more of the number is a smaller level.
+    A place is a number of steps from the ``start``, positive towards larger values of the varied number, and is limited
+    by the range of levels. ``step`` is the change of u per step, negative if a larger value is a smaller level.
     """
 
     stimulus: Stimulus
@@ -315,7 +317,7 @@ class Adjusting:
     step: float
 
     def moved(self, place: int, steps: int) -> int:
-        """Return the place after steps, which does not go beyond an end of the range."""
+        """Return the place after a number of steps, at most an end of the range."""
         ends = [(end - self.stimulus.coordinate(self.start)) / self.step for end in self.stimulus.domain]
         least, most = math.floor(min(ends) + _ROUNDING), math.ceil(max(ends) - _ROUNDING)
         return min(max(place + steps, least), most)
@@ -330,15 +332,15 @@ class Adjusting:
         return self.stimulus.comparison(self.standard, self.level(place))
 
     def place_after(self, steps: Iterable[int]) -> int:
-        """Return the place after these steps, from the start."""
+        """Return the place after consecutive steps from the start."""
         place = 0
         for step in steps:
             place = self.moved(place, step)
         return place
 
 
-_Count = Annotated[int, Field(ge=1, le=LEVELS_MOST)]
-_Listed = Annotated[tuple[float, ...], Field(min_length=1, max_length=LEVELS_MOST)]
+_Count = Annotated[int, Field(ge=1, le=MAX_LEVELS)]
+_Listed = Annotated[tuple[float, ...], Field(min_length=1, max_length=MAX_LEVELS)]
 
 
 class Constant(Method):
@@ -423,8 +425,8 @@ class QuestPlus(_Adaptive):
 
     @property
     def paper_name(self) -> str:
-        what, prins = ("the threshold", "; Prins 2013") if self.learn == "threshold" else ("all parameters", "")
-        return f"QUEST+, which minimises the expected entropy of {what} (Watson 2017{prins})"
+        parameters, source = ("the threshold", "; Prins 2013") if self.learn == "threshold" else ("all parameters", "")
+        return f"QUEST+, which minimises the expected entropy of {parameters} (Watson 2017{source})"
 
     def target(self, guess: float | None, success: str) -> str | None:
         return None if guess is None else f"threshold at {50 * (1 + guess):.3g} % {success}"
@@ -433,27 +435,27 @@ class QuestPlus(_Adaptive):
         if self.stop is None or sum(not result.noise for result in heard) < self.stop.after:
             return False
         search = self._search(track)
-        interval = fit(search.levels, *_counts(track.stimulus, search.levels, heard), search.grid).interval
+        interval = fit(search.levels, *_success_counts(track.stimulus, search.levels, heard), search.grid).interval
         return track.stimulus.ratio(*interval) <= self.stop.ratio
 
     def after(self, track: TrackSetting, heard: Sequence[TrialResult]) -> float:
         """Return the level that follows these answers, whose order does not matter."""
-        levels = _levels(track)
+        levels = _track_levels(track)
         if all(result.noise for result in heard) and (first := self.first(track.number)) is not None:
-            return levels[_nearest(_coordinates(track), track.stimulus.coordinate(first))]
+            return levels[_nearest(_track_coordinates(track), track.stimulus.coordinate(first))]
         search = self._search(track)
-        return levels[search.next(*_counts(track.stimulus, search.levels, heard))]
+        return levels[search.next(*_success_counts(track.stimulus, search.levels, heard))]
 
     def simulated(self, track: TrackSetting, observers: Observers, random: Generator, noise: Floats | None) -> Answers:
-        """Return the tracks of simulated observers; a track ends early only if levels have logarithms."""
+        """Return the answers of simulated observers; a track ends early only if levels are spaced logarithmically."""
         draws = random.random((len(observers.thresholds), self.presentations(track.stimulus)))
         first, log = self.first(track.number), track.stimulus.spacing == "log"
-        begin = None if first is None else _nearest(_coordinates(track), track.stimulus.coordinate(first))
+        begin = None if first is None else _nearest(_track_coordinates(track), track.stimulus.coordinate(first))
         stop = None if self.stop is None or not log else (math.log10(self.stop.ratio), self.stop.after)
         return search_tracks(self._search(track), observers, draws, begin, noise, stop)
 
     def assumed(self, stimulus: Stimulus, design: Design) -> Assumed:
-        """Return the family and the prior on the width in its keys, else the defaults."""
+        """Return the stated assumptions, and the defaults for others."""
         default = stimulus.assumed(design)
         return Assumed(
             self.family or default.family, self.widths or default.widths, self.width_prior or default.width_prior
@@ -462,34 +464,34 @@ class QuestPlus(_Adaptive):
     def _search(self, track: TrackSetting) -> Search:
         stimulus, design = track.stimulus, track.design
         grid = stimulus.running_grid(design, self.assumed(stimulus, design), self.lapses)
-        return Search(grid, _coordinates(track), self.learn, design.has_noise)
+        return Search(grid, _track_coordinates(track), self.learn, design.has_noise)
 
 
-def _counts(
+def _success_counts(
     stimulus: Stimulus, coordinates: Sequence[float], heard: Sequence[TrialResult]
 ) -> tuple[list[int], list[int]]:
-    """Return the numbers of successes and failures at each of the levels."""
+    """Return the numbers of successes and of failures at each level, given by its coordinate."""
     counts = ([0] * len(coordinates), [0] * len(coordinates))
     for (level, success), number in Counter((answer.level, bool(answer.success)) for answer in heard).items():
         counts[0 if success else 1][_nearest(coordinates, stimulus.coordinate(level))] += number
     return counts
 
 
-def _levels(track: TrackSetting) -> tuple[float, ...]:
-    """Return the levels of a track's trials in ascending order: the grid, preceded by 0 if there are noise trials."""
+def _track_levels(track: TrackSetting) -> tuple[float, ...]:
+    """Return the possible levels of a track in ascending order: the grid, preceded by 0 if there are noise trials."""
     return (0.0, *track.stimulus.grid) if track.design.has_noise else track.stimulus.grid
 
 
-def _coordinates(track: TrackSetting) -> tuple[float, ...]:
-    return tuple(track.stimulus.coordinate(level) for level in _levels(track))
+def _track_coordinates(track: TrackSetting) -> tuple[float, ...]:
+    return tuple(track.stimulus.coordinate(level) for level in _track_levels(track))
 
 
 def _nearest(coordinates: Sequence[float], u: float) -> int:
-    """Return the index of the coordinate nearest to ``u``, the lower of two."""
-    above = bisect_left(coordinates, u)
-    if above in (0, len(coordinates)):
-        return min(above, len(coordinates) - 1)  # the first is −∞ where there are noise trials
-    return above - (u - coordinates[above - 1] <= coordinates[above] - u)
+    """Return the index of the coordinate nearest to ``u``, in a tie that of the lower one."""
+    upper = bisect_left(coordinates, u)
+    if upper in (0, len(coordinates)):
+        return min(upper, len(coordinates) - 1)  # with noise trials, the first coordinate is −∞
+    return upper - (u - coordinates[upper - 1] <= coordinates[upper] - u)
 
 
 class Reversals(Table):
@@ -533,11 +535,13 @@ class UpDown(_Adaptive):
     def warnings(self) -> Iterator[tuple[str, str]]:
         successes = int(self.rule[0])
         if self.ratio is not None and self.ratio != RATIOS[successes]:
-            reached, published = (100 * converges_to(successes, ratio) for ratio in (self.ratio, RATIOS[successes]))
+            own_percent, published_percent = (
+                100 * converges_to(successes, ratio) for ratio in (self.ratio, RATIOS[successes])
+            )
             yield (
                 "ratio",
-                f"{self.rule} with ratio {self.ratio:g} converges to {reached:.1f} % only if steps are small; "
-                f"ratio = {RATIOS[successes]:g} converges to {published:.1f} % with steps of any size",
+                f"{self.rule} with ratio {self.ratio:g} converges to {own_percent:.1f} % only if steps are small; "
+                f"ratio = {RATIOS[successes]:g} converges to {published_percent:.1f} % with steps of any size",
             )
         if self.tracks == 1:
             yield "tracks", "participants can predict the levels of a single up–down track: choose tracks = 2"
@@ -563,7 +567,7 @@ class UpDown(_Adaptive):
         return len(answers) >= self.stop.after and len(reversals) >= self.stop.reversals
 
     def after(self, track: TrackSetting, heard: Sequence[TrialResult]) -> float:
-        """Return the level that follows these answers: one step from the last one, or the same."""
+        """Return the level that follows these answers: one step from the last level, or the same level."""
         low, high = track.stimulus.levels
         u = self.staircase(track.stimulus, track.number).next(_answers(track, heard))
         return min(max(track.stimulus.level_of(u), low), high)
@@ -574,12 +578,14 @@ class UpDown(_Adaptive):
         return staircase_tracks(self.staircase(track.stimulus, track.number), observers, draws, stop)
 
     def reversals(self, track: TrackSetting, answers: Sequence[Answer]) -> tuple[int, ...]:
-        return tuple(self.staircase(track.stimulus, track.number).reversals_at(_in_u(track.stimulus, answers)))
+        return tuple(
+            self.staircase(track.stimulus, track.number).reversals_at(_with_coordinates(track.stimulus, answers))
+        )
 
     def reversal_mean(self, track: TrackSetting, answers: Sequence[Answer]) -> float | None:
         """Return the level of the mean of the last reversals; None if there are too few."""
         staircase = self.staircase(track.stimulus, track.number)
-        mean = staircase.mean_of_reversals(_in_u(track.stimulus, answers), self.average)
+        mean = staircase.mean_of_reversals(_with_coordinates(track.stimulus, answers), self.average)
         return None if mean is None else track.stimulus.level_of(mean)
 
     def staircase(self, stimulus: Stimulus, track: int) -> Staircase:
@@ -597,11 +603,13 @@ class UpDown(_Adaptive):
 
 
 def _answers(track: TrackSetting, heard: Sequence[TrialResult]) -> list[Answer]:
-    """Return the answers to comparisons with levels in u, without noise trials, which do not affect a track."""
-    return _in_u(track.stimulus, [(result.level, bool(result.success)) for result in heard if not result.noise])
+    """Return the answers with levels in u, without those to noise trials, which do not affect a track."""
+    return _with_coordinates(
+        track.stimulus, [(result.level, bool(result.success)) for result in heard if not result.noise]
+    )
 
 
-def _in_u(stimulus: Stimulus, answers: Sequence[Answer]) -> list[Answer]:
+def _with_coordinates(stimulus: Stimulus, answers: Sequence[Answer]) -> list[Answer]:
     return [(stimulus.coordinate(level), success) for level, success in answers]
 
 
@@ -622,8 +630,8 @@ class _RecordedMethod(Method):
         return float(self.presentations(track.stimulus))
 
 
-_MOST_PRESENTATIONS: Final = 10_000
-"""No track of a plug-in presents more comparisons."""
+_MAX_PRESENTATIONS: Final = 10_000
+"""Greatest number of comparisons in a track of a plug-in."""
 METHOD_KINDS: Final = Registry[type[Method]](
     "method",
     {"adjustment": Adjustment, "constant": Constant, "questplus": QuestPlus, "updown": UpDown},
@@ -631,8 +639,8 @@ METHOD_KINDS: Final = Registry[type[Method]](
     "kind",
     {
         "presentations": Returns(
-            f"a whole number from 1 to {_MOST_PRESENTATIONS:,}",
-            lambda value: isinstance(value, Integral) and 1 <= int(value) <= _MOST_PRESENTATIONS,
+            f"a whole number from 1 to {_MAX_PRESENTATIONS:,}",
+            lambda value: isinstance(value, Integral) and 1 <= int(value) <= _MAX_PRESENTATIONS,
         ),
         "levels_of": Returns("at least one number", lambda values: are_numbers(values) and len(values) > 0),
         "level": number_between(-1e12, 1e12),
@@ -652,5 +660,5 @@ else:
 
 
 def default_method(kind: str) -> Method:
-    """Return a method of a kind with all its defaults (KeyError of an unknown kind)."""
+    """Return the method of a kind with all its defaults; raise KeyError for an unknown kind."""
     return METHOD_KINDS[kind].model_validate({"kind": kind})

@@ -1,6 +1,6 @@
-"""Stimuli: the one number of a condition that is varied, its levels, and the psychometric function of the answers.
+"""Stimuli: the varied number of a condition, its levels, and assumptions about the psychometric function.
 
-The prior of the function is flat in the threshold, log-normal in the width and listed for the lapse rate.
+The prior is flat in the threshold, log-normal in the width, and a list of values for the lapse rate.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from study_app.psychophysics.families import Family, Floats
 from study_app.psychophysics.grid import FREE_GUESSES, Grid, Values, evenly, geometric, lapse_prior
 
 _Level = TypeVar("_Level", float, Floats)
-"""One level or value, or an array of them."""
+"""A level or value, or an array of them."""
 _LevelKind: TypeAlias = Literal["weber", "difference", "value"]
 
 DELAY: Final = "delay_ms"
@@ -35,9 +35,9 @@ OF_LINK: Final = {
     "force_loss": ForceLink.MOST_LOSS,
 }
 OF_CONDITION: Final = {DELAY: MOST_DELAY_MS, **OF_LINK}
-"""The varied numbers that belong to the condition, not to its liquid, and the most that each may be."""
+"""The numbers that can be varied and belong to the condition, not to its liquid, with their maxima."""
 CONSTANT_LEVELS: Final = 7
-LEVELS_MOST: Final = 201
+MAX_LEVELS: Final = 201
 
 
 class Condition(Table):
@@ -79,7 +79,7 @@ class Condition(Table):
         description="shown: the ball and the targets are drawn over a video; hidden: the video is shown without them.",
     )
     footage_sha256: SkipJsonSchema[str | None] = later()
-    """That of the video file; ``load`` fills it in."""
+    """The SHA-256 of the video file; ``load`` fills it in."""
 
     @property
     def liquid_ids(self) -> tuple[str, ...]:
@@ -87,7 +87,7 @@ class Condition(Table):
 
     @property
     def shows_video(self) -> bool:
-        """Whether it shows a video, live or from a file, in place of the drawn tank."""
+        """Whether a video, live or from a file, replaces the drawn tank."""
         return self.view != "tank"
 
     @property
@@ -102,7 +102,7 @@ class Condition(Table):
         )
 
 
-@lru_cache(maxsize=64)  # each trial needs the levels; with the cache of `_running_grid` it takes a third less time
+@lru_cache(maxsize=64)  # every trial needs them; with the cache of `_running_grid`, a trial takes a third less time
 def _spaced_levels(low: float, high: float, log: bool, count: int) -> tuple[float, ...]:
     if count == 1:
         return (high,)
@@ -114,41 +114,41 @@ def _spaced_levels(low: float, high: float, log: bool, count: int) -> tuple[floa
 
 
 LEVEL_RULES: Final = 2
-"""Version of the rules by which levels are chosen; receipts state it. In 2 all widths are equally likely."""
+"""Version of the rules for choosing levels, as stated in receipts. Since 2, all widths are equally likely."""
 _RUNNING_THRESHOLDS: Final = 41
 _RUNNING_WIDTHS: Final = 9
 _WIDTHS: Final = (0.5, 4.0)
-"""The smallest and the largest width, in decades."""
+"""The smallest and the largest width while levels are chosen [decades]."""
 _ANALYSIS_WIDTHS: Final = (0.15, 5.6)
-"""Those of the analysis; people's functions are 0.2 to 2 decades wide."""
+"""The same for the analysis; people's functions are 0.2 to 2 decades wide."""
 LINEAR_WIDTH: Final = 1.4
 """Width of an observer whose d′ is proportional to the level [decades]."""
 WIDTH_PRIOR: Final = (0.5, 2.0)
 """Median and factor of people's widths [decades]. The median is the slope of 3.5 that QUEST assumes.
 
-(Watson & Pelli 1983, Percept. Psychophys. 33, 113–120.) Of three medians it is the best on the published answers of
-discrimination; confirmed on plaid and checkerboard (``tests/benchmarks/analysis/people.py``).
+(Watson & Pelli 1983, Percept. Psychophys. 33, 113–120.) Of three medians, it fits published answers on discrimination
+best, as confirmed for plaid and checkerboard (``tests/benchmarks/analysis/people.py``).
 """
 LAPSES: Final = (0.0, 0.02, 0.04)
 _LAPSE_PRIOR: Final = (0.4, 0.4, 0.2)
 ANALYSIS_LAPSES: Final = (0.0, 0.01, 0.02, 0.03, 0.045, 0.065, 0.09, 0.12, 0.16)
 SESSION_SD: Final = 0.049
-"""Standard deviation of a person's threshold from one session to the next [decades], with [0.034, 0.077].
+"""Standard deviation of a person's threshold between sessions [decades]; interval [0.034, 0.077].
 
-Of six observers of Jäkel & Wichmann 2006 (J. Vision 6:13) between series of 400 trials
+Estimated from six observers of Jäkel & Wichmann 2006 (J. Vision 6:13) between series of 400 trials
 (``tests/benchmarks/analysis/people.py --spread``).
 """
-_BEYOND_DECADES: Final = 0.4
-_BEYOND_SPANS: Final = 0.25
-"""How far beyond the ends of the levels a threshold is looked for, on log and on linear spacing."""
+_MARGIN_DECADES: Final = 0.4
+_MARGIN_SPANS: Final = 0.25
+"""Thresholds are estimated up to this far beyond the levels: in decades if spaced logarithmically, else in spans."""
 
 
 @dataclass(frozen=True, slots=True)
 class Assumed:
     """The assumptions about the psychometric function of a block.
 
-    ``widths`` are the smallest and the largest width while levels are chosen, ``width_prior`` median and factor of the
-    log-normal prior in the analysis, in u.
+    ``widths`` are the smallest and the largest width while levels are chosen, ``width_prior`` is the median and the
+    factor of the log-normal prior in the analysis, both in u.
     """
 
     family: Family
@@ -196,19 +196,19 @@ class Stimulus(Table):
     spacing: Literal["log", "linear"] = Field(
         default="log", description="Spacing of the levels in between. log: equal ratios; linear: equal steps."
     )
-    steps: Annotated[int, Field(ge=2, le=LEVELS_MOST)] = Field(default=31, description="Number of levels.")
+    steps: Annotated[int, Field(ge=2, le=MAX_LEVELS)] = Field(default=31, description="Number of levels.")
     direction: Literal["up", "down"] = Field(
         default="up", description="up: comparisons are above the standard; down: below it."
     )
 
     @property
     def quantity(self) -> str:
-        """The name of the varied quantity within a sentence (KeyError if there is none)."""
+        """The name of the varied quantity within a sentence; raises KeyError if there is none."""
         return quantity_words(self.vary)
 
     @property
     def unit(self) -> str:
-        """The unit of the varied quantity (KeyError if there is none)."""
+        """The unit of the varied quantity; raises KeyError if there is none."""
         return quantity(self.vary).unit
 
     @property
@@ -216,9 +216,9 @@ class Stimulus(Table):
         return self.level or ("difference" if self.vary.endswith("_ms") else "weber")
 
     def comparison(self, standard: float | None, level: _Level) -> _Level:
-        """Return the comparison at a level (0 is the standard itself), in the varied number's unit.
+        """Return the comparison at a level, in the varied number's unit.
 
-        ``standard`` is None where the level is the value itself.
+        Level 0 is the standard itself; ``standard`` is None if the level is the value itself.
         """
         if standard is None or self.level_kind == "value":
             return level
@@ -233,7 +233,7 @@ class Stimulus(Table):
         return distance / standard if self.level_kind == "weber" else distance
 
     def coordinate(self, level: float) -> float:
-        """Return u of a level: its log10 (−∞ for 0) or the level itself, as levels are spaced."""
+        """Return u of a level: its log10 (−∞ for 0) if levels are spaced logarithmically, else the level itself."""
         if self.spacing == "linear":
             return level
         return math.log10(level) if level > 0 else -math.inf
@@ -255,62 +255,62 @@ class Stimulus(Table):
 
     def ratio(self, low: float, high: float) -> float:
         """Return the ratio of two levels given in u; infinite if the lower is not above zero."""
-        least = self.level_of(low)
-        return self.level_of(high) / least if least > 0 else math.inf
+        low_level = self.level_of(low)
+        return self.level_of(high) / low_level if low_level > 0 else math.inf
 
     @property
-    def _is_distance(self) -> bool:
-        """Whether a level is a distance from a standard."""
+    def _is_relative(self) -> bool:
+        """Whether levels are relative to a standard."""
         return self.level_kind != "value"
 
     def rises(self, design: Design) -> bool:
         """Return whether the share of successes increases with the level, so that there is a threshold.
 
-        It does not if a level is a value and the odd or the repeated interval is asked for, since differences are
-        noticed above and below the standard.
+        It does not if levels are values and the question is for the odd or the repeated interval, because differences
+        are noticed both above and below the standard.
         """
-        return design.adaptive and (self._is_distance or not design.has_standard or design.asks_for_more)
+        return design.adaptive and (self._is_relative or not design.has_standard or design.asks_for_more)
 
     def assumed(self, design: Design) -> Assumed:
         """Return the default assumptions about the psychometric function."""
         low, high = self.domain
         log, span = self.spacing == "log", high - low
         # Weibull, since a distance of zero must give chance performance
-        by_chance = self._is_distance and log and design.guess_rate is not None
+        starts_at_chance = self._is_relative and log and design.guess_rate is not None
         return Assumed(
-            family="weibull" if by_chance else "normal",
+            family="weibull" if starts_at_chance else "normal",
             widths=_WIDTHS if log else (span / 8, 2 * span),
-            width_prior=WIDTH_PRIOR if log and self._is_distance else (span / 2, 2.0),
+            width_prior=WIDTH_PRIOR if log and self._is_relative else (span / 2, 2.0),
         )
 
     def guesses(self, design: Design) -> tuple[float, ...] | None:
-        """Return the guess rates of a design; None if no answer is correct, so that it equals the lapse rate."""
-        if design.has_standard and not self._is_distance:
+        """Return the guess rates of a design; None if no answer is correct, so that guesses are lapses."""
+        if design.has_standard and not self._is_relative:
             return None
         return FREE_GUESSES if design.guess_rate is None else (design.guess_rate,)
 
     def running_grid(self, design: Design, assumed: Assumed, lapses: tuple[float, ...]) -> Grid:
         """Return the grid for choosing levels during a session.
 
-        All widths are equally likely, so that levels stay at the threshold for any width of a person's function; with
-        levels above it the threshold would depend on the prior.
+        All widths are equally likely, so that levels stay at the threshold whatever the width of a person's function;
+        with levels above the threshold, its estimate would depend on the prior.
         """
         return _running_grid(assumed.family, self.domain, assumed.widths, lapses, self.guesses(design))
 
     def analysis_grid(self, design: Design, assumed: Assumed, sessions: float = 1) -> Grid:
         """Return the grid for estimating thresholds: finer, and extended beyond both ends of the levels.
 
-        The estimate is of a person's threshold, about which that of each of the ``sessions`` varies by `SESSION_SD`.
+        The thresholds of the ``sessions`` vary about the person's threshold, which is estimated, by `SESSION_SD`.
         """
         low, high = self.domain
         log, session_sd = self.spacing == "log", SESSION_SD / math.sqrt(sessions)
-        beyond = _BEYOND_DECADES if log else _BEYOND_SPANS * (high - low)
-        least, most = assumed.widths
-        widest = _ANALYSIS_WIDTHS if log else (0.3 * least, 1.4 * most)
+        margin = _MARGIN_DECADES if log else _MARGIN_SPANS * (high - low)
+        narrowest, widest = assumed.widths
+        low_width, high_width = _ANALYSIS_WIDTHS if log else (0.3 * narrowest, 1.4 * widest)
         return Grid(
             family=assumed.family,
-            thresholds=evenly(low - beyond, high + beyond, 97),
-            widths=geometric(min(widest[0], 0.7 * least), max(widest[1], 1.4 * most), 17),
+            thresholds=evenly(low - margin, high + margin, 97),
+            widths=geometric(min(low_width, 0.7 * narrowest), max(high_width, 1.4 * widest), 17),
             width_prior=assumed.width_prior,
             lapses=ANALYSIS_LAPSES,
             lapse_prior=lapse_prior(ANALYSIS_LAPSES),
@@ -345,9 +345,9 @@ class Stimulus(Table):
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Stimulated:
-    """The content of one interval: a condition with its varied number; never printed, since it reveals the level.
+    """The content of one interval: a condition with its varied number, not printable because it reveals the level.
 
-    ``vary`` is None if the condition is presented unchanged; ``value`` is in the unit that ends its name.
+    ``vary`` is None if the condition is presented unchanged; ``value`` is in the unit at the end of that name.
     """
 
     condition: str

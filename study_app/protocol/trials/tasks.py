@@ -1,4 +1,4 @@
-"""The tasks of a trial: what the hand does, for how long, and how fast it moves at most."""
+"""Tasks of a trial: movements of the hand with their duration and greatest speed."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class Stroke(NamedTuple):
 
 _SHAKE_HZ: Final = 5.0
 _SHAKE_M: Final = 0.03
-"""As quick and as wide as free shaking of a light handle commonly is. [choice]"""
+"""Frequency and amplitude of freely shaking a light handle. [choice]"""
 
 
 class Task(Table):
@@ -59,17 +59,17 @@ class Task(Table):
     tracker: ClassVar[str] = "study_app.session.tasks:TimedTracker"
     hand: ClassVar[str] = "study_app.session.simulated.observers:Explorer"
     start_m: ClassVar[Point | None] = None
-    """Where the ball must be before an interval begins [m, hand frame]; None: anywhere."""
+    """The position of the ball at which an interval may begin [m, hand frame]; None: any."""
     targets_m: ClassVar[tuple[Point, ...]] = ()
-    """The targets that stand still [m, hand frame]."""
+    """The stationary targets [m, hand frame]."""
     radius_m: ClassVar[float] = 0.0
-    """Of the targets [m]."""
+    """The radius of the targets [m]."""
     wanted: ClassVar[int | None] = None
-    """How many targets complete it; None: time does."""
+    """The number of targets that complete the task; None: it is completed by time."""
     least_s: ClassVar[float | None] = None
-    """The time after which the participant may go on [s]; None: the task ends by itself."""
+    """The time after which the participant may continue [s]; None: the task ends by itself."""
     judged_from_s: ClassVar[float] = 0.0
-    """How much of its beginning is not judged [s]."""
+    """The time at the start that is not evaluated [s]."""
 
     @property
     def summary(self) -> str:
@@ -78,7 +78,7 @@ class Task(Table):
     @property
     @abstractmethod
     def limit_s(self) -> float:
-        """The time limit after which it ends by itself [s]."""
+        """The time after which the task ends by itself [s]."""
 
     @property
     def expected_s(self) -> float:
@@ -96,7 +96,7 @@ class Task(Table):
         return self.target_m(0.0) is not None
 
     def target_m(self, t_s: float) -> Point | None:
-        """Return the moving target's position ``t_s`` after the task began [m, hand frame]; None: none moves."""
+        """Return the moving target's position ``t_s`` after the task began [m, hand frame]; None if no target moves."""
         return None
 
     def fastest_stroke(self, workspace_m: Point) -> Stroke:
@@ -104,7 +104,7 @@ class Task(Table):
         return Stroke(_SHAKE_HZ, min(_SHAKE_M, workspace_m[0] / 2))
 
     def lasting(self, most_s: float) -> Self:
-        """Return the task ended only by time: after ``most_s``, or a target's first whole period after that [s]."""
+        """Return the task ended only by time: after ``most_s``, or after the first whole target period from then [s]."""
         return self
 
 
@@ -188,7 +188,7 @@ class Follow(Task):
 
     @property
     def rms_speed_mps(self) -> float:
-        """Root mean square of the target's speed over the judged part, A 2πf / √2 [m/s]."""
+        """Root mean square of the target's speed over the evaluated part, A 2πf / √2 [m/s]."""
         return 2 * math.pi * self.frequency_hz * self.amplitude_m / math.sqrt(2)
 
     def fastest_stroke(self, workspace_m: Point) -> Stroke:
@@ -199,7 +199,7 @@ class Follow(Task):
         return self.model_copy(update={"cycles": max(swings, self.cycles)})
 
     def target_m(self, t_s: float) -> Point:
-        """Return the target's position ``t_s`` after the task began, hand frame [m]; before it the centre."""
+        """Return the target's position ``t_s`` after the task began [m, hand frame]; the centre for a negative time."""
         ramp = 1.0 if t_s >= self.lead_s else (1 - math.cos(math.pi * max(t_s, 0.0) / self.lead_s)) / 2
         return self.amplitude_m * ramp * math.sin(2 * math.pi * self.frequency_hz * t_s), 0.0, 0.0
 
@@ -207,11 +207,11 @@ class Follow(Task):
 _Millimetres: TypeAlias = Annotated[float, within(-500, 500, "the tank extends at most 500 mm to either side")]
 
 _REACH_S: Final = 0.3
-"""From target to target, as fast as aimed reaches are. [choice]"""
+"""The duration of a fast aimed movement from target to target. [choice]"""
 _MOVE_S: Final = 1.5
-"""How long people take from one target to the next, for the expected duration. [choice]"""
+"""The time from one target to the next for the expected duration. [choice]"""
 _SHORTEST_MOVE_S: Final = 1.0
-"""From target to target at least. [choice]"""
+"""The shortest time from one target to the next. [choice]"""
 
 
 class Reach(Task):
@@ -266,9 +266,9 @@ class Reach(Task):
 
     def fastest_stroke(self, workspace_m: Point) -> Stroke:
         """Return the stroke between the two most distant neighbouring targets."""
-        following = (*self.targets_m[1:], self.targets_m[0])
-        way_m = max(math.dist(*pair) for pair in zip(self.targets_m, following, strict=True))
-        return Stroke(0.5 / _REACH_S, way_m / 2)
+        next_targets = (*self.targets_m[1:], self.targets_m[0])
+        longest_m = max(math.dist(*pair) for pair in zip(self.targets_m, next_targets, strict=True))
+        return Stroke(0.5 / _REACH_S, longest_m / 2)
 
     @property
     def limit_s(self) -> float:
@@ -290,17 +290,17 @@ class Reach(Task):
         limit, targets = self.duration_s or self.timeout_s, self.count or 1
         if targets * self.dwell_s >= limit:
             subject = "a target" if targets == 1 else f"each of {targets} targets"
-            lasting_s = f"takes at least as long as the whole task ({limit:g} s)"
-            raise invalid(f"dwell_s = {self.dwell_s:g} in {subject} {lasting_s}: shorten it", "dwell_s")
+            duration_text = f"takes at least as long as the whole task ({limit:g} s)"
+            raise invalid(f"dwell_s = {self.dwell_s:g} in {subject} {duration_text}: shorten it", "dwell_s")
         return self
 
     @model_validator(mode="after")
     def _check_target_distances(self) -> Self:
-        for index, (target, other) in enumerate(pairwise((*self.targets_mm, self.targets_mm[0])), start=1):
-            distance = math.dist(target, other)
+        for index, (target, next_target) in enumerate(pairwise((*self.targets_mm, self.targets_mm[0])), start=1):
+            distance = math.dist(target, next_target)
             if distance <= 2 * self.radius_mm:
-                apart = f"target {index} and the next one are {distance:g} mm apart"
-                raise invalid(f"{apart} and overlap, because radius_mm is {self.radius_mm:g}", "targets_mm")
+                distance_text = f"target {index} and the next one are {distance:g} mm apart"
+                raise invalid(f"{distance_text} and overlap, because radius_mm is {self.radius_mm:g}", "targets_mm")
         return self
 
 
@@ -316,14 +316,14 @@ class _RecordedTask(Task):
         raise PlugInError(": ".join(TASK_KINDS.missing(self.kind)))
 
 
-_IS_SPAN: Final = number_between(0, 3600)
+_IS_DURATION: Final = number_between(0, 3600)
 _IS_POINT: Final = Returns(
     "three coordinates [m] or None", lambda value: value is None or (are_numbers(value) and len(value) == 3)
 )
 _RETURNS: Final = {
     "limit_s": number_between(0.1, 3600),
-    **dict.fromkeys(("expected_s", "shortest_s"), _IS_SPAN),
-    "least_s": Returns(f"{_IS_SPAN.permitted} or None", lambda value: value is None or _IS_SPAN.holds(value)),
+    **dict.fromkeys(("expected_s", "shortest_s"), _IS_DURATION),
+    "least_s": Returns(f"{_IS_DURATION.permitted} or None", lambda value: value is None or _IS_DURATION.holds(value)),
     **dict.fromkeys(("target_m", "start_m"), _IS_POINT),
     "fastest_stroke": Returns("a Stroke of numbers", lambda value: isinstance(value, Stroke) and are_numbers(value)),
     "summary": instance_of(str),
@@ -331,7 +331,7 @@ _RETURNS: Final = {
 TASK_KINDS: Final = Registry[type[Task]](
     "task", {"explore": Explore, "reach": Reach, "follow": Follow}, Task, "kind", _RETURNS
 )
-"""Every kind by its id."""
+"""The kinds of tasks by ID."""
 
 if TYPE_CHECKING:
     AnyTask: TypeAlias = Task

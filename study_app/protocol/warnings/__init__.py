@@ -1,4 +1,4 @@
-"""Warnings about a valid protocol: withheld forces, imprecise thresholds, names of groups, untranslated texts."""
+"""Warnings about a valid protocol, such as withheld forces, imprecise thresholds and untranslated texts."""
 
 from study_app.protocol.warnings.delayed_force import WITHHELD_PERCENT, Entry, longest_delay_ms, stored_table
 from study_app.protocol.warnings.expected_precision import (

@@ -1,7 +1,7 @@
-"""Conditions whose delayed force the passivity controller withholds in part, and the table that tells how much.
+"""Warnings about delayed forces that the passivity controller withholds in part.
 
-The table is ``delayed_force.csv`` in this folder, measured by ``evidence.stability.force_delay`` on the servo's own
-tick.
+The withheld shares are in ``delayed_force.csv`` in this folder; ``evidence.stability.force_delay`` measured them with
+the servo's own tick.
 """
 
 from __future__ import annotations
@@ -25,15 +25,15 @@ from study_app.protocol.model import Follow, Protocol
 from study_app.protocol.trials.tasks import Stroke
 
 WITHHELD_PERCENT: Final = 5.0
-"""A trial in which more is withheld does not present the force that was asked for."""
+"""If more of the force is withheld, a trial does not present the requested force."""
 
 
 class Entry(NamedTuple):
-    """One row: a liquid of ``rek2024``, or of ``physical2`` as "physical2_water", with one hand.
+    """A row of the table: a liquid of ``rek2024``, or of ``physical2`` as "physical2_water", with one grip.
 
-    The grip is "light", "middle" or "firm"; the force is delayed by ``delay_ms`` in addition to the device's delay.
-    ``left_percent`` is the RMS of the force sent relative to that of the requested force, ``withheld_percent`` the
-    share of the force that is withheld, as in a trial.
+    The grip in ``hand`` is "light", "middle" or "firm"; the force is delayed by ``delay_ms`` in addition to the
+    device's delay. ``left_percent`` is the RMS of the force sent relative to that of the requested force,
+    ``withheld_percent`` the share of the force that is withheld, as in a trial.
     """
 
     liquid: str
@@ -46,7 +46,7 @@ class Entry(NamedTuple):
 
 @cache
 def stored_table() -> tuple[Entry, ...]:
-    """Return the shipped table."""
+    """Return the rows of the shipped table."""
     with (resources.files("study_app.protocol.warnings") / "delayed_force.csv").open(encoding="utf-8") as file:
         return tuple(
             Entry(
@@ -68,45 +68,45 @@ def longest_delay_ms(
     rows = _table_rows(liquid, estimator, hand)
     if not rows:
         raise KeyError((liquid, estimator, hand))
-    permitted = takewhile(lambda it: it.withheld_percent <= withheld_percent, rows)
-    return max((it.delay_ms for it in permitted), default=-1.0)
+    permitted = takewhile(lambda row: row.withheld_percent <= withheld_percent, rows)
+    return max((row.delay_ms for row in permitted), default=-1.0)
 
 
 def _table_rows(liquid: str, estimator: str, hand: str) -> list[Entry]:
-    """Return the table's rows of a liquid, the shortest delay first."""
-    rows = (it for it in stored_table() if (it.liquid, it.estimator, it.hand) == (liquid, estimator, hand))
+    """Return the table's rows for a liquid, the shortest delay first."""
+    rows = (row for row in stored_table() if (row.liquid, row.estimator, row.hand) == (liquid, estimator, hand))
     return sorted(rows, key=attrgetter("delay_ms"))
 
 
 STIRRED: Final = Stroke(frequency_hz=1.061, amplitude_m=0.03)
-"""The motion of the stored table: ±30 mm with at most 0.2 m/s."""
-_SHIPPED: Final = (("rek2024", ""), ("physical2", "physical2_"))
-"""The studies whose liquids the table has, and how it calls them."""
+"""The motion for which the table was measured: ±30 mm with at most 0.2 m/s."""
+_STUDIES_IN_TABLE: Final = (("rek2024", ""), ("physical2", "physical2_"))
+"""The studies whose liquids are in the table, and the prefix of their names there."""
 _load: Final = cache(load)
 
 
 def delay_warnings(protocol: Protocol) -> Iterator[str]:
-    """Yield the conditions whose force delay is longer than the passivity controller can deliver."""
+    """Yield warnings about conditions whose delayed force is withheld in part."""
     presented = {name for block in protocol.blocks.values() for name in protocol.conditions_in(block.id)}
     for name, condition in protocol.conditions.items():
         delay_ms = 1000 * condition.link().mean_delay_s(protocol.device.rate_hz)
         if name not in presented or delay_ms == 0 or len(condition.liquid_ids) > 1:
             continue
-        listed = _name_in_table(protocol, condition.liquid_ids[0])
+        table_name = _name_in_table(protocol, condition.liquid_ids[0])
         problem = (
             _energy_warning(protocol, name, delay_ms)
-            if listed is None
-            else _table_warning(protocol, name, listed, delay_ms)
+            if table_name is None
+            else _table_warning(protocol, name, table_name, delay_ms)
         )
         if problem is not None:
             yield f"conditions.{name}.force_delay_ms: {problem}, or delay the picture instead"
 
 
 def _table_warning(protocol: Protocol, name: str, liquid: str, delay_ms: float) -> str | None:
-    """Return the warning about a shipped liquid and a light grip from the stored table; None if little is withheld."""
+    """Return a warning for a liquid of the table and a light grip; None if little is withheld."""
     estimator = protocol.scene.velocity.kind if protocol.scene.velocity.kind == "kalman" else "ewma"
-    most_ms = longest_delay_ms(liquid, estimator)
-    if delay_ms <= most_ms:
+    longest_ms = longest_delay_ms(liquid, estimator)
+    if delay_ms <= longest_ms:
         return None
     rows = _table_rows(liquid, estimator, "light")
     percent = float(np.interp(delay_ms, [row.delay_ms for row in rows], [row.withheld_percent for row in rows]))
@@ -117,12 +117,12 @@ def _table_warning(protocol: Protocol, name: str, liquid: str, delay_ms: float) 
         f"with a delay of {delay_ms:.3g} ms and a light grip, the passivity controller holds back about "
         f"{percent:.0f} % of the force ({percent / 100 * force_n:.2g} of {force_n:.2g} N at {STIRRED.speed_mps:.2g} "
         "m/s): choose at most "
-        f"{most_ms:g} ms"
+        f"{longest_ms:g} ms"
     )
 
 
 def _energy_warning(protocol: Protocol, name: str, delay_ms: float) -> str | None:
-    """Return a warning if a liquid outside the table returns more energy than the limit in its tasks' motion."""
+    """Return a warning if a liquid outside the table returns too much energy in the motion of its tasks."""
     scene, workspace_m = protocol.scene_for(name), protocol.device.workspace_m
     tasks = [
         protocol.tasks[block.task] for block in protocol.blocks.values() if name in protocol.conditions_in(block.id)
@@ -142,13 +142,13 @@ def _energy_warning(protocol: Protocol, name: str, delay_ms: float) -> str | Non
 
 
 def _name_in_table(protocol: Protocol, liquid: str) -> str | None:
-    """Return the table's name of a liquid; None if it has none with the same numbers and scale."""
-    for study, prefix in _SHIPPED:
+    """Return the name in the table of a liquid with the same numbers and scale, or None."""
+    for study, prefix in _STUDIES_IN_TABLE:
         shipped = _load(study)
         if shipped.scene.scale != protocol.scene.scale:
             continue
-        for name, known in shipped.liquids.items():
-            listed = any(entry.liquid == prefix + name for entry in stored_table())
-            if listed and felt_numbers(known) == felt_numbers(protocol.liquids[liquid]):
+        for name, shipped_liquid in shipped.liquids.items():
+            is_listed = any(entry.liquid == prefix + name for entry in stored_table())
+            if is_listed and felt_numbers(shipped_liquid) == felt_numbers(protocol.liquids[liquid]):
                 return prefix + name
     return None

@@ -1,7 +1,7 @@
-"""Names of groups that suggest what a participant already is, in English, Dutch, German and French.
+"""Names of groups that suggest an attribute of participants, in English, Dutch, German and French.
 
-A name is split at underscores and digits, and each word is looked up. Words that also name what can be randomised are
-left out: trained, control, experimental, left_hand, stroke.
+A name is split at underscores and digits, and each word is looked up. Words that also name possible treatments are
+not included: trained, control, experimental, left_hand, stroke.
 """
 
 import re
@@ -37,8 +37,8 @@ _WORDS: Final = r"""
 
 def suggests_attribute(name: str) -> bool:
     """Return whether a group's name suggests an attribute that participants already have."""
-    name_parts = re.findall(r"[a-z]+", name.casefold())
-    whole = name.casefold() in ("old", "oud", "alt", "vieux")
-    return whole or any(
-        re.match(_STEMS, word, re.VERBOSE) or re.fullmatch(_WORDS, word, re.VERBOSE) for word in name_parts
+    name_words = re.findall(r"[a-z]+", name.casefold())
+    is_old = name.casefold() in ("old", "oud", "alt", "vieux")
+    return is_old or any(
+        re.match(_STEMS, word, re.VERBOSE) or re.fullmatch(_WORDS, word, re.VERBOSE) for word in name_words
     )

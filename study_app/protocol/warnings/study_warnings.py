@@ -1,4 +1,4 @@
-"""What is permitted in a study and may still be a mistake, a sentence each."""
+"""Warnings about valid parts of a study that may be mistakes, one sentence each."""
 
 from __future__ import annotations
 
@@ -27,14 +27,17 @@ from study_app.protocol.warnings.expected_precision import imprecise
 from study_app.protocol.warnings.group_names import suggests_attribute
 from study_app.protocol.wording.languages import language_name
 
-_TELLING = 0.39
-"""Twice the difference of viscosity that people just tell, 19 % (Jones, Hunter & Lafontaine 1997): what two liquids
-need for reliable discrimination; the thesis' water and honey differ by 40 %."""
+_DISCRIMINABLE = 0.39
+"""The relative difference at which two liquids are reliably discriminated.
+
+It is twice the just noticeable difference of viscosity, 19 % (Jones, Hunter & Lafontaine 1997); the thesis' water and
+honey differ by 40 %.
+"""
 
 _FRAME_MS = 8.0
-"""About a frame of a screen of 120 Hz."""
-_NARROW = 1.3
-"""A log-normal prior with a smaller factor decides the width: 95 % of it lie within a factor of 1.7. [choice]"""
+"""About the duration of a frame at 120 Hz."""
+_MIN_PRIOR_FACTOR = 1.3
+"""With a smaller factor, a log-normal prior determines the width: 95 % lie within a factor of 1.7. [choice]"""
 
 
 def warnings(protocol: Protocol, *, simulates: bool = True, without_force: str = "") -> tuple[str, ...]:
@@ -58,61 +61,63 @@ def warnings(protocol: Protocol, *, simulates: bool = True, without_force: str =
 
 def liquid_warnings(protocol: Protocol) -> tuple[str, ...]:
     """Return warnings about possible mistakes in the liquids, one sentence each."""
-    felt = {name: steady_force(protocol.scene_of(name)) for name in protocol.liquids}
+    forces = {name: steady_force(protocol.scene_of(name)) for name in protocol.liquids}
     return (
-        *_similar_liquids(protocol, felt),
-        *_clipped_liquids(protocol, felt),
-        *_ignoring_viscosity(protocol, felt),
+        *_similar_liquids(protocol, forces),
+        *_clipped_liquids(protocol, forces),
+        *_ignoring_viscosity(protocol, forces),
         *_practised_liquids(protocol),
         *_balls_of_different_sizes(protocol),
     )
 
 
-def _similar_liquids(protocol: Protocol, felt: dict[str, Steady]) -> Iterator[str]:
-    seen: set[frozenset[str]] = set()
+def _similar_liquids(protocol: Protocol, forces: dict[str, Steady]) -> Iterator[str]:
+    reported: set[frozenset[str]] = set()
     for block in protocol.main_blocks:
         for liquid, other in combinations(_liquids_of(protocol, block), 2):
             pair = frozenset((liquid, other))
-            smaller_n, greater_n = sorted((felt[liquid].force_n, felt[other].force_n))
-            if (greater_n > 0 and greater_n - smaller_n >= _TELLING * smaller_n) or pair in seen:
+            smaller_n, greater_n = sorted((forces[liquid].force_n, forces[other].force_n))
+            if (greater_n > 0 and greater_n - smaller_n >= _DISCRIMINABLE * smaller_n) or pair in reported:
                 continue
-            seen.add(pair)
+            reported.add(pair)
             yield (
                 f"{liquid} and {other} in block {block.id} are hard to tell apart: at a hand speed of {HAND_MPS:g} "
-                f"m/s their forces ({felt[liquid].force_n:.2f} and {felt[other].force_n:.2f} N) differ by less than "
-                f"{_TELLING:.0%}"
+                f"m/s their forces ({forces[liquid].force_n:.2f} and {forces[other].force_n:.2f} N) "
+                f"differ by less than {_DISCRIMINABLE:.0%}"
             )
 
 
 def _liquids_of(protocol: Protocol, block: Block) -> dict[str, None]:
     """Return the liquids of a block without duplicates."""
-    conditions = (protocol.conditions[it] for it in protocol.conditions_in(block.id))
+    conditions = (protocol.conditions[name] for name in protocol.conditions_in(block.id))
     return dict.fromkeys(name for condition in conditions for name in condition.liquid_ids)
 
 
-def _clipped_liquids(protocol: Protocol, felt: dict[str, Steady]) -> Iterator[str]:
-    for name, it in felt.items():
-        if it.limit is not None:
-            limit = "the force limit" if it.limit == "norm" else "the slope limit (which keeps the servo stable)"
+def _clipped_liquids(protocol: Protocol, forces: dict[str, Steady]) -> Iterator[str]:
+    for name, force in forces.items():
+        if force.limit is not None:
+            limit = "the force limit" if force.limit == "norm" else "the slope limit (which keeps the servo stable)"
             scale = _unclipped_scale(protocol.scene_of(name))
             most_percent = protocol.limits.withheld_percent
-            is_valid = 100 * (1 - it.force_n / it.drag_n) <= most_percent
+            is_valid = 100 * (1 - force.force_n / force.drag_n) <= most_percent
             beyond = "" if is_valid else ", which is more than limits.withheld_percent permits"
             advice = "" if scale is None else f"; with scene.scale = {scale} it is not clipped"
             yield (
                 f"{name} is clipped: at a hand speed of {HAND_MPS:g} m/s {limit} reduces its force of "
-                f"{it.drag_n:.2f} N to {it.force_n:.2f} N{beyond}{advice}"
+                f"{force.drag_n:.2f} N to {force.force_n:.2f} N{beyond}{advice}"
             )
 
 
 def _unclipped_scale(scene: Scene) -> int | None:
     """Return the highest lower whole scale at which the liquid of a scene is not clipped, or None."""
-    lower = range(math.ceil(scene.scale) - 1, 0, -1)
-    return next((it for it in lower if steady_force(scene.model_copy(update={"scale": it})).limit is None), None)
+    lower_scales = range(math.ceil(scene.scale) - 1, 0, -1)
+    return next(
+        (scale for scale in lower_scales if steady_force(scene.model_copy(update={"scale": scale})).limit is None), None
+    )
 
 
-def _ignoring_viscosity(protocol: Protocol, felt: dict[str, Steady]) -> Iterator[str]:
-    """Yield liquids whose drag ignores their viscosity, and the resulting error."""
+def _ignoring_viscosity(protocol: Protocol, forces: dict[str, Steady]) -> Iterator[str]:
+    """Yield warnings about liquids whose drag ignores their viscosity."""
     for name in protocol.liquids:
         scene = protocol.scene_of(name)
         (liquid,) = scene.liquids
@@ -121,38 +126,38 @@ def _ignoring_viscosity(protocol: Protocol, felt: dict[str, Steady]) -> Iterator
         speed_mps = effective_speed_mps(scene, liquid, scene.scale * HAND_MPS)
         named_n, true_n = (resistance_n(scene, liquid, speed_mps, law) for law in ("constant", REFERENCE))
         if "drag" in liquid.effects and liquid.drag.law == "constant":
-            why, instead = "its constant drag coefficient ignores it", f'drag = {{ law = "{REFERENCE}" }}'
-        elif felt[name].drag_n == 0.0:
-            named_n, why, instead = 0.0, "its effects do not include drag", 'add "drag" to its effects'
+            reason, correction = "its constant drag coefficient ignores it", f'drag = {{ law = "{REFERENCE}" }}'
+        elif forces[name].drag_n == 0.0:
+            named_n, reason, correction = 0.0, "its effects do not include drag", 'add "drag" to its effects'
         else:
             continue
         if abs(named_n - true_n) > max(scene.accuracy.relative * true_n, scene.accuracy.absolute_n):
             yield (
-                f"{name} has a viscosity, but {why}: at a hand speed of {HAND_MPS:g} m/s its drag is {named_n:.2f} "
+                f"{name} has a viscosity, but {reason}: at a hand speed of {HAND_MPS:g} m/s its drag is {named_n:.2f} "
                 f'instead of {true_n:.2f} N, an error of {abs(named_n - true_n):.2f} N; write effects = "auto", or '
-                f"{instead}"
+                f"{correction}"
             )
 
 
 def _practised_liquids(protocol: Protocol) -> Iterator[str]:
-    """Yield liquids that are used for practice and judged in another block, unless levels are practised."""
-    used = {block.id: _liquids_of(protocol, block) for block in protocol.blocks_in_order}
-    judged = {name: block.id for block in reversed(protocol.main_blocks) for name in used[block.id]}
+    """Yield warnings about liquids that are presented in practice and in a main block, unless levels are practised."""
+    liquids = {block.id: _liquids_of(protocol, block) for block in protocol.blocks_in_order}
+    main_block_ids = {name: block.id for block in reversed(protocol.main_blocks) for name in liquids[block.id]}
     for block in protocol.blocks_in_order:
         if block.phase != "practice" or block.stimulus is not None:
             continue
-        for name in used[block.id]:
-            if name in judged:
+        for name in liquids[block.id]:
+            if name in main_block_ids:
                 yield (
-                    f"practice block {block.id} presents {name}, which is also in block {judged[name]}, so "
+                    f"practice block {block.id} presents {name}, which is also in block {main_block_ids[name]}, so "
                     "participants will already know it from practice"
                 )
 
 
 def _balls_of_different_sizes(protocol: Protocol) -> Iterator[str]:
-    """Yield blocks whose conditions show balls of different sizes, which tells them apart."""
+    """Yield warnings about blocks whose conditions can be told apart by the size of the ball."""
     for block in protocol.main_blocks:
-        sizes = {1000 * protocol.scene_for(it).body.diameter_m for it in protocol.conditions_in(block.id)}
+        sizes = {1000 * protocol.scene_for(name).body.diameter_m for name in protocol.conditions_in(block.id)}
         if len(sizes) > 1:
             listed = ", ".join(f"{size:g}" for size in sorted(sizes))
             yield (
@@ -162,7 +167,7 @@ def _balls_of_different_sizes(protocol: Protocol) -> Iterator[str]:
 
 
 def level_warnings(protocol: Protocol, *, simulates: bool = True) -> Iterator[str]:
-    """Yield warnings about blocks with a design; ``simulates``: also those that need simulated observers."""
+    """Yield warnings about blocks with a design; ``simulates`` includes those that need simulated observers."""
     blocks = (block for block in protocol.blocks_in_order if block.design is not None)
     yield from dict.fromkeys(warning for block in blocks for warning in _design_warnings(protocol, block, simulates))
 
@@ -170,10 +175,10 @@ def level_warnings(protocol: Protocol, *, simulates: bool = True) -> Iterator[st
 def _design_warnings(protocol: Protocol, block: Block, simulates: bool) -> Iterator[str]:
     design, track = protocol.design_of(block), tracks_of(protocol, block)[0]
     count, trials = len(design.arrangements), track.slots - len(track.catch)
-    if not design.has_noise and trials % count:  # not every arrangement comes equally often
+    if not design.has_noise and trials % count:  # some arrangements are presented more often than others
         place = f"blocks.{block.id}.repetitions" if block.stimulus is None else f"methods.{block.method}"
-        wanted = "an even number" if count == 2 else f"a multiple of {count}"
-        yield f"{place}: {count} arrangements cannot be balanced over {counted(trials, 'trial')}; choose {wanted}"
+        divisible = "an even number" if count == 2 else f"a multiple of {count}"
+        yield f"{place}: {count} arrangements cannot be balanced over {counted(trials, 'trial')}; choose {divisible}"
     if block.stimulus is not None:
         for key, sentence in protocol.method_of(block).warnings():
             yield f"methods.{block.method}.{key}: {sentence}"
@@ -196,11 +201,11 @@ def _design_warnings(protocol: Protocol, block: Block, simulates: bool) -> Itera
 def _unpaced_blocks(protocol: Protocol, block: Block) -> Iterator[str]:
     if isinstance(protocol.tasks[block.task], Follow) or block.stimulus is None:
         return
-    alike = [
+    similar_blocks = [
         other for other in protocol.blocks.values() if (other.stimulus, other.task) == (block.stimulus, block.task)
     ]
-    if (said := unpaced_clipping_warning(protocol, alike)) is not None:
-        yield said
+    if (warning := unpaced_clipping_warning(protocol, similar_blocks)) is not None:
+        yield warning
     error_percent = protocol.limits.level_error_percent
     if highest_damping(protocol, block) > 0 and error_percent is not None:
         fast_hz = fastest_hz(protocol.scene.velocity, protocol.device.rate_hz, 1 - error_percent / 100)
@@ -211,11 +216,11 @@ def _unpaced_blocks(protocol: Protocol, block: Block) -> Iterator[str]:
 
 
 def _imperceptible_settings(protocol: Protocol, without_force: str) -> Iterator[str]:
-    """Yield settings that have no perceptible effect: a delay in seconds or of an undrawn part, a missing force."""
+    """Yield warnings about settings without perceptible effect, such as a delay of a hidden ball."""
     for block in protocol.blocks_in_order:
         conditions = {name: protocol.conditions[name] for name in protocol.conditions_in(block.id)}
         vary = None if block.stimulus is None else protocol.stimuli[block.stimulus].vary
-        hides = [
+        hidden = [
             name for name, condition in conditions.items() if condition.ball == "hidden" and not condition.shows_video
         ]
         for name, condition in conditions.items():
@@ -223,30 +228,30 @@ def _imperceptible_settings(protocol: Protocol, without_force: str) -> Iterator[
             if vary in OF_CONDITION:
                 places[vary] = f"stimuli.{block.stimulus}.vary"
             stroke = protocol.tasks[block.task].fastest_stroke(protocol.device.workspace_m)
-            gives_none = force_n(protocol.scene_for(name), stroke) < LEAST_N
+            is_forceless = force_n(protocol.scene_for(name), stroke) < LEAST_N
             for key, place in places.items():
                 value = getattr(condition, key)
                 if key.endswith("_ms") and 0 < value < 1:
                     yield f"{place}: {value:g} ms cannot be perceived: write {1000 * value:g} for {value:g} s"
-                if key == DELAY and name in hides:
+                if key == DELAY and name in hidden:
                     yield f'{place}: the ball is hidden, so participants cannot see its delay: write ball = "shown"'
-                elif key in OF_LINK and (without_force or gives_none):
-                    what = f"{without_force or 'the condition'} does not produce force"
-                    yield f"{place}: {what}, so participants cannot feel whether the force is late or lost"
-        of_liquids = protocol.compared_in(block.id) == "liquids" if vary is None else vary not in OF_CONDITION
-        if without_force and of_liquids and block.phase == "main":
-            seen = ", so participants see but do not feel how the liquids slow the ball down"
-            seen = (
+                elif key in OF_LINK and (without_force or is_forceless):
+                    cause = f"{without_force or 'the condition'} does not produce force"
+                    yield f"{place}: {cause}, so participants cannot feel whether the force is late or lost"
+        compares_liquids = protocol.compared_in(block.id) == "liquids" if vary is None else vary not in OF_CONDITION
+        if without_force and compares_liquids and block.phase == "main":
+            consequence = ", so participants see but do not feel how the liquids slow the ball down"
+            consequence = (
                 ", and the ball is hidden, so participants cannot perceive the block's liquids"
-                if len(hides) == len(conditions)
-                else seen
+                if len(hidden) == len(conditions)
+                else consequence
             )
-            yield f"blocks.{block.id}: {without_force} does not produce force{seen}"
+            yield f"blocks.{block.id}: {without_force} does not produce force{consequence}"
 
 
 def _analysis_warnings(protocol: Protocol) -> Iterator[str]:
-    """Yield reasons why the study may not answer its question, regardless of the answers."""
-    decided = protocol.analysis
+    """Yield warnings about confounds and other reasons why the study may not answer its question."""
+    analysis = protocol.analysis
     for block in protocol.main_blocks:
         if block.order == "fixed" and block.design is None and len(block.conditions) > 1:
             yield (
@@ -257,12 +262,12 @@ def _analysis_warnings(protocol: Protocol) -> Iterator[str]:
         yield from _forced_choice_warnings(protocol, block)
         yield from _condition_warnings(protocol, block)
     half = (POINTS - 1) / 2
-    if decided is not None and (decided.equivalence_bound or 0.0) > half:
+    if analysis is not None and (analysis.equivalence_bound or 0.0) > half:
         yield (
-            f"analysis.equivalence_bound: {decided.equivalence_bound:g} points are more than half the scale "
+            f"analysis.equivalence_bound: {analysis.equivalence_bound:g} points are more than half the scale "
             f"({half:g}), so almost any answers would count as equivalent"
         )
-    if decided is not None and decided.participants is None:
+    if analysis is not None and analysis.participants is None:
         yield (
             "analysis.participants is missing: a study that stops at the first significant result has a "
             "false-positive rate above alpha"
@@ -270,12 +275,12 @@ def _analysis_warnings(protocol: Protocol) -> Iterator[str]:
     yield from _attribute_groups(protocol)
     yield from _block_order_warnings(protocol)
     yield from dict.fromkeys(_repeated_pages(protocol))
-    for number, value in enumerate(() if decided is None else decided.published, start=1):
+    for number, value in enumerate(() if analysis is None else analysis.published, start=1):
         yield from _unbracketed_value(protocol, number, value)
 
 
 def _attribute_groups(protocol: Protocol) -> Iterator[str]:
-    """Yield randomised groups whose names suggest attributes of participants."""
+    """Yield warnings about randomised groups whose names suggest attributes of participants."""
     for name in protocol.groups if protocol.randomises else ():
         if suggests_attribute(name):
             yield (
@@ -285,7 +290,7 @@ def _attribute_groups(protocol: Protocol) -> Iterator[str]:
 
 
 def _repeated_pages(protocol: Protocol) -> Iterator[str]:
-    """Yield pages other than breaks that a session shows several times."""
+    """Yield warnings about pages other than breaks that a session shows several times."""
     for steps in (variant.protocol.steps for variant in variants(protocol)):
         for name, page in protocol.pages.items():
             if page.kind != "break" and (times := steps.count(name)) > 1:
@@ -293,21 +298,23 @@ def _repeated_pages(protocol: Protocol) -> Iterator[str]:
 
 
 def _block_order_warnings(protocol: Protocol) -> Iterator[str]:
-    """Yield contrasts of blocks in a fixed order, and fixed blocks among changing ones."""
+    """Yield warnings about contrasts of blocks in a fixed order, and about fixed blocks among varying ones."""
     for number, contrast in enumerate(() if protocol.analysis is None else protocol.analysis.contrasts, start=1):
         if len(contrast.blocks) < 2 or protocol.groups:
             continue
-        said = (
+        sentence = (
             f"analysis.contrasts.{number}: all participants complete {' and '.join(contrast.blocks)} in the same "
             "order, so the difference between them is confounded with"
         )
         if not any({*contrast.blocks} <= {*steps} for steps in protocol.every_session()):
-            yield f"{said} practice and with everything else that differs between the sessions; add a control group"
+            yield f"{sentence} practice and with everything else that differs between the sessions; add a control group"
         elif protocol.study.block_order == "fixed":
-            yield f'{said} practice and fatigue; choose study.block_order = "balanced"'
+            yield f'{sentence} practice and fatigue; choose study.block_order = "balanced"'
     blocks = protocol.blocks_in_order
-    main = [at for at, block in enumerate(blocks) if block.phase == "main"]
-    for block in blocks[main[0] : main[-1]] if main and protocol.study.block_order != "fixed" else ():
+    main_indices = [index for index, block in enumerate(blocks) if block.phase == "main"]
+    if not main_indices or protocol.study.block_order == "fixed":
+        return
+    for block in blocks[main_indices[0] : main_indices[-1]]:
         if block.phase != "main":
             yield (
                 f"study.block_order: block {block.id} ({block.phase}) keeps its position while the order of the "
@@ -316,19 +323,19 @@ def _block_order_warnings(protocol: Protocol) -> Iterator[str]:
 
 
 def _condition_warnings(protocol: Protocol, block: Block) -> Iterator[str]:
-    """Yield conditions that cannot be distinguished, or that a trial's name reveals."""
+    """Yield warnings about conditions that cannot be compared, or that a label reveals."""
     conditions = [protocol.conditions[name] for name in block.conditions]
-    alone = block.design is None and block.questionnaire is not None and len(conditions) == 1
-    if alone and len(protocol.main_blocks) > 1:
+    is_single = block.design is None and block.questionnaire is not None and len(conditions) == 1
+    if is_single and len(protocol.main_blocks) > 1:
         yield (
             f"blocks.{block.id}.conditions: there is only one condition, so there is nothing to compare it with; a "
             "main block needs at least two"
         )
     if protocol.compared_in(block.id) == "delays":
-        for delay_ms, other in pairwise(sorted({condition.delay_ms for condition in conditions})):
-            if other - delay_ms < _FRAME_MS:
+        for delay_ms, next_ms in pairwise(sorted({condition.delay_ms for condition in conditions})):
+            if next_ms - delay_ms < _FRAME_MS:
                 yield (
-                    f"blocks.{block.id}.conditions: delays of {delay_ms:g} and {other:g} ms differ by less than "
+                    f"blocks.{block.id}.conditions: delays of {delay_ms:g} and {next_ms:g} ms differ by less than "
                     f"one frame ({_FRAME_MS:g} ms), so the screen cannot show the difference"
                 )
     if block.design is not None and block.standard is not None:
@@ -344,8 +351,8 @@ def _condition_warnings(protocol: Protocol, block: Block) -> Iterator[str]:
 
 
 def _mixed_differences(protocol: Protocol, block: Block, standard: str) -> Iterator[str]:
-    """Yield conditions that differ from the standard in several ways, any of which participants may notice."""
-    ways = {
+    """Yield warnings about conditions that differ from the standard in several noticeable ways."""
+    keys_by_difference = {
         "liquid": ("liquid_ids",),
         "view": ("seen",),
         "visual delay": (DELAY,),
@@ -354,8 +361,8 @@ def _mixed_differences(protocol: Protocol, block: Block, standard: str) -> Itera
     for name in block.conditions:
         pair = [protocol.conditions[condition] for condition in (name, standard)]
         differing = [
-            words
-            for words, keys in ways.items()
+            difference
+            for difference, keys in keys_by_difference.items()
             if len({tuple(getattr(condition, key) for key in keys) for condition in pair}) > 1
         ]
         if len(differing) > 1:
@@ -366,7 +373,7 @@ def _mixed_differences(protocol: Protocol, block: Block, standard: str) -> Itera
 
 
 def _forced_choice_warnings(protocol: Protocol, block: Block) -> Iterator[str]:
-    """Yield missing parts of a forced-choice block of levels."""
+    """Yield warnings about missing catch trials and a narrow prior in a block of levels."""
     if block.stimulus is None or block.design is None or block.method is None:
         return
     design, stimulus = protocol.design_of(block), protocol.stimulus_of(block)
@@ -376,15 +383,15 @@ def _forced_choice_warnings(protocol: Protocol, block: Block) -> Iterator[str]:
             "apart from participants with a high threshold"
         )
     factor = protocol.method_of(block).assumed(stimulus, design).width_prior[1]
-    if factor < _NARROW:
+    if factor < _MIN_PRIOR_FACTOR:
         yield (
             f"methods.{block.method}.width_prior: a factor of {factor:g} is so narrow that the prior determines the "
-            f"slope and biases the thresholds of participants with other slopes; choose {_NARROW:g} or more"
+            f"slope and biases the thresholds of participants with other slopes; choose {_MIN_PRIOR_FACTOR:g} or more"
         )
 
 
 def _unbracketed_value(protocol: Protocol, number: int, published: Published) -> Iterator[str]:
-    """Yield a published value outside the study's own levels."""
+    """Yield a warning about a published value outside the study's levels."""
     block = protocol.blocks[published.block]
     if published.measure == "exponent" or block.stimulus is None or block.method is None:
         return
@@ -397,7 +404,7 @@ def _unbracketed_value(protocol: Protocol, number: int, published: Published) ->
 
 
 def _tasks_without_target(protocol: Protocol) -> Iterator[str]:
-    """Yield reaching tasks whose trials are valid without a reached target."""
+    """Yield warnings about reaching tasks whose trials are valid without a reached target."""
     if protocol.limits.targets_percent is not None:
         return
     for name in dict.fromkeys(block.task for block in protocol.main_blocks):
@@ -410,8 +417,8 @@ def _tasks_without_target(protocol: Protocol) -> Iterator[str]:
 
 def _recalled_instruments(protocol: Protocol) -> Iterator[str]:
     for name, questionnaire in protocol.questionnaires.items():
-        of = questionnaire.instrument
-        if of is not None and (recalled := Instrument(of).table.get("from_memory")) is not None:
+        instrument = questionnaire.instrument
+        if instrument is not None and (recalled := Instrument(instrument).table.get("from_memory")) is not None:
             yield (
                 f"questionnaires.{name}: the wording was written from memory and has not been checked "
                 f"against a source ({recalled}); check it against your copy"
@@ -419,7 +426,7 @@ def _recalled_instruments(protocol: Protocol) -> Iterator[str]:
 
 
 def _untitled_forms(protocol: Protocol) -> Iterator[str]:
-    """Yield the forms whose heading would be their id, in a study that is not in English."""
+    """Yield warnings about forms whose heading would be their ID, in a study that is not in English."""
     languages = protocol.study.languages
     for name in protocol.forms if {*languages} != {"en"} else ():
         if protocol.questionnaires[name].title is None:
@@ -430,15 +437,15 @@ def _untitled_forms(protocol: Protocol) -> Iterator[str]:
 
 
 def _shared_titles(protocol: Protocol) -> Iterator[str]:
-    """Yield the main blocks whose title is that of an earlier main block in some language, each once."""
-    alike: set[str] = set()
+    """Yield a warning for each main block that has the title of an earlier main block in some language."""
+    reported: set[str] = set()
     for language in protocol.study.languages:
-        titled: dict[str, str] = {}
+        blocks_by_title: dict[str, str] = {}
         for block in protocol.main_blocks:
             title = protocol.text(block.title, language)
-            other = titled.setdefault(title, block.id)
-            if other != block.id and block.id not in alike:
-                alike.add(block.id)
+            other = blocks_by_title.setdefault(title, block.id)
+            if other != block.id and block.id not in reported:
+                reported.add(block.id)
                 yield (
                     f"blocks.{block.id}.title: block {other} has the same title, “{title}”, so the report adds the "
                     "IDs to both; use a different title for each block"

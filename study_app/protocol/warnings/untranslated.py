@@ -1,7 +1,7 @@
-"""Texts that are still in another language than the one that the study states for them.
+"""Texts in a different language than the study states for them.
 
-Nothing marks a copied text. It is recognised by comparison: with the texts that ship with the program (studies,
-templates, standard questionnaires), with the other languages of the study, and with the other studies of the workspace.
+They are recognised by comparison with the texts that ship with the program (studies, templates, standard
+questionnaires), with the other languages of the study, and with the other studies of the workspace.
 """
 
 import re
@@ -26,22 +26,22 @@ SAME_WORDS: Final[Mapping[str, frozenset[str]]] = {
     "fr": frozenset({"effort", "frustration", "performance"}),
     "nl": frozenset({"baseline", "begin", "hand"}),
 }
-"""Shipped texts of another language that are right in this language, too."""
+"""Shipped texts of another language that are also correct in this language."""
 _SENTENCE_WORDS: Final = 3
-"""Texts of so many words are not the same in two languages by chance."""
+"""Texts of this many words are not the same in two languages by chance."""
 _PLACES_LISTED: Final = 5
 _PLACEHOLDER: Final = re.compile(r"new [a-z0-9 ]+")
-"""What the designer writes into a new element, in English: "New question"."""
+"""The designer's English text for a new element, such as "New question"."""
 _PARAGRAPHS: Final = re.compile(r"\n\s*\n")
-_OF_INSTRUMENTS: Final = ("title", "intro", "scales.*.labels", "scales.*.cannot_judge",
+_INSTRUMENT_TEXTS: Final = ("title", "intro", "scales.*.labels", "scales.*.cannot_judge",
                           *(f"items.*.{key}" for key in ("text", "short", "low", "high")))  # fmt: skip
 
 
 class UntranslatedText(NamedTuple):
     """A text that should be in ``language`` but is in ``source``, the codes of two languages.
 
-    A text that ``ships`` with the program exists there in ``source``; otherwise it equals that of another language or
-    study. A text that ``is_word`` may be right, because a word can be the same in two languages.
+    If it ``ships``, the program contains it in ``source``; otherwise it equals a text of another language or study. If
+    it ``is_word``, it may be correct, because a word can be the same in two languages.
     """
 
     path: Path
@@ -52,7 +52,7 @@ class UntranslatedText(NamedTuple):
 
     @property
     def is_shown(self) -> bool:
-        """Whether participants read the text: short texts are for tables, the study's title for the operator."""
+        """Whether participants read it; short texts are for tables, the study's title is for the operator."""
         return self.path[-1] != "short" and self.path != ("study", "title")
 
 
@@ -68,7 +68,7 @@ def untranslated_texts(document: Mapping[str, Any]) -> tuple[UntranslatedText, .
 def untranslated_at(
     document: Mapping[str, Any], path: Path, value: Any, languages: Sequence[str]
 ) -> Iterator[UntranslatedText]:
-    """Yield the languages into which the text at ``path`` is not translated."""
+    """Yield the text at ``path`` for each language into which it is not translated."""
     first = languages[0]
     texts = value if isinstance(value, Mapping) else {first: value}
     for code in languages:
@@ -91,16 +91,16 @@ def describe_untranslated(document: Mapping[str, Any], *, lists_places: bool) ->
     """
     texts, only_one = untranslated_texts(document), len(languages_of(document)) == 1
     for (language, source), count in Counter((text.language, text.source) for text in texts).items():
-        stated, wanted = language_name(source), language_name(language)
-        are = f"{counted(count, 'text')} {'is' if count == 1 else 'are'}"
-        what = f"{are} still in {stated} and must be translated into {wanted}"
+        source_name, target = language_name(source), language_name(language)
+        count_text = f"{counted(count, 'text')} {'is' if count == 1 else 'are'}"
+        problem = f"{count_text} still in {source_name} and must be translated into {target}"
         if only_one:
-            what = f"{are} still in {stated}, but the study's only language is {wanted}"
-        of_these = [text for text in texts if (text.language, text.source) == (language, source)]
-        place, more = _place_text(of_these[0]), "; this is the first of them" if count > 1 else ""
+            problem = f"{count_text} still in {source_name}, but the study's only language is {target}"
+        untranslated = [text for text in texts if (text.language, text.source) == (language, source)]
+        place, more = _place_text(untranslated[0]), "; this is the first of them" if count > 1 else ""
         if lists_places:
-            place, more = "study.languages", f": {listed_places(of_these)}"
-        yield f"{place}: {what}{more}"
+            place, more = "study.languages", f": {listed_places(untranslated)}"
+        yield f"{place}: {problem}{more}"
 
 
 def untranslated_on_pages(document: Mapping[str, Any]) -> tuple[UntranslatedText, ...]:
@@ -111,8 +111,8 @@ def untranslated_on_pages(document: Mapping[str, Any]) -> tuple[UntranslatedText
 def check_translated(document: Mapping[str, Any]) -> None:
     """Raise SessionError if pages would show shipped texts in another language, not only single words."""
     shipped = [text for text in untranslated_on_pages(document) if text.ships]
-    wrong = next((text.language for text in shipped if not text.is_word), None)
-    if texts := [text for text in shipped if text.language == wrong]:
+    wrong_language = next((text.language for text in shipped if not text.is_word), None)
+    if texts := [text for text in shipped if text.language == wrong_language]:
         language, source = language_name(texts[0].language), language_name(texts[0].source)
         count = f"{counted(len(texts), 'text')} on {language} pages {'is' if len(texts) == 1 else 'are'}"
         raise SessionError(
@@ -136,9 +136,9 @@ def _place_text(text: UntranslatedText) -> str:
 @lru_cache(maxsize=4096)  # the texts of a study are compared after each edit: 1 to 2 ms instead of 10 to 40
 def _text_parts(text: Any) -> tuple[str, ...]:
     """Return a text's paragraphs or a scale's labels for comparison, without those that contain no letters."""
-    parts = text if isinstance(text, tuple) else _PARAGRAPHS.split(text) if isinstance(text, str) else ()
-    read = (visible_text(part) for part in parts if isinstance(part, str))
-    return tuple(part for part in read if any(map(str.isalpha, part)))
+    raw_parts = text if isinstance(text, tuple) else _PARAGRAPHS.split(text) if isinstance(text, str) else ()
+    visible_parts = (visible_text(part) for part in raw_parts if isinstance(part, str))
+    return tuple(part for part in visible_parts if any(map(str.isalpha, part)))
 
 
 def _source_language(parts: Sequence[str], code: str, known: Mapping[str, frozenset[str]]) -> str | None:
@@ -160,7 +160,7 @@ def _same_words(code: str) -> frozenset[str]:
 def _shipped_texts() -> Mapping[str, frozenset[str]]:
     """Return every shipped text with its languages."""
     studies = ((_read_table(file), TEXTS) for file in shipped_studies())
-    instruments = ((_read_table(file), _OF_INSTRUMENTS) for file in sorted(INSTRUMENTS.glob("*.toml")))
+    instruments = ((_read_table(file), _INSTRUMENT_TEXTS) for file in sorted(INSTRUMENTS.glob("*.toml")))
     return _languages_by_text((*studies, *instruments))
 
 
@@ -177,9 +177,9 @@ def _workspace_texts(document: Mapping[str, Any]) -> Mapping[str, frozenset[str]
 
 
 @lru_cache(maxsize=2)
-def _texts_of_files(files: tuple[tuple[File, int, int], ...], but: str) -> Mapping[str, frozenset[str]]:
+def _texts_of_files(files: tuple[tuple[File, int, int], ...], except_name: str) -> Mapping[str, frozenset[str]]:
     tables = (_read_table_or_nothing(*file) for file in files)
-    others = [(table, TEXTS) for table in tables if value_at(table, ("study", "name")) != but]
+    others = [(table, TEXTS) for table in tables if value_at(table, ("study", "name")) != except_name]
     shipped = _shipped_texts()
     return {text: codes for text, codes in _languages_by_text(others).items() if text not in shipped}
 

@@ -1,6 +1,6 @@
-"""The program's own words on the participant's pages, one file for each language: everything that no protocol writes.
+"""The program's own texts on the participant's pages, which are not part of a protocol, one file for each language.
 
-Templates in braces are filled with ``str.format``; where grammar depends on a number there is a method. Languages of a
+Texts with braces are templates for ``str.format``; for texts that depend on a number there is a method. Languages of a
 lab are complete files in the workspace's folder ``languages``, read when the program starts.
 """
 
@@ -24,10 +24,11 @@ RIGHT_TO_LEFT = frozenset({"ar", "dv", "fa", "he", "ks", "ps", "sd", "ug", "ur",
 
 
 class Words:
-    """One language's texts: an attribute for each key of its file, a text or a template with slots in braces.
+    """The texts of one language: an attribute for each key of its file, a text or a template with slots in braces.
 
-    ``small_numbers`` are the numbers from one at the start of a sentence; ``interval_coming`` are shown in the pause
-    before the first interval, the second …; questions are by the kind of design, answers by their id.
+    ``small_numbers`` are the numbers from one at the start of a sentence; ``interval_coming`` has the texts in the
+    pause before the first interval, the second, and so on. The
+    keys of questions are kinds of designs, those of answers are IDs.
     """
 
     small_numbers: tuple[str, ...]
@@ -48,7 +49,7 @@ class Words:
         return self.language in RIGHT_TO_LEFT
 
     def joined(self, entries: Sequence[str]) -> str:
-        """Return "2", "2 and 5", "2, 5 and 8"."""
+        """Return a list for a sentence: "2", "2 and 5", "2, 5 and 8"."""
         if not entries:
             return ""
         joined = entries[0]
@@ -66,11 +67,11 @@ class Words:
         return self.number_unclear.format(text=text.strip(), one=reading, other=other)
 
     def missing(self, numbers: Sequence[int]) -> str:
-        """Return the sentence that lists the unanswered statements by number, at least one."""
+        """Return the sentence that lists the numbers of unanswered statements, at least one."""
         return self._missing(numbers, self.one_missing, self.many_missing)
 
     def questions_missing(self, numbers: Sequence[int]) -> str:
-        """Return the sentence that lists the unanswered questions of a form by number."""
+        """Return the sentence that lists the numbers of unanswered questions of a form."""
         return self._missing(numbers, self.one_question_missing, self.many_questions_missing)
 
     def _missing(self, numbers: Sequence[int], singular: str, many: str) -> str:
@@ -78,8 +79,8 @@ class Words:
         count = len(numbers)
         if count == 1:
             return singular.format(list=listed)
-        named = self.small_numbers[count - 1] if count <= len(self.small_numbers) else str(count)
-        return many.format(n=named, list=listed)
+        count_text = self.small_numbers[count - 1] if count <= len(self.small_numbers) else str(count)
+        return many.format(n=count_text, list=listed)
 
 
 _FOLDER: Final = File(__file__).parent
@@ -105,42 +106,44 @@ def read_language(file: File) -> Words:
     if table.get("language") != file.stem:
         faults.append(f'language must be "{file.stem}", as in the file name')
     if faults:
-        more = f"; and {len(faults) - _SHOWN} more" if len(faults) > _SHOWN else ""
-        raise StudyError(f"{file}: {'; '.join(faults[:_SHOWN])}{more}")
+        more_text = f"; and {len(faults) - _MAX_FAULTS} more" if len(faults) > _MAX_FAULTS else ""
+        raise StudyError(f"{file}: {'; '.join(faults[:_MAX_FAULTS])}{more_text}")
     return Words(table)
 
 
-_SHOWN: Final = 8
+_MAX_FAULTS: Final = 8
 
 
 def _language_faults(place: str, english: Mapping[str, Any], table: Mapping[str, Any]) -> Iterator[str]:
-    """Yield what is missing, unknown or wrong in a table of texts, compared with the English one."""
+    """Yield problems of a table of texts, compared with the English one."""
     yield from (f"{place}{key} is unknown: remove it" for key in table if key not in english)
-    for key, model in english.items():
+    for key, english_text in english.items():
         text = table.get(key)
         if not text:
             yield f"{place}{key} is missing"
-        elif isinstance(model, Mapping):
+        elif isinstance(english_text, Mapping):
             yield from (
-                _language_faults(f"{key}.", model, text) if isinstance(text, Mapping) else [f"{key} must be a table"]
+                _language_faults(f"{key}.", english_text, text)
+                if isinstance(text, Mapping)
+                else [f"{key} must be a table"]
             )
-        elif type(text) is not type(model) or (
-            isinstance(text, list) and not all(isinstance(one, str) for one in text)
+        elif type(text) is not type(english_text) or (
+            isinstance(text, list) and not all(isinstance(entry, str) for entry in text)
         ):
-            yield f"{place}{key} must be {'a list of strings' if isinstance(model, list) else 'a string'}"
-        elif key == "interval_coming" and len(text) != len(model):
-            yield f"{place}{key} needs {len(model)} strings"
-        elif isinstance(text, str) and (wrong := _wrong_slots(text, model)):
+            yield f"{place}{key} must be {'a list of strings' if isinstance(english_text, list) else 'a string'}"
+        elif key == "interval_coming" and len(text) != len(english_text):
+            yield f"{place}{key} needs {len(english_text)} strings"
+        elif isinstance(text, str) and (wrong_slots := _wrong_slots(text, english_text)):
             yield (
-                f"{place}{key} must contain the same placeholders as “{model}”; these differ: "
-                f"{{{'}, {'.join(sorted(wrong))}}}"
+                f"{place}{key} must contain the same placeholders as “{english_text}”; these differ: "
+                f"{{{'}, {'.join(sorted(wrong_slots))}}}"
             )
 
 
-def _wrong_slots(text: str, model: str) -> set[str]:
-    """Return the slots that only one of two texts has; a list may omit its count, as some grammars prefer."""
-    slots, needed = _slots(text), _slots(model)
-    return (slots - needed) | (needed - slots - ({"n"} if "list" in slots else set()))
+def _wrong_slots(text: str, english_text: str) -> set[str]:
+    """Return the slots that only one of two texts has; a list may lack its count, as in some languages."""
+    slots, english_slots = _slots(text), _slots(english_text)
+    return (slots - english_slots) | (english_slots - slots - ({"n"} if "list" in slots else set()))
 
 
 def _slots(text: str) -> set[str]:
@@ -152,31 +155,31 @@ def _slots(text: str) -> set[str]:
 
 
 def own_languages(folder: File) -> tuple[dict[str, Words], dict[str, str]]:
-    """Return the languages in a folder by code, and why the others are rejected."""
+    """Return the languages in a folder by code, and the reasons for rejecting others."""
     languages: dict[str, Words] = {}
-    refused: dict[str, str] = {}
+    reasons: dict[str, str] = {}
     try:
         files = sorted(folder.glob("[a-z][a-z].toml"))
     except OSError as error:
         return {}, {folder.name: f"{folder} cannot be read ({error.strerror})"}
     for file in files:
         if file.stem in SHIPPED:
-            refused[file.stem] = f"{file}: the program already includes this language; remove the file"
+            reasons[file.stem] = f"{file}: the program already includes this language; remove the file"
             continue
         try:
             languages[file.stem] = read_language(file)
         except StudyError as error:
-            refused[file.stem] = str(error)
-    return languages, refused
+            reasons[file.stem] = str(error)
+    return languages, reasons
 
 
 SHIPPED: Final = {code: read_language(_FOLDER / f"{code}.toml") for code in ("en", "nl", "de", "fr", "ar")}
-_OWN, REFUSED = own_languages(workspace().folder / "languages")
-LANGUAGES: Final = SHIPPED | _OWN
+_LAB_LANGUAGES, REFUSED = own_languages(workspace().folder / "languages")
+LANGUAGES: Final = SHIPPED | _LAB_LANGUAGES
 
 
 def language_template(code: str) -> str:
-    """Return a language file without texts; the English ones are comments."""
+    """Return a language file without texts, with the English ones in comments."""
     lines = (_FOLDER / "en.toml").read_text(encoding="utf-8").splitlines()[2:]
     text = "\n".join(re.sub(r'^(\w+) = ((?:".*?"|\[.*\]))(.*)$', _empty_line, line) for line in lines)
     return text.replace('language = ""', f'language = "{code}"', 1) + "\n"
@@ -188,7 +191,7 @@ def _empty_line(line: re.Match[str]) -> str:
 
 
 def languages_of(document: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return the languages that a study's document states; English if it states none."""
+    """Return the languages that a study's document states; the default is English."""
     return tuple(str(code) for _, code in entries(document, "study.languages.*")) or ("en",)
 
 
@@ -198,23 +201,23 @@ def language_name(code: str) -> str:
 
 
 def missing_text(path: Path, language: str) -> Fault:
-    """Return the fault about a text missing in one of the study's languages."""
+    """Return the fault that a text is missing in one of the study's languages."""
     hint = f"add {language}: every text is needed in every language of the study"
     return Fault(path, f"is missing in {language_name(language)}", hint, missing_language=language, kind="no text")
 
 
 def words(language: str) -> Words:
-    """Return the texts of a language (StudyError if there are none)."""
+    """Return the texts of a language; raise StudyError if there are none."""
     if language not in LANGUAGES:
-        why = REFUSED.get(
+        reason = REFUSED.get(
             language,
             f"known: {', '.join(sorted(LANGUAGES))}; copy languages/{language}.toml from the workspace in which the "
             f"study was made, or run liquid-study language {language}",
         )
-        raise StudyError(f'the program does not have texts for the participant\'s pages in "{language}" ({why})')
+        raise StudyError(f'the program does not have texts for the participant\'s pages in "{language}" ({reason})')
     return LANGUAGES[language]
 
 
 def words_or_english(language: str) -> Words:
-    """Return the texts of a language, the English ones if there are none, as for results without the lab's file."""
+    """Return the texts of a language, or the English ones if there are none."""
     return LANGUAGES.get(language, SHIPPED["en"])
