@@ -149,7 +149,7 @@ class Editing(QObject):
             is_within(selected, entry.path) or bool(row and (is_within(row, entry.path) or is_within(entry.path, row)))
             for entry in entries
         )
-        remaining = entries[: max((at for at, stays in enumerate(inside, start=1) if stays), default=0)]
+        remaining = entries[: max((count for count, stays in enumerate(inside, start=1) if stays), default=0)]
         if remaining != entries:
             opened.study = opened.study.with_unfinished(remaining)
             self.announce_edit()

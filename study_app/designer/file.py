@@ -261,11 +261,11 @@ class _FileEditor(Coloured, QPlainTextEdit):
         inside = self.contentsRect()
         self._gutter.setGeometry(inside.left(), inside.top(), self.gutter_px(), inside.height())
 
-    def _scroll_gutter(self, place: QRect, by: int) -> None:
-        if by:
-            self._gutter.scroll(0, by)
+    def _scroll_gutter(self, area: QRect, dy: int) -> None:
+        if dy:
+            self._gutter.scroll(0, dy)
         else:
-            self._gutter.update(0, place.y(), self._gutter.width(), place.height())
+            self._gutter.update(0, area.y(), self._gutter.width(), area.height())
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)

@@ -439,8 +439,8 @@ class DesignerHeader(QWidget):
         self.play.play.show_action("play", PLAY if self.width() >= _WIDE_MIN_PX else PLAY_NARROW)
         self._fit_parts()
 
-    def _choose_study(self, at: int) -> None:
-        source = self.study.itemData(at)
+    def _choose_study(self, index: int) -> None:
+        source = self.study.itemData(index)
         self.study.setCurrentIndex(self.study.findData(self.state.chosen) if self.state.chosen else -1)
         if source == NEW:
             self.new_asked.emit()

@@ -93,7 +93,7 @@ class MeasuresController(QObject):
         valid = valid_part(study)
         if valid.protocol is None or not needs_precision_check(valid.protocol):
             self._set_warnings(())
-        shows_power = self._place.measures.isVisible() and valid.whole and valid.forces
+        shows_power = self._place.measures.isVisible() and valid.is_complete and valid.forces
         self._request(None if valid.protocol is None else simulation_of(valid.protocol, power=shows_power))
         view = measures_view(study, facts(study), path, self._latest, earlier=study is not opened.study)
         self._place.measures.power.changed.setVisible(self._was_changed_after_preregistration(opened))

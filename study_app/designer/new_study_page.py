@@ -569,13 +569,13 @@ class Questions(Themed, QWidget):
         self._add_field(2, "Short name", self.name)
         languages_box = QWidget()
         checks = grid_of(2, 2, margins=0, parent=languages_box)
-        for at, (code, name) in enumerate(_available_languages()):
+        for index, (code, name) in enumerate(_available_languages()):
             check = Check(name)
             check.setFont(font("label", weight=400))
             check.setAccessibleName(f"Language {name}")
             check.toggled.connect(self._show_first_texts)
             self.languages[code] = check
-            checks.addWidget(check, at // 2, at % 2)
+            checks.addWidget(check, index // 2, index % 2)
         self.first_texts = label("", "label", "text2", wraps=True)
         checks.addWidget(self.first_texts, checks.rowCount(), 0, 1, 2)
         self._show_first_texts()
@@ -808,12 +808,12 @@ class NewStudyPage(Themed, QWidget):
             add_layout(column, hbox(*labels, STRETCH, spacing=10, margins=(_RING_PX, 0, 0, 0)))
             grid = grid_of(14 - 2 * _RING_PX, 14 - 2 * _RING_PX)
             columns = across if self.width() >= NARROW_BELOW else 2
-            for at, choice in enumerate(choice for choice in choices if choice.copy == copies):
-                made = _TemplateButton(choice)
-                made.focused.connect(partial(self._show_focused_card, made))
-                self._group.addButton(made)
-                grid.addWidget(made, at // columns, at % columns)
-                self.buttons.append(made)
+            for index, choice in enumerate(choice for choice in choices if choice.copy == copies):
+                card = _TemplateButton(choice)
+                card.focused.connect(partial(self._show_focused_card, card))
+                self._group.addButton(card)
+                grid.addWidget(card, index // columns, index % columns)
+                self.buttons.append(card)
             for number in range(columns):
                 grid.setColumnStretch(number, 1)
             add_layout(column, grid)

@@ -222,7 +222,7 @@ _SECTION_HELP: Final = {
     "groups": "Groups of participants. A study has at least two, so the first one comes with a second one.",
     "liquids": "A new liquid; you enter its values. To copy a shipped liquid, such as water or slime, type its name.",
 }
-"""The help of sections whose names do not say enough."""
+"""The help texts of sections whose names need an explanation."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -418,7 +418,7 @@ _Index = QModelIndex | QPersistentModelIndex
 
 
 class _RowPainter(QStyledItemDelegate):
-    """Paints the rows of a tree in its theme; ``movable`` says whether rows can be dragged."""
+    """Paints the rows of a tree in its theme; ``movable`` is whether rows can be dragged."""
 
     def __init__(self, tree: "Tree") -> None:
         super().__init__(tree)
@@ -455,7 +455,7 @@ class _RowPainter(QStyledItemDelegate):
     ) -> None:
         theme = self.theme
         assert theme is not None  # noqa: S101 - painted with a theme
-        middle, right = Qt.AlignmentFlag.AlignVCenter, place.right() - 10
+        middle, right_px = Qt.AlignmentFlag.AlignVCenter, place.right() - 10
         is_selected = bool(state & QStyle.StateFlag.State_Selected)
         current = index == self.tree.currentIndex()
         is_hovered = bool(state & QStyle.StateFlag.State_MouseOver)
@@ -480,20 +480,20 @@ class _RowPainter(QStyledItemDelegate):
         draw_icon(painter, row.icon, QRectF(x + 20, place.center().y() - 9, 18, 18), colour, 1.9)
         painter.setFont(font("label", weight=600, tabular=True))
         if row.faults:
-            badge = QRectF(right - 22, place.center().y() - 10, 22, 20)
+            badge = QRectF(right_px - 22, place.center().y() - 10, 22, 20)
             fill_rounded(painter, badge, 10, theme.bad_bg)
             painter.setPen(QColor(theme.bad))
             painter.drawText(badge, Qt.AlignmentFlag.AlignCenter, str(row.faults))
-            right = badge.left() - 6
+            right_px = badge.left() - 6
         if row.note:
             painter.setFont(font("label", weight=400, tabular=True))
             painter.setPen(QColor(theme.text2))
             width = painter.fontMetrics().horizontalAdvance(row.note) + 2
-            painter.drawText(QRectF(right - width, place.top(), width, place.height()), middle, row.note)
-            right -= width + 8
+            painter.drawText(QRectF(right_px - width, place.top(), width, place.height()), middle, row.note)
+            right_px -= width + 8
         painter.setFont(font("label", weight=600 if is_selected else 500))
         painter.setPen(QColor(colour))
-        room = QRectF(x + 46, place.top(), right - x - 46, place.height())
+        room = QRectF(x + 46, place.top(), right_px - x - 46, place.height())
         title = painter.fontMetrics().elidedText(row.title, Qt.TextElideMode.ElideRight, int(room.width()))
         painter.drawText(room, middle, title)
 
@@ -570,19 +570,19 @@ class Tree(Themed, QTreeView):
         super().mousePressEvent(event)
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
-        at = event.position().toPoint()
+        position = event.position().toPoint()
         if self._pressed is None or not event.buttons() & Qt.MouseButton.LeftButton:
             super().mouseMoveEvent(event)
             return
         start, entry = self._pressed
-        if not self.dragged and (at - start).manhattanLength() >= QApplication.startDragDistance():
+        if not self.dragged and (position - start).manhattanLength() >= QApplication.startDragDistance():
             self.dragged = entry
             self.viewport().setCursor(Qt.CursorShape.ClosedHandCursor)
         if self.dragged:
             bar, height = self.verticalScrollBar(), self.viewport().height()
-            if at.y() < _EDGE_PX or at.y() > height - _EDGE_PX:
-                bar.setValue(bar.value() + (-12 if at.y() < _EDGE_PX else 12))
-            self.target = self._drop_target(at)
+            if position.y() < _EDGE_PX or position.y() > height - _EDGE_PX:
+                bar.setValue(bar.value() + (-12 if position.y() < _EDGE_PX else 12))
+            self.target = self._drop_target(position)
             self.viewport().update()
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
@@ -598,7 +598,7 @@ class Tree(Themed, QTreeView):
         self.viewport().unsetCursor()
         self.viewport().update()
 
-    def _drop_target(self, at: QPoint) -> tuple[ElementPath, float] | None:
+    def _drop_target(self, position: QPoint) -> tuple[ElementPath, float] | None:
         """Return the path of the entry after the drop line, and the vertical position of that line [px]."""
         array = self.dragged[:-1]
         places: list[tuple[ElementPath, float]] = []
@@ -612,7 +612,7 @@ class Tree(Themed, QTreeView):
             elif end is not None and row.path and self._is_below_entry(index, array):
                 end = end[0], box.bottom()
             index = self.indexBelow(index)
-        return min((*places, *([end] if end else ())), key=lambda array: abs(array[1] - at.y()), default=None)
+        return min((*places, *([end] if end else ())), key=lambda array: abs(array[1] - position.y()), default=None)
 
     def _is_below_entry(self, index: QModelIndex, array: ElementPath) -> bool:
         """Return whether a row is inside an entry of a list."""
@@ -695,7 +695,7 @@ class OutlineCard(Coloured, Card):
         self.search_field.clear()
 
     def show_outline(self, rows: tuple[OutlineRow, ...], selected: object) -> None:
-        """Show rows; expanded branches stay expanded. If nothing matches the search, a line says so."""
+        """Show rows; expanded branches stay expanded. If nothing matches the search, a line states this."""
         self._show_search_result(rows)
         if rows != self.rows:
             current = self.tree.currentIndex()

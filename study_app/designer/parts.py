@@ -75,10 +75,10 @@ class Segments(Themed, QWidget):
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         step = {Qt.Key.Key_Left: -1, Qt.Key.Key_Right: 1}.get(Qt.Key(event.key()), 0)
-        at = next((number for number, button in enumerate(self.buttons) if button.hasFocus()), None)
-        if step and at is not None and 0 <= at + step < len(self.buttons):
-            self.buttons[at + step].setFocus(Qt.FocusReason.TabFocusReason)
-            self.chosen.emit(self._values[at + step])
+        index = next((number for number, button in enumerate(self.buttons) if button.hasFocus()), None)
+        if step and index is not None and 0 <= index + step < len(self.buttons):
+            self.buttons[index + step].setFocus(Qt.FocusReason.TabFocusReason)
+            self.chosen.emit(self._values[index + step])
         else:
             super().keyPressEvent(event)
 

@@ -289,8 +289,8 @@ class ProblemLine(Coloured, QWidget):
             self.repairs.append(new_button)
 
     def apply_theme(self, theme: Theme) -> None:
-        own = f"QPushButton {{ text-align: left; padding: 0; color: {theme.text}; }}"
-        self.go.setStyleSheet(f"{own} QPushButton:disabled {{ color: {theme.text3}; }}")
+        style = f"QPushButton {{ text-align: left; padding: 0; color: {theme.text}; }}"
+        self.go.setStyleSheet(f"{style} QPushButton:disabled {{ color: {theme.text3}; }}")
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
         if event.button() == Qt.MouseButton.LeftButton:
@@ -326,7 +326,7 @@ class ProblemsCard(Card):
         self._here_only = False
         self._listed_rows: tuple[ProblemRow, ...] | None = None
         self.repairs: dict[ProblemRow, tuple[str, ...]] = {}
-        self.at: ProblemRow | None = None
+        self._current: ProblemRow | None = None
         self._number = 0
         self.heading = label("", "card")
         self.limit = Segments("Problems of")
@@ -360,7 +360,7 @@ class ProblemsCard(Card):
         self._had_rows = bool(self.rows)
         self.problems = self._warnings = ()
         self.lines, self._listed_rows = [], None
-        self.at, self._number = None, 0
+        self._current, self._number = None, 0
         self.area.verticalScrollBar().setValue(0)
 
     def show_problems(self, rows: tuple[ProblemRow, ...], element: object) -> None:
@@ -386,8 +386,8 @@ class ProblemsCard(Card):
 
     def _show_lines(self, *, closes: bool = False) -> None:
         rows = self.rows
-        if self.at is not None:  # its line number may have changed
-            self.at = next((row for row in rows if row.identity == self.at.identity), self.at)
+        if self._current is not None:  # its line number may have changed
+            self._current = next((row for row in rows if row.identity == self._current.identity), self._current)
         if closes and not rows and not self.keeps_lines_still:
             self.hide()
         counts = ((len(self.problems), "problem"), (len(self._warnings), "warning"))
@@ -426,7 +426,7 @@ class ProblemsCard(Card):
         line = ProblemLine(row, self.repairs.get(row, ()), narrow=narrow)
         line.opened.connect(lambda: self.open_problem(line.row))
         line.repair_asked.connect(lambda sentence: self._ask_to_repair(line.row, sentence))
-        line.here = row == self.at
+        line.here = row == self._current
         for part in (line, Rule()):
             self._column.insertWidget(self._column.count() - 1, part)
         self.lines.append(line)
@@ -459,14 +459,14 @@ class ProblemsCard(Card):
     @property
     def current(self) -> ProblemRow | None:
         """The problem that was opened last, until it is solved."""
-        return self.at if self.at in self.rows else None
+        return self._current if self._current in self.rows else None
 
     @property
     def rows_after_current(self) -> tuple[ProblemRow, ...]:
         """All rows, beginning after the current one, or at its former position if it was solved."""
-        at = self.rows.index(self.at) + 1 if self.at in self.rows else self._number
-        at %= max(1, len(self.rows))
-        return (*self.rows[at:], *self.rows[:at])
+        index = self.rows.index(self._current) + 1 if self._current in self.rows else self._number
+        index %= max(1, len(self.rows))
+        return (*self.rows[index:], *self.rows[:index])
 
     def repairs_of(self, problem: ProblemRow) -> list[RepairButton]:
         return [button for line in self.lines for button in line.repairs if line.row == problem]
@@ -474,7 +474,7 @@ class ProblemsCard(Card):
     def set_current(self, row: ProblemRow) -> None:
         """Make a problem the current one, after which `rows_after_current` begins."""
         if row in self.rows:
-            self.at, self._number = row, self.rows.index(row)
+            self._current, self._number = row, self.rows.index(row)
 
     def open_problem(self, row: ProblemRow) -> None:
         self.set_current(row)

@@ -93,7 +93,7 @@ class DeleteCard(Prompt):
                 self.other.addItem(f"{title_of(document, (path[0], name))} ({name})", name)
         self.other.setCurrentIndex(-1)
         self.other.activated.connect(
-            lambda at: self.answered.emit(DeleteElement(path, "other", self.other.itemData(at)))
+            lambda index: self.answered.emit(DeleteElement(path, "other", self.other.itemData(index)))
         )
         add_parts(self.buttons, self.gaps, self.other, self.all)
         add_layout(self.column, self.buttons)

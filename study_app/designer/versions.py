@@ -337,7 +337,7 @@ class Changes(Card):
         editing.opened_other.connect(self._forget_choice)
         editing.edited.connect(self._pause_timer.start)
         runs.changed.connect(self.compare_now)
-        self.version.activated.connect(lambda at: self.compare_with(str(self.version.itemData(at))))
+        self.version.activated.connect(lambda index: self.compare_with(str(self.version.itemData(index))))
         self.restore.clicked.connect(self._restore_version)
 
     def compare_with(self, key: str) -> None:

@@ -93,8 +93,8 @@ class _RightPane(QWidget):
         body, key = self._stack.currentWidget(), event.key()
         if isinstance(body, QAbstractScrollArea) and key in {Qt.Key.Key_PageUp, Qt.Key.Key_PageDown}:
             step = QAbstractSlider.SliderAction
-            by = step.SliderPageStepAdd if key == Qt.Key.Key_PageDown else step.SliderPageStepSub
-            body.verticalScrollBar().triggerAction(by)
+            action = step.SliderPageStepAdd if key == Qt.Key.Key_PageDown else step.SliderPageStepSub
+            body.verticalScrollBar().triggerAction(action)
         else:
             super().keyPressEvent(event)
 
@@ -459,7 +459,7 @@ class _Layout(QWidget):
         else:
             self.form.focus_first()
 
-    def cycle(self, by: int) -> None:
+    def cycle(self, step: int) -> None:
         stops: list[tuple[QWidget, Callable[[], None]]] = [
             (self.header, self.focus_header),
             (self.outline, self.focus_outline),
@@ -469,8 +469,10 @@ class _Layout(QWidget):
         if self.problems.isVisible():
             stops.append((self.problems, self.focus_problems))
         focused = self.window().focusWidget()
-        index = next((at for at, (part, _) in enumerate(stops) if focused and part.isAncestorOf(focused)), -by)
-        stops[(index + by) % len(stops)][1]()
+        index = next(
+            (position for position, (part, _) in enumerate(stops) if focused and part.isAncestorOf(focused)), -step
+        )
+        stops[(index + step) % len(stops)][1]()
 
 
 class DesignerPlace(Place):
@@ -579,20 +581,20 @@ class DesignerPlace(Place):
         if self.form.head.delete.isEnabled():
             self.finish("delete", self.form_path)
 
-    def move_by(self, by: int) -> None:
+    def move_by(self, offset: int) -> None:
         if self.form_path and not self.view.header.read_only:
             self.flush()
-            self.asked.emit(MoveElement(self.form_path, by))
+            self.asked.emit(MoveElement(self.form_path, offset))
 
-    def write_question(self, by: int) -> None:
-        """Go to the text of the question ``by`` positions away; from a questionnaire, to that of its first question."""
+    def write_question(self, offset: int) -> None:
+        """Go to the text of the question ``offset`` positions away, or from a questionnaire to its first question."""
         if (form := self.view.form) is None:
             return
         question_lists = [row.facts.lines for row in form.rows if row.path[-1] == "items" and row.facts is not None]
         paths = [line.path for line in (*form.questions.lines, *(line for lines in question_lists for line in lines))]
-        at = (paths.index(form.path) if form.path in paths else -1) + by
-        if 0 <= at < len(paths):
-            self._handle_request(Do("write", (paths[at],)))
+        index = (paths.index(form.path) if form.path in paths else -1) + offset
+        if 0 <= index < len(paths):
+            self._handle_request(Do("write", (paths[index],)))
 
     @property
     def form_path(self) -> ElementPath:
@@ -801,15 +803,15 @@ class DesignerPlace(Place):
         if focused not in stops:
             if not (forward and stops and focused is not None and focused.isAncestorOf(self.stack)):  # the page itself
                 return super().focusNextPrevChild(forward)
-            at = -1
+            index = -1
         else:
-            at = stops.index(focused)
-        if not forward and at == 0:
+            index = stops.index(focused)
+        if not forward and index == 0:
             return super().focusNextPrevChild(forward)
         reason = Qt.FocusReason.TabFocusReason if forward else Qt.FocusReason.BacktabFocusReason
         target = (
-            stops[at + (1 if forward else -1)]
-            if at + 1 < len(stops) or not forward
+            stops[index + (1 if forward else -1)]
+            if index + 1 < len(stops) or not forward
             else next(focus_stops(self.window()))
         )
         target.setFocus(reason)

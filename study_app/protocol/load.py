@@ -89,7 +89,7 @@ def load(name_or_path: str | File, *, delay_ticks: int = ASSUMED_TICKS) -> Proto
 
 
 def parse(source: bytes, name: str, *, delay_ticks: int = ASSUMED_TICKS) -> Protocol:
-    """Return the protocol in ``source``, like `load`; error messages contain ``name``."""
+    """Return the protocol in ``source``, like `load`; ``name`` is its name in error messages."""
     document, places = read_document(source, name)
     protocol, faults = validate_document(document, delay_ticks=delay_ticks)
     if protocol is None or faults:

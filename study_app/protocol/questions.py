@@ -85,8 +85,8 @@ class ShowIf(Table):
 
     def holds(self, answer: Value) -> bool:
         if self.values is not None:
-            given = answer if isinstance(answer, tuple) else (answer,)
-            return any(value in self.permitted for value in given)
+            answers = answer if isinstance(answer, tuple) else (answer,)
+            return any(value in self.permitted for value in answers)
         if not isinstance(answer, int | float):
             return False
         return (self.at_least is None or answer >= self.at_least) and (self.at_most is None or answer <= self.at_most)
@@ -274,7 +274,7 @@ class RatingView(ItemView):
 
 
 class Rated(Question):
-    """What a statement and a rating have in common: a scale."""
+    """Base class of statements and ratings, which have a scale."""
 
     widget: ClassVar[str] = "rating"
     measure: ClassVar[str] = "rating"

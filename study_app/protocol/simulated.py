@@ -383,7 +383,7 @@ class Comparison:
 class SimulatedTrial(NamedTuple):
     """One answered trial of a block with a design; ``track`` is the track of its ``code``.
 
-    ``level`` is in the unit of the stimulus' levels, None if conditions are compared; ``success`` tells whether the
+    ``level`` is in the unit of the stimulus' levels, None if conditions are compared; ``success`` is whether the
     answer is a success of the psychometric function.
     """
 

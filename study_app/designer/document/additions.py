@@ -237,10 +237,10 @@ def short_text_edits(study: Study, path: Path, language: str, text: str) -> tupl
     before, short = value_at(study.document, path), value_at(study.document, short_path)
     if path[-1] != "text" or isinstance(before, Mapping) != isinstance(short, Mapping):
         return ()
-    old, own = _text_in(before, language), _text_in(short, language)
+    old_text, short_text = _text_in(before, language), _text_in(short, language)
     others = [value for _, value in entries(study.document, f"{path[0]}.{path[1]}.*.*.short")]
-    is_copy = sum(_text_in(other, language) == own for other in others) > 1
-    if old is None or own is None or not (is_copy or own == _initial_short_text(old)):
+    is_copy = sum(_text_in(other, language) == short_text for other in others) > 1
+    if old_text is None or short_text is None or not (is_copy or short_text == _initial_short_text(old_text)):
         return ()
     return (Set((*short_path, language) if isinstance(short, Mapping) else short_path, _initial_short_text(text)),)
 
@@ -384,19 +384,19 @@ def _highest_level(study: Study, fault: Fault, low: float, high: float) -> float
     def passes(level: float) -> bool:
         stimulus = formed.stimuli[name].model_copy(update={"levels": (low, level)})
         lowered = _lowered_levels(study, name, level).items()
-        methods = {name: formed.methods[name].model_copy(update={"levels": own}) for name, own in lowered}
+        methods = {name: formed.methods[name].model_copy(update={"levels": levels}) for name, levels in lowered}
         changed = formed.model_copy(
             update={"stimuli": {**formed.stimuli, name: stimulus}, "methods": {**formed.methods, **methods}}
         )
         return not any(problem.path == fault.path for problem in check_paced(changed))
 
-    least, most = low, high
+    valid_level, too_high_level = low, high
     for _ in range(_HALVINGS):
-        middle = (least + most) / 2
-        least, most = (middle, most) if passes(middle) else (least, middle)
+        middle = (valid_level + too_high_level) / 2
+        valid_level, too_high_level = (middle, too_high_level) if passes(middle) else (valid_level, middle)
     for digits in (3, 4):
-        step = 10.0 ** (int(f"{least:e}".split("e")[1]) - digits + 1)
-        rounded = round(step * int(least / step + 1e-9), 12)
+        step = 10.0 ** (int(f"{valid_level:e}".split("e")[1]) - digits + 1)
+        rounded = round(step * int(valid_level / step + 1e-9), 12)
         if low < rounded and passes(rounded):
             return int(rounded) if rounded.is_integer() else rounded
     return None
@@ -668,5 +668,5 @@ def _titles(document: Mapping[str, Any], path: Path) -> Iterator[tuple[Path, str
 
 
 def _number_in_id(value: float) -> str:
-    """Return a number as it is written in an ID: "0_5", "minus_60"."""
+    """Return a number in the notation for IDs, such as "0_5" or "minus_60"."""
     return exact_text(value).replace("-", "minus_").replace(".", "_")[: MAX_ID // 2]

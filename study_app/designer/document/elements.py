@@ -98,7 +98,7 @@ def title_of(document: Mapping[str, Any], path: Path) -> str:
     if path[:2] == EXCLUSIONS and isinstance(rule := value.get("rule"), str):
         return label_of(rule)
     if isinstance(path[-1], int) and "id" not in value:
-        texts = [text for held in value.values() for text in (held if isinstance(held, tuple | list) else (held,))]
+        texts = [text for entry in value.values() for text in (entry if isinstance(entry, tuple | list) else (entry,))]
         return ", ".join([text for text in texts if isinstance(text, str)][:_MAX_TITLE_TEXTS]) or str(path[-1] + 1)
     return name_label(str(value.get("id", path[-1])))
 
@@ -302,7 +302,7 @@ def search_words(text: str) -> list[str]:
 def find_fields(study: Study, text: str) -> tuple[FoundField, ...]:
     """Return the fields whose labels or choices have words that begin with the search words, labels first.
 
-    Choices that are not selected are considered only if no label and no selected choice matches; sentences come last.
+    Unselected choices are searched only if no label and no selected choice matches, and sentences only after those.
     """
     parts = search_words(text)
     if not parts or len(text.strip()) < _MIN_SEARCH_LENGTH:

@@ -360,8 +360,8 @@ def _matches_kind(node: _Node, tables: list[_Node], value: Mapping[str, Any]) ->
 def _is_distinguishing(key: str, tables: list[_Node]) -> bool:
     """Return whether the key has a different fixed value in each table; one table may lack it."""
     values = [_fixed_values(node, key) for node in tables]
-    every = [value for some in values for value in some]
-    return sum(map(bool, values)) >= len(tables) - 1 and len(every) == len(set(every))
+    all_values = [value for table_values in values for value in table_values]
+    return sum(map(bool, values)) >= len(tables) - 1 and len(all_values) == len(set(all_values))
 
 
 def _fixed_values(node: _Node, key: str) -> tuple[str, ...]:
@@ -574,8 +574,8 @@ def refused_at(document: Mapping[str, Any], path: Path) -> frozenset[str]:
         return frozenset()
     if path[:2] == EXCLUSIONS:
         return frozenset() if table.get("rule") in RULE_LIMITS else frozenset({"limit"})
-    applies = (keys for given, keys in node.get(FormKey.NOT_WITH, ()) if all(key in table for key in given))
-    return frozenset(next(applies, ()))
+    applicable = (keys for owners, keys in node.get(FormKey.NOT_WITH, ()) if all(key in table for key in owners))
+    return frozenset(next(applicable, ()))
 
 
 def row_at(document: Mapping[str, Any], path: Path) -> Row | None:

@@ -105,24 +105,24 @@ def _header_pieces(spans: Spans, path: Path) -> list[Piece]:
     return [piece for piece in spans.pieces(path) if piece.node.kind in {"table", "array table"}]
 
 
-def _insert_block(spans: Spans, edit: Editor, at: int, body: str) -> None:
-    """Insert whole lines after the piece that ends at ``at``, with blank lines around them as needed."""
+def _insert_block(spans: Spans, edit: Editor, position: int, body: str) -> None:
+    """Insert whole lines after the piece that ends at ``position``, with blank lines around them as needed."""
     text, newline = spans.text, spans.newline
-    before = text[:at]
+    before = text[:position]
     opening = "" if not before.strip() else newline if before.endswith("\n") else newline * 2
     if before.endswith(newline * 2):
         opening = ""
-    closing = "" if _BLANK_LINE.match(text, at) else newline
-    if at == len(text) and before and not before.endswith("\n"):
+    closing = "" if _BLANK_LINE.match(text, position) else newline
+    if position == len(text) and before and not before.endswith("\n"):
         body = body.removesuffix(newline)
-    edit.insert(at, opening + body + closing)
+    edit.insert(position, opening + body + closing)
 
 
-def _insert_lines(spans: Spans, edit: Editor, at: int, lines: str) -> None:
+def _insert_lines(spans: Spans, edit: Editor, position: int, lines: str) -> None:
     """Insert whole lines; a text without a final line break stays without one."""
-    if at and not spans.text[:at].endswith("\n"):
+    if position and not spans.text[:position].endswith("\n"):
         lines = spans.newline + lines.removesuffix(spans.newline)
-    edit.insert(at, lines)
+    edit.insert(position, lines)
 
 
 def _add_line(spans: Spans, edit: Editor, owner: Node | None, path: Path, value: Any, after: str | None) -> None:
@@ -133,9 +133,9 @@ def _add_line(spans: Spans, edit: Editor, owner: Node | None, path: Path, value:
     key = f"{key_text(str(path[-1]))} = "
     if last is None:
         first = next(spans.headers(), None)
-        at = len(spans.text) if first is None else spans.owned_start(first)
+        position = len(spans.text) if first is None else spans.owned_start(first)
         line = f"{key}{toml_value(value, newline=spans.newline, column=len(key))}{spans.newline}"
-        _insert_lines(spans, edit, at, line if first is None else line + spans.newline)
+        _insert_lines(spans, edit, position, line if first is None else line + spans.newline)
         return
     line_start = spans.text.rfind("\n", 0, last.start) + 1
     indent = spans.text[line_start : last.start]
@@ -217,11 +217,11 @@ def _renamed_text(spans: Spans, piece: Piece, depth: int, name: str) -> str:
     for start, end in _key_spans(spans, piece.node.path[: depth + 1]):
         if piece.start <= start < piece.end:
             editor.replace(start, end, key_text(name))
-    text, at = "", piece.start
+    text, position = "", piece.start
     for splice in editor.splices:
-        text += spans.text[at : splice.at] + splice.after
-        at = splice.at + len(splice.before)
-    text += spans.text[at : piece.end]
+        text += spans.text[position : splice.start] + splice.after
+        position = splice.start + len(splice.before)
+    text += spans.text[position : piece.end]
     return text if piece.node.kind == "pair" or text.endswith("\n") else text + spans.newline
 
 

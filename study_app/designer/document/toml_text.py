@@ -21,9 +21,9 @@ class Refused(StudyError):
 
 
 class Splice(NamedTuple):
-    """A replacement of ``before`` at position ``at`` of a text by ``after``."""
+    """A replacement of ``before``, which begins at position ``start`` of a text, by ``after``."""
 
-    at: int
+    start: int
     before: str
     after: str
 
@@ -44,8 +44,8 @@ class Editor:
         if (before := self.text[start:end]) != after:
             self._replacements.append(Splice(start, before, after))
 
-    def insert(self, at: int, after: str) -> None:
-        self.replace(at, at, after)
+    def insert(self, position: int, after: str) -> None:
+        self.replace(position, position, after)
 
     def delete(self, start: int, end: int) -> None:
         """Delete a piece; overlapping deletions are joined."""
@@ -55,11 +55,11 @@ class Editor:
     def splices(self) -> Splices:
         """The collected splices, overlapping deletions joined."""
         joined: list[Splice] = []
-        for splice in sorted(self._replacements, key=lambda splice: splice.at):
-            if joined and splice.at < (end := joined[-1].at + len(joined[-1].before)):
+        for splice in sorted(self._replacements, key=lambda splice: splice.start):
+            if joined and splice.start < (end := joined[-1].start + len(joined[-1].before)):
                 last = joined.pop()
-                whole = self.text[last.at : max(end, splice.at + len(splice.before))]
-                splice = Splice(last.at, whole, last.after + splice.after)  # noqa: PLW2901
+                replaced = self.text[last.start : max(end, splice.start + len(splice.before))]
+                splice = Splice(last.start, replaced, last.after + splice.after)  # noqa: PLW2901
             joined.append(splice)
         return tuple(joined)
 
@@ -80,19 +80,19 @@ def apply_splices(text: str, splices: Iterable[Splice]) -> str:
     """Return a text with splices applied."""
     parts: list[str] = []
     end = 0
-    for at, before, after in splices:
-        if at < end or text[at : at + len(before)] != before:
+    for position, before, after in splices:
+        if position < end or text[position : position + len(before)] != before:
             raise ValueError("the text has changed since these edits were computed")
-        parts += (text[end:at], after)
-        end = at + len(before)
+        parts += (text[end:position], after)
+        end = position + len(before)
     return "".join((*parts, text[end:]))
 
 
 def revert_splices(splices: Splices) -> Splices:
     """Return the splices that undo the given ones in the resulting text."""
     shift, reverted = 0, list[Splice]()
-    for at, before, after in splices:
-        reverted.append(Splice(at + shift, after, before))
+    for position, before, after in splices:
+        reverted.append(Splice(position + shift, after, before))
         shift += len(after) - len(before)
     return tuple(reverted)
 
@@ -217,8 +217,8 @@ class Spans:
         """Return the end of the line on which a header or key ends, after its comment and line break."""
         if node is None:
             return 0
-        rest = _REST.match(self.text, node.end)
-        return rest.end() if rest else node.end
+        match = _REST.match(self.text, node.end)
+        return match.end() if match else node.end
 
     def owned_start(self, node: Node) -> int:
         """Return the start of a header or key including its line and the comments directly above."""

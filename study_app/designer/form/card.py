@@ -110,11 +110,11 @@ class _EitherField(Field):
     def _chosen_row(self, row: FormRow) -> FormRow:
         return replace(row, **values_of(row.either[row.number or 0]))
 
-    def _switch_kind(self, at: int) -> None:
+    def _switch_kind(self, index: int) -> None:
         """Request a value of another kind, converted from the current one as far as possible."""
-        if at == self.row.number:
+        if index == self.row.number:
             return
-        new_row, value = self.row.either[at], self.row.value
+        new_row, value = self.row.either[index], self.row.value
         first_value = value[0] if isinstance(value, tuple) and value else value
         if new_row.kind in {"choice", "reference"}:
             self.set_value(new_row.choices[0].value if new_row.choices else "")
@@ -345,13 +345,13 @@ class _RowWidget(Themed, QWidget):
         ]
         counts = Counter(text for _problem, text in repairs)
         for problem, text in [(problem, text) for problem, text in repairs if counts[text] == 1][:_MAX_REPAIRS]:
-            made = RepairButton(problem, text)
-            made.clicked.connect(lambda _on=False, problem=problem, text=text: self.repair_asked.emit(problem, text))
-            made.typed.connect(self._type_letter)
-            name_scroll_bars(made)
-            self._buttons.addWidget(made, 0, Qt.AlignmentFlag.AlignRight)
-            made.show()  # at once: Tab skips widgets that a layout has not shown yet
-            self.repairs.append(made)
+            button = RepairButton(problem, text)
+            button.clicked.connect(lambda _on=False, problem=problem, text=text: self.repair_asked.emit(problem, text))
+            button.typed.connect(self._type_letter)
+            name_scroll_bars(button)
+            self._buttons.addWidget(button, 0, Qt.AlignmentFlag.AlignRight)
+            button.show()  # at once: Tab skips widgets that a layout has not shown yet
+            self.repairs.append(button)
         if focused_text is not None and not self.repairs:
             self.field.take_keyboard()
         elif focused_text is not None:  # focus the same repair again, if it is still offered
@@ -510,9 +510,9 @@ class FormCard(Card):
     def _show_parts(self, form: Form, before: Form | None) -> None:
         """Show the parts of a form; ``before`` is the previous form of the same element, None for another element."""
         lines = form.questions.lines
-        at = next((at for at, line in enumerate(lines) if line.path == form.path), 0)
-        self.above.show_lines(lines[:at], form.questions.languages if lines else ())
-        self.below.show_lines(lines[at + 1 :])
+        index = next((index for index, line in enumerate(lines) if line.path == form.path), 0)
+        self.above.show_lines(lines[:index], form.questions.languages if lines else ())
+        self.below.show_lines(lines[index + 1 :])
         self.panel.tinted = bool(lines)
         self.sections.setContentsMargins(*((10, 8, 4, 8) if lines else (0, 0, 0, 0)))
         keyboard = self.window().focusWidget()
@@ -701,13 +701,13 @@ class FormCard(Card):
         field.selectAll()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """In the list of texts to write, go to the next missing text at Enter."""
+        """At Enter in the list of texts to write, go to the next missing text."""
         if self.form is None or not self.form.lists_texts or event.key() not in {Qt.Key.Key_Return, Qt.Key.Key_Enter}:
             super().keyPressEvent(event)
             return
         fields = list(self._typed_fields())
-        at = next((at for at, field in enumerate(fields, start=1) if field.hasFocus()), 0)
-        to_write = (field for field in (*fields[at:], *fields[:at]) if self._is_to_write(field))
+        next_index = next((next_index for next_index, field in enumerate(fields, start=1) if field.hasFocus()), 0)
+        to_write = (field for field in (*fields[next_index:], *fields[:next_index]) if self._is_to_write(field))
         if (field := next(to_write, None)) is None:
             self.show_note("Every text is written in every language.")
         else:

@@ -32,9 +32,9 @@ class DesignList(Coloured, Choice):
         self.apply_theme(self.theme)
 
     def apply_theme(self, theme: Theme) -> None:
-        for at, kind in enumerate(self._kinds):
+        for index, kind in enumerate(self._kinds):
             if (design := default_designs().get(str(kind))) is not None:
-                self.setItemIcon(at, QIcon(_design_pixmap(design, theme)))
+                self.setItemIcon(index, QIcon(_design_pixmap(design, theme)))
 
 
 def _design_pixmap(design: Design, theme: Theme) -> QPixmap:

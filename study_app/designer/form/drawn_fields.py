@@ -383,13 +383,13 @@ class _StripView(Extra, Themed, QWidget):
         self.setAccessibleName("One trial")
         self.setAccessibleDescription(strip.sentence)
         while len(self.phases) < len(strip.phases):
-            made = _PhaseButton(self)
-            made.clicked.connect(lambda _checked=False, made=made: self._open_phase(made))
-            self.phases.append(made)
-        for at, button in enumerate(self.phases):
-            button.setVisible(at < len(strip.phases))
-            if at < len(strip.phases):
-                button.show_phase(strip.phases[at])
+            phase_button = _PhaseButton(self)
+            phase_button.clicked.connect(lambda _checked=False, button=phase_button: self._open_phase(button))
+            self.phases.append(phase_button)
+        for index, button in enumerate(self.phases):
+            button.setVisible(index < len(strip.phases))
+            if index < len(strip.phases):
+                button.show_phase(strip.phases[index])
         self._place_phases()
         self.update()
 

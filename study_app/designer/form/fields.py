@@ -439,18 +439,18 @@ class LineField(Field):
         self.line.typed.connect(self._submit_text)
         self.line.focused.connect(self.focused)
         if row.kind in {"number", "whole number"}:
-            self.line.stepped.connect(self._count)
+            self.line.stepped.connect(self._step_number)
         self.setFocusProxy(self.line)
         self.show_value()
 
-    def _count(self, by: int) -> None:
-        """Increment or decrement the last digit that is shown."""
+    def _step_number(self, steps: int) -> None:
+        """Increment the last digit that is shown by a number of steps."""
         shown = self.line.text().strip() or str(self.row.default or 0)
         number = number_of(shown)
         if number is None or self.line.isReadOnly():
             return
         digits = len(shown.replace(",", ".").partition(".")[2]) if isinstance(number, float) else 0
-        value = round(number + by * 10.0**-digits, digits)
+        value = round(number + steps * 10.0**-digits, digits)
         self.line.setText(f"{value:.{digits}f}")
         self._submit_text(self.line.text())
 
@@ -548,11 +548,11 @@ class ChoiceField(Field):
         if shown is not None and shown not in [value for value, _ in values]:
             values.append((shown, typed_value(shown)))
         values += [(label, label) for label, _ in row.additions]
-        if [text for _, text in values] != [self.list.itemText(at) for at in range(self.list.count())]:
+        if [text for _, text in values] != [self.list.itemText(index) for index in range(self.list.count())]:
             self.list.clear()
             self.list.addItems([text for _, text in values])
-            for at, choice in enumerate(row.choices):
-                self.list.setItemData(at, choice.sentence, Qt.ItemDataRole.ToolTipRole)
+            for index, choice in enumerate(row.choices):
+                self.list.setItemData(index, choice.sentence, Qt.ItemDataRole.ToolTipRole)
         self._values = [value for value, _ in values]
         if isinstance(self.list, DesignList):
             self.list.show_pictures(self._values)
@@ -586,12 +586,12 @@ class ChoiceField(Field):
         super().resizeEvent(event)
         self._choose_layout()
 
-    def _choose_at(self, at: int) -> None:
+    def _choose_at(self, index: int) -> None:
         """Choose the value of a list entry; the last entries add an element and refer to it."""
         additions = self.row.additions
-        addition_index = at - (len(self._values) - len(additions))
+        addition_index = index - (len(self._values) - len(additions))
         if addition_index < 0:
-            self._choose_value(self._values[at])
+            self._choose_value(self._values[index])
             return
         self.show_value()
         self.asked.emit(additions[addition_index][1])
@@ -666,7 +666,7 @@ def kept_value_sentence(value: Any) -> str:
 
 
 def typed_value(value: Any) -> str:
-    """Return a value as it is typed: numbers of a list are separated by spaces."""
+    """Return the text to type for a value; numbers of a list are separated by spaces."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, tuple | list):

@@ -171,7 +171,9 @@ def _requests_to_add(document: Mapping[str, Any], path: Path) -> Iterator[tuple[
     """Yield label and request of each way to add a questionnaire to the session."""
     if len(path) != 2 or path[0] != "questionnaires":
         return
-    steps = [((*place, at), str(step)) for place, listed in sequences_in(document) for at, step in enumerate(listed)]
+    steps = [
+        ((*place, index), str(step)) for place, listed in sequences_in(document) for index, step in enumerate(listed)
+    ]
     blocks = [step for step in steps if step[1] in names(document, "blocks")]
     main_blocks = [step for step in blocks if value_at(document, ("blocks", step[1], "phase")) in (None, "main")]
     taken = {place for place, step in steps if step == path[1]}
@@ -366,13 +368,13 @@ def _label_to_add(document: Mapping[str, Any], row: Row, name: str) -> str:
 def _entries(study: Study, row: Row) -> Iterator[Entry]:
     if row.path == STUDY_LANGUAGES:
         counts, copied = texts_by_language(study), copied_texts(study)
-        for at, code in enumerate(row.value if isinstance(row.value, tuple) else ()):
+        for index, code in enumerate(row.value if isinstance(row.value, tuple) else ()):
             (present, required), untranslated = counts.get(str(code), (0, 0)), copied.get(str(code), 0)
             note = f"{present - untranslated} of {required} texts" + (
                 f", {untranslated} to translate" if untranslated else ""
             )
             target: Path = STUDY_LANGUAGES if present - untranslated < required else ()
-            yield Entry((*row.path, at), language_name(str(code)), note, required - present, target)
+            yield Entry((*row.path, index), language_name(str(code)), note, required - present, target)
     if row.kind in {"list", "tables", "references"} and isinstance(row.value, tuple | Mapping):
         keys = row.value if isinstance(row.value, Mapping) else range(len(row.value))
         for key in keys:

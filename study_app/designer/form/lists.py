@@ -220,11 +220,11 @@ class EntryList(Field):
     def take_keyboard(self) -> None:
         (self if self.chosen < 0 else self.list).setFocus(Qt.FocusReason.OtherFocusReason)
 
-    def entry_path(self, at: int) -> tuple[str | int, ...]:
-        return self.row.entries[at].path if self.row.entries else (*self.row.path, at)
+    def entry_path(self, index: int) -> tuple[str | int, ...]:
+        return self.row.entries[index].path if self.row.entries else (*self.row.path, index)
 
-    def open_entry(self, at: int) -> None:
-        if 0 <= at < len(self.row.entries) and (target := self.row.entries[at].target):
+    def open_entry(self, index: int) -> None:
+        if 0 <= index < len(self.row.entries) and (target := self.row.entries[index].target):
             self.asked.emit(Do("select", (target,)))
 
     def _open_current(self) -> None:
@@ -236,15 +236,15 @@ class EntryList(Field):
         self.asked.emit(request)
         self._selected_after_step = None
 
-    def move_entry(self, at: int, to: int) -> None:
+    def move_entry(self, index: int, to: int) -> None:
         """Request to move an entry before the one at ``to``."""
-        after = to - (at < to)
-        if at >= 0 and 0 <= to <= len(self.rows) and after != at:
-            self._request_step(MoveTo(self.entry_path(at), to, stays=True), after)
+        after = to - (index < to)
+        if index >= 0 and 0 <= to <= len(self.rows) and after != index:
+            self._request_step(MoveTo(self.entry_path(index), to, stays=True), after)
 
-    def remove_entry(self, at: int) -> None:
-        if at >= 0:
-            self._request_step(RemoveKey(self.entry_path(at)), min(at, len(self.rows) - 2))
+    def remove_entry(self, index: int) -> None:
+        if index >= 0:
+            self._request_step(RemoveKey(self.entry_path(index)), min(index, len(self.rows) - 2))
 
     def _duplicate(self) -> None:
         if self.chosen >= 0 and self.row.kind != "references":  # a list must not contain a name twice
@@ -271,9 +271,9 @@ class _AdditionList(KeysOpenList):
         self.setCurrentIndex(-1)
         self.setEnabled(bool(self.count()))
 
-    def _choose_at(self, at: int) -> None:
+    def _choose_at(self, index: int) -> None:
         self.setCurrentIndex(-1)
-        self.chosen.emit(self.itemData(at))
+        self.chosen.emit(self.itemData(index))
 
 
 class EntriesField(EntryList):
@@ -300,30 +300,30 @@ class EntriesField(EntryList):
 
     def fill_rows(self) -> None:
         label, count = self.row.label, len(self.row.entries)
-        for at, entry in enumerate(self.row.entries):
+        for index, entry in enumerate(self.row.entries):
             title = cut_text(entry.title, "label", "bad" if entry.faults else "text")
             entry_row = self.add_row(
-                f"{label}, {entry.title}, {at + 1} of {count}", (title, 1), faulty=bool(entry.faults)
+                f"{label}, {entry.title}, {index + 1} of {count}", (title, 1), faulty=bool(entry.faults)
             )
-            self.add_note(entry_row, at)
+            self.add_note(entry_row, index)
             if self.ordered:
                 for offset, icon, direction in ((-1, "arrow_up", "up"), (1, "arrow_down", "down")):
-                    move = partial(self.move_entry, at, at - 1 if offset < 0 else at + 2)
+                    move = partial(self.move_entry, index, index - 1 if offset < 0 else index + 2)
                     entry_row.add_button(icon, f"Move {entry.title} {direction}", move, direction).setEnabled(
-                        0 <= at + offset < count
+                        0 <= index + offset < count
                     )
             action = "open entry" if self.ordered else ""
             open_button = entry_row.add_button(
-                "arrow_right", f"Open {entry.title}", partial(self.open_entry, at), action
+                "arrow_right", f"Open {entry.title}", partial(self.open_entry, index), action
             )
             open_button.setEnabled(bool(entry.target))
             if self.ordered:
                 entry_row.add_button(
-                    "cross", f"Remove {entry.title} from {label}", partial(self.remove_entry, at), "delete"
+                    "cross", f"Remove {entry.title} from {label}", partial(self.remove_entry, index), "delete"
                 )
 
-    def add_note(self, entry_row: EntryRow, at: int) -> None:
-        entry = self.row.entries[at]
+    def add_note(self, entry_row: EntryRow, index: int) -> None:
+        entry = self.row.entries[index]
         if entry.note and entry.note.replace("_", " ") != entry.title.lower():
             note = cut_text(entry.note, "small", "text2", right=True)
             entry_row.line.addWidget(note)
@@ -338,23 +338,25 @@ class _ConditionsField(EntriesField):
         super().__init__(row)
         self.list.keys[keys_of("open liquid")[0]] = lambda: self._open_liquid(self.list.currentRow())
 
-    def _open_liquid(self, at: int) -> None:
-        if 0 <= at < len(self.row.facts) and (liquid := self.row.facts[at].liquid):
+    def _open_liquid(self, index: int) -> None:
+        if 0 <= index < len(self.row.facts) and (liquid := self.row.facts[index].liquid):
             self.asked.emit(Do("select", (liquid,)))
 
     def entries_state(self) -> object:
         return self.row.entries, self.row.facts
 
-    def add_note(self, entry_row: EntryRow, at: int) -> None:
-        line = self.row.facts[at]
+    def add_note(self, entry_row: EntryRow, index: int) -> None:
+        line = self.row.facts[index]
         note, force = Elided("small", "text2"), figures(f"{line.force}, clipped" if line.clipped else line.force)
         note.show_text(line.note)
         force.setMinimumWidth(52)
         for part in (note, force):
             part.setAlignment(RIGHT)
             entry_row.line.addWidget(part)
-        name = f"Open the liquid used in {self.row.entries[at].title}"
-        entry_row.add_button("drop", name, partial(self._open_liquid, at), "open liquid").setEnabled(bool(line.liquid))
+        name = f"Open the liquid used in {self.row.entries[index].title}"
+        entry_row.add_button("drop", name, partial(self._open_liquid, index), "open liquid").setEnabled(
+            bool(line.liquid)
+        )
 
 
 class LinesField(EntryList):
@@ -374,12 +376,14 @@ class LinesField(EntryList):
     def fill_rows(self) -> None:
         self.lines, row = [], self.row
         count = len(row.value or ())
-        for at in range(count):
-            line = TypedLine(f"{row.label} {at + 1}")
-            line.typed.connect(partial(self._submit_line, at))
+        for index in range(count):
+            line = TypedLine(f"{row.label} {index + 1}")
+            line.typed.connect(partial(self._submit_line, index))
             line.focused.connect(self.focused)
-            entry_row = self.add_row(f"{row.label} {at + 1} of {count}", (line, 1))
-            entry_row.add_button("cross", f"Remove {line.accessibleName()}", partial(self.remove_entry, at), "delete")
+            entry_row = self.add_row(f"{row.label} {index + 1} of {count}", (line, 1))
+            entry_row.add_button(
+                "cross", f"Remove {line.accessibleName()}", partial(self.remove_entry, index), "delete"
+            )
             self.lines.append(line)
         self.setFocusProxy(self.lines[0] if self.lines else self.add)
 
@@ -392,16 +396,16 @@ class LinesField(EntryList):
     def _value_of(self, text: str) -> Any:
         return text if self.row.kind == "texts" else [number for _, number in typed_numbers(text)]
 
-    def _submit_line(self, at: int, text: str) -> None:
+    def _submit_line(self, index: int, text: str) -> None:
         self.refusal, value = "", None
         try:
             value = self._value_of(text)
         except ValueError as unclear:
-            self.refusal = f"{unclear}. {kept_value_sentence(self.row.value[at])}"
-        self.lines[at].show_refused(bool(self.refusal))
+            self.refusal = f"{unclear}. {kept_value_sentence(self.row.value[index])}"
+        self.lines[index].show_refused(bool(self.refusal))
         self.focused.emit()
         if not self.refusal:
-            self.asked.emit(SetValue((*self.row.path, at), value, typing=True))
+            self.asked.emit(SetValue((*self.row.path, index), value, typing=True))
 
 
 class LanguageListField(EntryList):
@@ -421,18 +425,18 @@ class LanguageListField(EntryList):
         row, self.copies = self.row, {}
         codes = [str(code) for code in row.value] if isinstance(row.value, tuple) else []
         first = row.entries[0].title if row.entries else ""
-        for at, (code, entry) in enumerate(zip(codes, row.entries, strict=True)):
+        for index, (code, entry) in enumerate(zip(codes, row.entries, strict=True)):
             title = label(entry.title, "label", "bad" if entry.faults else "text")
             note = cut_text(entry.note, right=True)
             note.setMinimumWidth(note.fontMetrics().horizontalAdvance(entry.note.partition(",")[0]) + 2)
-            description = f"{entry.title}, {entry.note}, {at + 1} of {len(codes)}"
+            description = f"{entry.title}, {entry.note}, {index + 1} of {len(codes)}"
             entry_row = self.add_row(description, title, note, faulty=bool(entry.faults))
             if entry.target:
                 write_button = small_button("", "Write …", height=32)
                 write_button.setAccessibleName(f"Write the texts that are missing in {entry.title}")
-                write_button.clicked.connect(partial(self.open_entry, at))
+                write_button.clicked.connect(partial(self.open_entry, index))
                 entry_row.line.addWidget(write_button)
-            if entry.faults and at:
+            if entry.faults and index:
                 copy_button = self.copies[code] = add_button(
                     f"Copy the {first} text wherever {entry.title} is missing", f"Copy {first}"
                 )

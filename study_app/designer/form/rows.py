@@ -42,10 +42,10 @@ def question_lines(study: Study, path: Path) -> QuestionLines:
     codes = languages_of(study.document)
     value = value_at(study.document, path)
     items = value if isinstance(value, tuple) else ()
-    numbers = {str(item.get("id")): at for at, item in enumerate(items, start=1) if isinstance(item, Mapping)}
+    numbers = {str(item.get("id")): index for index, item in enumerate(items, start=1) if isinstance(item, Mapping)}
     lines = tuple(
-        _question_line(study, (*path, at), item, codes, numbers)
-        for at, item in enumerate(items)
+        _question_line(study, (*path, index), item, codes, numbers)
+        for index, item in enumerate(items)
         if isinstance(item, Mapping)
     )
     return QuestionLines(tuple(language_name(code) for code in codes), lines)
@@ -123,9 +123,9 @@ class FormRow(Row):
     @property
     def is_removable(self) -> bool:
         path = self.path
-        given = self.value is not None and isinstance(path[-1], str)
-        section = len(path) == 1 or path == STUDY_LANGUAGES
-        return given and not (self.required or self.keys or section)
+        is_stated = self.value is not None and isinstance(path[-1], str)
+        is_section = len(path) == 1 or path == STUDY_LANGUAGES
+        return is_stated and not (self.required or self.keys or is_section)
 
     @property
     def permitted(self) -> str:

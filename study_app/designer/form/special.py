@@ -107,7 +107,9 @@ def _scale_points(study: Study, row: Row) -> _ScalePoints:
     codes = list(dict.fromkeys([*languages_of(study.document), *labels]))
     columns = [labels[code] if isinstance(labels.get(code), tuple) else () for code in codes]
     count = max(map(len, columns), default=0)
-    points = tuple(tuple(str(column[at]) if at < len(column) else "" for column in columns) for at in range(count))
+    points = tuple(
+        tuple(str(column[index]) if index < len(column) else "" for column in columns) for index in range(count)
+    )
     return _ScalePoints(tuple((code, language_name(code)) for code in codes), points)
 
 
@@ -131,8 +133,8 @@ class _QuestionRow(Themed, QWidget):
         number.setFixedWidth(NUMBER_PX)
         across = hbox(number, Icon(line.icon, "text2", ICON_PX), spacing=8, margins=(0, 3, 0, 3), parent=self)
         self.write: ActionButton | None = None
-        for at, text in enumerate(line.texts):
-            across.addWidget(self._text_part(text, line.note if at == 0 else ""), 1)
+        for index, text in enumerate(line.texts):
+            across.addWidget(self._text_part(text, line.note if index == 0 else ""), 1)
         self.open = IconButton("chevron", f"Open question {line.number}, {title}", size=OPEN_PX, role="plain")
         self.open.clicked.connect(self.opened)
         across.addWidget(self.open)
@@ -269,20 +271,20 @@ class _PointsField(Field):
         for column, (_code, language) in enumerate(languages, start=1):
             grid_layout.addWidget(label(language, "small", "text2"), 0, column)
         self.lines: list[list[TypedLine]] = []
-        for at in range(last + 1):
-            position_text = f"{at + 1}  {({0: 'lowest', last: 'highest'}).get(at, '')}".strip()
-            grid_layout.addWidget(figures(position_text, "label", "text2"), at + 1, 0)
-            self.lines.append([TypedLine(f"Point {at + 1}, {language}") for _code, language in languages])
+        for index in range(last + 1):
+            position_text = f"{index + 1}  {({0: 'lowest', last: 'highest'}).get(index, '')}".strip()
+            grid_layout.addWidget(figures(position_text, "label", "text2"), index + 1, 0)
+            self.lines.append([TypedLine(f"Point {index + 1}, {language}") for _code, language in languages])
             for column, (line, (code, language)) in enumerate(zip(self.lines[-1], languages, strict=True)):
                 line.setProperty(LANGUAGE, code)
                 line.setPlaceholderText(f"Missing in {language}")
                 if is_right_to_left(code):
                     line.setLayoutDirection(Qt.LayoutDirection.RightToLeft)
-                line.typed.connect(partial(self.submit_text, at, column))
+                line.typed.connect(partial(self.submit_text, index, column))
                 line.focused.connect(self.focused)
-                grid_layout.addWidget(line, at + 1, column + 1)
-            remove = remove_button(f"Remove Point {at + 1}", partial(self.remove, at))
-            grid_layout.addWidget(remove, at + 1, len(languages) + 1)
+                grid_layout.addWidget(line, index + 1, column + 1)
+            remove = remove_button(f"Remove Point {index + 1}", partial(self.remove, index))
+            grid_layout.addWidget(remove, index + 1, len(languages) + 1)
         add_layout(self.box, grid_layout)
         self.add = add_button(f"Add to {row.label}", "Point")
         self.add.clicked.connect(self.add_entry)
@@ -303,11 +305,11 @@ class _PointsField(Field):
     def _text_count(self, code: str) -> int:
         return len((self.row.value or {}).get(code, ()))
 
-    def submit_text(self, at: int, column: int, text: str) -> None:
+    def submit_text(self, index: int, column: int, text: str) -> None:
         code = self.row.facts.languages[column][0]
         path, count = (*self.row.path, code), self._text_count(code)
-        labels = [*((self.row.value or {}).get(code, ())), *[""] * (at - count), text]
-        request = SetValue((*path, at), text, typing=True) if at < count else SetValue(path, labels, typing=True)
+        labels = [*((self.row.value or {}).get(code, ())), *[""] * (index - count), text]
+        request = SetValue((*path, index), text, typing=True) if index < count else SetValue(path, labels, typing=True)
         self.asked.emit(request)
 
     def add_entry(self) -> None:
@@ -315,15 +317,17 @@ class _PointsField(Field):
         requests = (AddEntry((*path, code), label) for code, _ in self.row.facts.languages if self._text_count(code))
         self.asked.emit(Several("Add point", tuple(requests)))
 
-    def remove(self, at: int) -> None:
+    def remove(self, index: int) -> None:
         path = self.row.path
-        requests = (RemoveKey((*path, code, at)) for code, _ in self.row.facts.languages if at < self._text_count(code))
-        self.asked.emit(Several(f"Remove point {at + 1}", tuple(requests)))
+        requests = (
+            RemoveKey((*path, code, index)) for code, _ in self.row.facts.languages if index < self._text_count(code)
+        )
+        self.asked.emit(Several(f"Remove point {index + 1}", tuple(requests)))
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        at = next((at for at, lines in enumerate(self.lines) if any(line.hasFocus() for line in lines)), None)
-        if at is not None and removes_key(event):
-            self.remove(at)
+        index = next((index for index, lines in enumerate(self.lines) if any(line.hasFocus() for line in lines)), None)
+        if index is not None and removes_key(event):
+            self.remove(index)
         else:
             super().keyPressEvent(event)
 
@@ -422,7 +426,7 @@ _ONE_RESULT: Final = (
 class Compared:
     """A block, or a condition or group in a block, with its measures, each as ID and label.
 
-    A group with a ``pair`` of blocks or conditions, as the key ``pair_of`` says, is one side of an interaction.
+    A group with a ``pair`` of blocks or conditions (``pair_of`` is the key) is one side of an interaction.
     """
 
     key: str  # the key that lists it in a hypothesis: "blocks", "conditions" or "groups"
@@ -533,10 +537,10 @@ def _form_measures(study: Study) -> dict[str, tuple[tuple[str, str], ...]]:
     return measures_by_block
 
 
-def _interaction_sides(every: Sequence[Compared]) -> Iterator[Compared]:
+def _interaction_sides(compared: Sequence[Compared]) -> Iterator[Compared]:
     """Yield an item for each group and each pair of blocks or conditions whose difference can be compared."""
-    groups = {item.name: item.label.partition(" in ")[0] for item in every if item.key == "groups"}
-    for first, second in combinations([item for item in every if item.key != "groups"], 2):
+    groups = {item.name: item.label.partition(" in ")[0] for item in compared if item.key == "groups"}
+    for first, second in combinations([item for item in compared if item.key != "groups"], 2):
         if groups and first.comparable_with((second,)):
             difference = f"{first.label} − {second.label}"
             for group, title in groups.items():
@@ -586,7 +590,7 @@ class Hypothesis(QWidget):
         entries_ = (value.get(key) for key in ("blocks", key, "conditions"))
         blocks, named, conditions = (tuple(map(str, entry)) if isinstance(entry, tuple) else () for entry in entries_)
         pairs = {"conditions": conditions, "blocks": blocks if len(blocks) > 1 else ()} if key == "groups" else {}
-        pair = next(((of, names) for of, names in pairs.items() if names), ("", ()))
+        pair = next(((pair_key, names) for pair_key, names in pairs.items() if names), ("", ()))
         places = [(key, name if key == "blocks" else next(iter(blocks), ""), name, *pair) for name in named]
         items = [next((item for item in known if item.place == place), None) for place in places]
         first, second = (*items, None, None)[:2]
@@ -610,10 +614,10 @@ class Hypothesis(QWidget):
     @staticmethod
     def _fill_choice(box: Choice, values: tuple[tuple[Any, str], ...], chosen: Any) -> None:
         labels = [word for _, word in values]
-        if labels != [box.itemText(at) for at in range(box.count())]:
+        if labels != [box.itemText(index) for index in range(box.count())]:
             box.clear()
             box.addItems(labels)
-        box.setCurrentIndex(next((at for at, (value, _) in enumerate(values) if value == chosen), -1))
+        box.setCurrentIndex(next((index for index, (value, _) in enumerate(values) if value == chosen), -1))
 
     def _submit_choice(self) -> None:
         """Emit the chosen hypothesis; choices that do not fit the first item are replaced."""
@@ -625,9 +629,9 @@ class Hypothesis(QWidget):
                 table | _relation_keys(relation, self._kept_bound(relation, str(self.value.get("measure"))))
             )
             return
-        first, others, at = self.known[self.first.currentIndex()], self.others, self.second.currentIndex()
+        first, others, index = self.known[self.first.currentIndex()], self.others, self.second.currentIndex()
         fitting = first.comparable_with(self.known)
-        second = others[at] if 0 <= at < len(others) and others[at] in fitting else fitting[0]
+        second = others[index] if 0 <= index < len(others) and others[index] in fitting else fitting[0]
         chosen, shared = self.measures[max(0, self.measure.currentIndex())], first.shared_measures(second)
         measure = (chosen if chosen in shared else shared[0])[0]
         self.changed.emit(
@@ -695,11 +699,11 @@ class _HypothesesField(Field):
     def __init__(self, row: FormRow) -> None:
         super().__init__(row)
         self.box.setDirection(QBoxLayout.Direction.TopToBottom)
-        self.lines = [Hypothesis(f"Hypothesis {at + 1}") for at in range(_hypothesis_count(row))]
-        for at, line in enumerate(self.lines):
-            line.changed.connect(lambda value, at=at: self._change_hypothesis(at, value))
+        self.lines = [Hypothesis(f"Hypothesis {index + 1}") for index in range(_hypothesis_count(row))]
+        for index, line in enumerate(self.lines):
+            line.changed.connect(lambda value, index=index: self._change_hypothesis(index, value))
             line.refused.connect(self._refuse)
-            line.removed.connect(partial(self._remove_hypothesis, at))
+            line.removed.connect(partial(self._remove_hypothesis, index))
             self.box.addWidget(line)
         self.add, self.why = add_button("Add a hypothesis", "Hypothesis"), label("", "small", "text2", wraps=True)
         self.add.clicked.connect(self._add_hypothesis)
@@ -736,12 +740,12 @@ class _HypothesesField(Field):
             self.refusal = reason
             self.focused.emit()
 
-    def _remove_hypothesis(self, at: int) -> None:
+    def _remove_hypothesis(self, index: int) -> None:
         path = self.row.path
-        self.asked.emit(RemoveKey(path if len(self.lines) == 1 else (*path, at)))
+        self.asked.emit(RemoveKey(path if len(self.lines) == 1 else (*path, index)))
 
-    def _change_hypothesis(self, at: int, value: Mapping[str, Any]) -> None:
-        path, before = (*self.row.path, at), self.row.value[at]
+    def _change_hypothesis(self, index: int, value: Mapping[str, Any]) -> None:
+        path, before = (*self.row.path, index), self.row.value[index]
         if not isinstance(before, Mapping):
             self.asked.emit(SetValue(path, value))
             return

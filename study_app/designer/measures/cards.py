@@ -184,9 +184,9 @@ class _CardWidget(Card):
             row.addStretch()
         elif isinstance(part, Segments):
             notes = hbox(margins=0)
-            for at, text in enumerate(part.notes):
+            for index, text in enumerate(part.notes):
                 note = cut_text(text, "small", "text2")
-                if at:
+                if index:
                     note.setAlignment(Qt.AlignmentFlag.AlignRight)
                 notes.addWidget(note)
             vbox(_Strip(part.segments, self.opens), notes, spacing=8, margins=0, parent=widget)
@@ -247,7 +247,7 @@ def _lines_widget(lines_part: Lines) -> QWidget:
     grid.setContentsMargins(0, 0, 0, 0)
     grid.setVerticalSpacing(4)
     grid.setColumnStretch(1, 1)
-    for at, line in enumerate(lines_part.lines[:_MAX_LINES]):
+    for index, line in enumerate(lines_part.lines[:_MAX_LINES]):
         name, bar = Elided("label"), Bar(6)
         name.setFixedWidth(_NAME_PX)
         name.show_text(line.title)
@@ -255,14 +255,14 @@ def _lines_widget(lines_part: Lines) -> QWidget:
         number = figures(line.number)
         tone, icon, text = line.verdict
         number.setAccessibleName(f"{line.title}: {line.number}{f', {text}' if text else ''}")
-        grid.addWidget(name, at, 0)
-        grid.addWidget(bar, at, 1)
-        grid.addWidget(number, at, 2, Qt.AlignmentFlag.AlignRight)
+        grid.addWidget(name, index, 0)
+        grid.addWidget(bar, index, 1)
+        grid.addWidget(number, index, 2, Qt.AlignmentFlag.AlignRight)
         if icon:
             verdict_icon = Icon(icon, INKS[tone], 16)
             verdict_icon.setToolTip(plain_tip(text))
             verdict_icon.setAccessibleName(f"{line.title}: {text}")
-            grid.addWidget(verdict_icon, at, 3)
+            grid.addWidget(verdict_icon, index, 3)
     if len(lines_part.lines) > _MAX_LINES:
         grid.addWidget(label(f"and {len(lines_part.lines) - _MAX_LINES} more", "small", "text2"), _MAX_LINES, 0, 1, 2)
     return widget
@@ -289,9 +289,9 @@ class CardGrid(Themed, QWidget):
         is_hovered = self.isVisible() and self.underMouse()
         heights = [(part.height(), part.accessibleName()) for part in self.parts] if is_hovered else []
         before, self.parts, self.cards = self.parts, [], cards
-        for at, card in enumerate(cards):
-            is_unchanged = at < len(before) and before[at].shown == card
-            self.parts.append(before[at] if is_unchanged else _CardWidget(card, self.opens))
+        for index, card in enumerate(cards):
+            is_unchanged = index < len(before) and before[index].shown == card
+            self.parts.append(before[index] if is_unchanged else _CardWidget(card, self.opens))
         for part in before:
             self.grid.removeWidget(part)
             if part not in self.parts:
@@ -303,10 +303,10 @@ class CardGrid(Themed, QWidget):
             if part.shown.wide or len(pair) == 2:
                 rows.append([part] if part.shown.wide else pair)
                 pair = pair if part.shown.wide else []
-        for at, row in enumerate([*rows, pair]):
-            self.grid.setRowStretch(at, 0)
+        for index, row in enumerate([*rows, pair]):
+            self.grid.setRowStretch(index, 0)
             for column, part in enumerate(row):
-                self.grid.addWidget(part, at, column, 1, 2 if part.shown.wide else 3 - len(row))
+                self.grid.addWidget(part, index, column, 1, 2 if part.shown.wide else 3 - len(row))
         self.grid.setRowStretch(len(rows) + 1, 1)
         for part, (height, title) in zip(self.parts, heights, strict=False):
             part.setMinimumHeight(height if title == part.accessibleName() else 0)

@@ -55,12 +55,14 @@ def texts_by_language(study: Study) -> dict[str, tuple[int, int]]:
             text = value.get(code) if isinstance(value, Mapping) else value if position == 0 else ""
             is_in_program = is_instrument and (path, code) not in missing
             counts[code][0] += is_in_program or bool(text.strip() if isinstance(text, str) else text)
-    return {code: (present, wanted) for code, (present, wanted) in counts.items()}
+    return {code: (present, required) for code, (present, required) in counts.items()}
 
 
 def missing_texts(study: Study) -> dict[str, int]:
     """Return the number of missing texts of each language that has some."""
-    return {code: wanted - present for code, (present, wanted) in texts_by_language(study).items() if present < wanted}
+    return {
+        code: required - present for code, (present, required) in texts_by_language(study).items() if present < required
+    }
 
 
 def copied_texts(study: Study) -> dict[str, int]:
@@ -133,12 +135,12 @@ _MARK: Final = "\u034f"
 class ValidPart:
     """The protocol of a study without its faulty elements; None if a fault affects everything.
 
-    ``whole`` says that no element was omitted, so that sums over the session are valid; ``forces`` that no value of
-    device and scene was omitted, so that forces are valid.
+    ``is_complete`` means that no element was omitted, so that sums over the session are valid; ``forces`` means that no
+    value of device and scene was omitted, so that forces are valid.
     """
 
     protocol: Protocol | None
-    whole: bool
+    is_complete: bool
     forces: bool = True
 
 
@@ -151,10 +153,10 @@ def valid_part(study: Study) -> ValidPart:
 def restored_part(study: Study, before: Mapping[str, Any]) -> ValidPart:
     """Return the valid part of a study; faulty values are replaced by those of the document ``before``, if any."""
     if study.formed is not None or not (study.is_toml or before):
-        return ValidPart(study.formed, whole=study.formed is not None)
+        return ValidPart(study.formed, is_complete=study.formed is not None)
     document: Any = study.document
     faults: list[Fault] = list(study.faults) if study.is_toml else validate_document(document)[1]
-    whole = forces = True
+    is_complete = forces = True
     for number in range(_MAX_ROUNDS):
         for fault in sorted(faults, key=_sort_key, reverse=True):
             changed_path, value = _restoring_change(document, fault, before) or _repairing_change(
@@ -164,18 +166,18 @@ def restored_part(study: Study, before: Mapping[str, Any]) -> ValidPart:
             if not changed_path:
                 changed_path, value = fault.path[:2], _initial_value(document, fault.path[:2])
                 if value is None:
-                    return ValidPart(None, whole=False)
+                    return ValidPart(None, is_complete=False)
             if value_at(document, changed_path) is None and value is None:
                 continue  # another fault of the same element already removed it
-            whole = whole and keeps_element
+            is_complete = is_complete and keeps_element
             forces = forces and (fault.kind == "unknown key" or fault.path[:1] not in _FORCE_TABLES)
             edit = Unset(changed_path) if value is None else Set(changed_path, value)
             with suppress(Refused):  # its table was removed
                 document = frozen(intended_document(document, edit))
         protocol, faults = validate_document(document)
         if protocol is not None:
-            return ValidPart(protocol, whole, forces)
-    return ValidPart(None, whole=False)
+            return ValidPart(protocol, is_complete, forces)
+    return ValidPart(None, is_complete=False)
 
 
 def _restoring_change(document: Any, fault: Fault, before: Mapping[str, Any]) -> tuple[Path, Any] | None:
@@ -205,7 +207,9 @@ def _path_before(document: Any, path: Path, before: Any) -> Path:
         if isinstance(step, int) and name is not None:
             entries_before = before if isinstance(before, list | tuple) else ()
             same = (
-                at for at, entry in enumerate(entries_before) if isinstance(entry, Mapping) and entry.get("id") == name
+                index
+                for index, entry in enumerate(entries_before)
+                if isinstance(entry, Mapping) and entry.get("id") == name
             )
             step = next(same, len(entries_before))  # noqa: PLW2901 - the step of the other document
         path_before.append(step)
@@ -301,7 +305,7 @@ def facts(study: Study) -> Facts:
     if valid.forces:
         forces_n = {name: steady_force(protocol.scene_of(name), HAND_MPS).force_n for name in protocol.liquids}
         study_facts = replace(study_facts, forces_n=forces_n)
-    if not valid.whole:
+    if not valid.is_complete:
         return study_facts
     session = max((variant.protocol for variant in variants(protocol)), key=expected_duration_s)  # as in `check`
     orders = orders_of(session)

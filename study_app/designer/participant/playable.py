@@ -108,7 +108,7 @@ def first_step(shown: Preview, path: Path) -> int | None:
     """Return the index of the first step that shows an element, or a part of it; None if none does."""
     graph = _graph_of(shown.protocol.model_dump())
     tables = (_tables_of_step(shown, step, graph) for step in shown.schedule.steps)
-    return next((at for at, tables_of_step in enumerate(tables) if path[:2] in tables_of_step), None)
+    return next((index for index, tables_of_step in enumerate(tables) if path[:2] in tables_of_step), None)
 
 
 def _graph_of(document: Mapping[str, object]) -> _Graph:
@@ -215,16 +215,16 @@ def find_first_step(study: Protocol, path: Path) -> SessionStep | None:
 def find_step(study: Protocol, name: str, trial: int, session: str) -> SessionStep | None:
     """Return the step with an ID in a session, as described in `_step_index`; None if there is none."""
     for session_name, shown in _previews(study):
-        if session_name == session and (at := _step_index(shown, name, trial)) is not None:
-            return SessionStep(shown, at, session)
+        if session_name == session and (index := _step_index(shown, name, trial)) is not None:
+            return SessionStep(shown, index, session)
     return None
 
 
 def _step_index(shown: Preview, name: str, trial: int) -> int | None:
     """Return the index of the step with an ID; of a block, the given trial or else its last one; None without one."""
-    candidates = [(at, step) for at, step in enumerate(shown.schedule.steps) if step_id(step) == name]
+    candidates = [(index, step) for index, step in enumerate(shown.schedule.steps) if step_id(step) == name]
     exact = (pair for pair in candidates if isinstance(pair[1], Trial) and pair[1].index == trial)
-    return next((at for at, _ in (*exact, *(candidates[::-1] if trial > 1 else candidates))), None)
+    return next((index for index, _ in (*exact, *(candidates[::-1] if trial > 1 else candidates))), None)
 
 
 def trial_page_of(path: Path) -> _TrialPage | None:

@@ -494,10 +494,10 @@ class ParticipantPreview(Card):
             self._language = language
             self._update_timer.start()
 
-    def go(self, by: int) -> None:
+    def go(self, offset: int) -> None:
         if (current := self._step) is None:
             return
-        index = current.index + by
+        index = current.index + offset
         if 0 <= index < len(current.shown.schedule.steps):
             self._step = SessionStep(current.shown, index, current.session)
             self._moment = None
@@ -525,9 +525,9 @@ class ParticipantPreview(Card):
         if (current := self._step) is None:
             return
         pages = pages_of_step(current.shown, current.index)
-        at = pages.index(self._moment) if self._moment in pages else 0
-        if at + 1 < len(pages):
-            self.show_moment(pages[at + 1])
+        index = pages.index(self._moment) if self._moment in pages else 0
+        if index + 1 < len(pages):
+            self.show_moment(pages[index + 1])
         elif current.index + 1 < len(current.shown.schedule.steps):
             self._trial_page = "tank"
             self.go(1)
@@ -546,9 +546,9 @@ class ParticipantPreview(Card):
         self._photodiode = settings.photodiode
         screen = choose_screens(screen_number(settings))[0]
         size = screen.size()
-        own = ScreenSize("own", f"This machine's, {size.width()} × {size.height()}", size.width(), size.height(),
+        own_size = ScreenSize("own", f"This machine's, {size.width()} × {size.height()}", size.width(), size.height(),
                          text_scale_on(settings, screen))  # fmt: skip
-        self.offer_screens((*SIZES, own))
+        self.offer_screens((*SIZES, own_size))
 
     def _show_if_visible(self) -> None:
         self._update_timer.stop()
@@ -747,8 +747,8 @@ class ParticipantPreview(Card):
         self.screens.setCurrentIndex(max(self.screens.findData(chosen), 0))
         self._choose_screen(self.screens.currentIndex())
 
-    def _choose_screen(self, at: int) -> None:
-        self.page.show_screen(self._screens_shown[at])
+    def _choose_screen(self, index: int) -> None:
+        self.page.show_screen(self._screens_shown[index])
         self._fit_page()
 
     def _show_fitted(self, fits: object) -> None:

@@ -50,7 +50,7 @@ _TABLES = ("liquids", "conditions", "tasks", "pages", "blocks")
 
 
 class Draft(BaseModel):
-    """The valid entries of a document; ``whole`` says that no block was omitted."""
+    """The valid entries of a document; ``is_complete`` means that no block was omitted."""
 
     model_config = ConfigDict(frozen=True, extra="ignore", defer_build=True)
 
@@ -62,7 +62,7 @@ class Draft(BaseModel):
     pages: dict[str, PageText] = {}
     blocks: Named[Block] = {}
     sequence: tuple[str, ...] = ()
-    whole: bool = True
+    is_complete: bool = True
     sessions_differ: bool = False
 
     def scene_of(self, condition: Condition) -> Scene | None:
@@ -92,7 +92,7 @@ def _make_draft(document: Mapping[str, Any], broken: Iterable[Path], valid: Prot
     valid_tables.setdefault("scene", None if "scene" in document else {})
     has_all_blocks = len(names(document, "blocks")) == len(names(valid_tables, "blocks"))
     return Draft.model_validate(
-        {**valid_tables, "whole": has_all_blocks, "sessions_differ": sessions_differ}, strict=True
+        {**valid_tables, "is_complete": has_all_blocks, "sessions_differ": sessions_differ}, strict=True
     )
 
 
@@ -212,7 +212,7 @@ def _check_liquids_differ(draft: Draft) -> Iterator[Fault]:
 
 
 def _check_conditions_differ(draft: Draft) -> Iterator[Fault]:
-    """Check that the conditions of a block differ, unless the block says that some are replicates."""
+    """Check that the conditions of a block differ, unless the block states that some are replicates."""
     for name, block in draft.blocks.items():
         presented = {
             condition_id: draft.conditions[condition_id]
@@ -280,7 +280,7 @@ def _check_parts(draft: Draft) -> Iterator[Fault]:
 
     If sessions differ, each one numbers its parts separately (`own_protocol`).
     """
-    if not (draft.whole and draft.blocks):
+    if not (draft.is_complete and draft.blocks):
         return
     if all(block.phase != "main" for block in draft.blocks.values()):
         yield Fault(("blocks",), "there is no main block", 'at least one block needs phase = "main"')

@@ -1,4 +1,4 @@
-"""A protocol as text: the output of ``liquid-study check``, which shows authors what they have specified."""
+"""A protocol as text: the output of ``liquid-study check``, for authors to verify their specification."""
 
 from __future__ import annotations
 

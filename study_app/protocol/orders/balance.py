@@ -35,8 +35,9 @@ _Table: TypeAlias = tuple[tuple[int, ...], ...]
 class Evenness:
     """Counts over the orders of one set of codes.
 
-    ``positions`` counts how often each code (column) has each position (row), ``follows`` how often it directly follows
-    each code (row), regardless of breaks and repetitions. ``shortest_distance`` is None if each code occurs only once.
+    ``positions`` has the number of times that each code (column) is at each position (row), ``follows`` the number of
+    times that it directly follows each code (row), regardless of breaks and repetitions. ``shortest_distance`` is None
+    if each code occurs only once.
     """
 
     codes: tuple[str, ...]
@@ -53,7 +54,7 @@ class Evenness:
 
     @property
     def after_another(self) -> tuple[int, ...]:
-        """The counts of how often each code follows every other code."""
+        """The number of times that each code follows every other code."""
         return tuple(
             count for row, counts in enumerate(self.follows) for column, count in enumerate(counts) if row != column
         )

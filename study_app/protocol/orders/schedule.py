@@ -240,7 +240,7 @@ _COMPARED_FIELDS = ("block", "phase", "part", "index", "of", "code")
 class RecordedTrial:
     """One recorded attempt at a trial; ``items`` are in the order shown, None if nothing was answered.
 
-    ``may_hide`` says that answers may have hidden some of the items, which are then not recorded.
+    ``may_hide`` means that some items may have been hidden because of other answers, and are then not recorded.
     """
 
     number: int

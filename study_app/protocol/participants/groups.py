@@ -96,8 +96,8 @@ class Sessions:
         """Return the steps of a participant's session (from 1) in a group; raise StudyError if there are fewer."""
         sequences = self._sequences_of(group)
         if not sequences:
-            own = () if group is None else self.groups[group].sequence
-            return own or self.sequence
+            group_sequence = () if group is None else self.groups[group].sequence
+            return group_sequence or self.sequence
         if session > len(sequences):
             raise _session_number_error(session, len(sequences))
         return sequences[session - 1]

@@ -1,4 +1,4 @@
-"""What the trials of a study present: their tracks, levels, and intervals."""
+"""The content of a study's trials: tracks, levels, and intervals."""
 
 from study_app.protocol.presented.presentation import (
     Presentation,

@@ -171,11 +171,11 @@ def draw_order(codes: Sequence[_T], repetitions: int, constraint: Constraint, dr
 def propose_order(codes: int, repetitions: int, constraint: Constraint, draw: Draw) -> _Proposal | None:
     """Draw an order from left to right; return it with its inverse probability, or None in a dead end."""
     apart = max(constraint.min_distance or 1, 2 if constraint.max_repeats == 1 else 1)
-    left = _Remaining(codes, repetitions, apart, constraint.max_repeats or codes * repetitions)
+    remaining = _Remaining(codes, repetitions, apart, constraint.max_repeats or codes * repetitions)
     steepness = _steepness(codes, repetitions, apart)
     masses = chosen_weights = 1
     for _ in range(codes * repetitions):
-        weights = [(code, left.count[code] ** steepness) for code in left.possible_codes()]
+        weights = [(code, remaining.count[code] ** steepness) for code in remaining.possible_codes()]
         mass = sum(weight for _, weight in weights)
         if not mass:
             return None
@@ -183,11 +183,11 @@ def propose_order(codes: int, repetitions: int, constraint: Constraint, draw: Dr
         for code, weight in weights:
             place -= weight
             if place < 0:
-                left.use_code(code)
+                remaining.use_code(code)
                 chosen_weights *= weight
                 break
         masses *= mass
-    return tuple(left.taken), Fraction(masses, chosen_weights)
+    return tuple(remaining.taken), Fraction(masses, chosen_weights)
 
 
 def _steepness(codes: int, repetitions: int, apart: int) -> int:

@@ -1,4 +1,4 @@
-"""The protocol file: where it is, its lines and its problems."""
+"""Reading protocol files: locations, positions in the text, and problems."""
 
 from study_app.protocol.source.document import Node, Path, Places, entries, frozen, has, names, scan_nodes, value_at
 from study_app.protocol.source.files import (

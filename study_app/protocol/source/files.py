@@ -55,8 +55,8 @@ class StudySource(NamedTuple):
     @classmethod
     def split(cls, source: bytes) -> StudySource:
         """Return the parts of a source."""
-        rest, liquids = _split(source, _HEADER)
-        file, footage = _split(rest, _FOOTAGE_HEADER)
+        without_liquids, liquids = _split(source, _HEADER)
+        file, footage = _split(without_liquids, _FOOTAGE_HEADER)
         return cls(file, liquids, footage)
 
     def with_liquids(self, text_of: Callable[[str], str | None]) -> StudySource:

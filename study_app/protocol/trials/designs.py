@@ -208,7 +208,7 @@ def _answer_counts(answers: _AnswerCounts, arrangements: Collection[int], answer
 
 def _odd_one_arrangements(count: int, *, odd_value: bool) -> tuple[_Arrangement, ...]:
     """Return the arrangements of ``count`` intervals of which exactly one has the value ``odd_value``."""
-    return tuple(tuple((at == odd) is odd_value for at in range(count)) for odd in range(count))
+    return tuple(tuple((index == odd) is odd_value for index in range(count)) for odd in range(count))
 
 
 class ForcedChoice(Design):

@@ -60,9 +60,9 @@ class TrackSetting:
 
 @dataclass(frozen=True, slots=True, repr=False, kw_only=True)
 class TrialResult:
-    """One answered trial: its last attempt, confirmed; never printed, since it reveals a level.
+    """The last attempt at a trial, with a confirmed answer; not printable, because it reveals a level.
 
-    ``success`` tells whether the answer was correct, for yes–no whether it was yes, "comparison chosen" if no answer is
+    ``success`` is whether the answer was correct, for yes–no whether it was yes, "comparison chosen" if no answer is
     correct, and None if the answer enters no psychometric function; ``correct`` is None if no answer is. The answer to
     a ``catch`` trial does not affect the levels; a ``noise`` trial presented only the standard.
     """

@@ -104,7 +104,7 @@ class Task(Table):
         return Stroke(_SHAKE_HZ, min(_SHAKE_M, workspace_m[0] / 2))
 
     def lasting(self, most_s: float) -> Self:
-        """Return the task ended only by time: after ``most_s``, or after the first whole target period from then [s]."""
+        """Return the task ended only by time: after ``most_s`` or the first whole target period from then [s]."""
         return self
 
 

@@ -43,7 +43,7 @@ STEPS = 16
 )  # fmt: skip
 def test_a_typed_text_replaces_only_what_differs(old: str, new: str, at: int, before: str, after: str) -> None:
     study, (((splice,)),) = Study(old).with_text(new)
-    assert (study.text, splice.at, splice.before, splice.after) == (new, at, before, after)
+    assert (study.text, splice.start, splice.before, splice.after) == (new, at, before, after)
 
 
 class Edited(RuleBasedStateMachine):
