@@ -113,7 +113,7 @@ class KnownRuns(QObject):
 
 def _read_runs(results: Path, study: str, file: Path) -> tuple[str, tuple[Run, ...], Mapping[tuple[str, str], int]]:
     known = runs_of_study(results, study)
-    with contextlib.suppress(StoreError):  # a draft that cannot be written reports itself
+    with contextlib.suppress(StoreError):  # the draft itself reports that it cannot be written
         keep_run_content(file, known)
     return study, known, recorded_items(known)
 

@@ -330,7 +330,7 @@ def _searchable_fields(study: Study) -> tuple[tuple[Path, Row, str], ...]:
     blocks = entries(study.document, "blocks.*")
     main = (path for path, block in blocks if isinstance(block, Mapping) and block.get("phase", "main") == "main")
     owner = SEQUENCE if value_at(study.document, SEQUENCE) else next(main, None)  # groups have their own sequences
-    block_rows = () if owner is None else main_block_rows(study.document)  # not again elsewhere
+    block_rows = () if owner is None else main_block_rows(study.document)  # listed only once
     fields: dict[Path, tuple[Path, Row, str]] = {row.path: (owner or FIRST, row, row.label) for row in block_rows}
     for element in elements:
         for row, label in _fields_of_table(study, element, ""):

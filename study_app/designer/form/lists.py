@@ -134,11 +134,11 @@ class EntryRow(QFrame):
         self.setFixedHeight(FIELD_PX + 2)
         self.line = hbox(*parts, spacing=2, margins=(12, 0, 2, 0), parent=self)
 
-    def add_button(self, icon: str, name: str, action_: Callable[[], object], action: str = "") -> IconButton:
+    def add_button(self, icon: str, name: str, on_click: Callable[[], object], action: str = "") -> IconButton:
         button = IconButton(icon, name, with_key(name, action) if action else "", size=FIELD_PX - 2, role="plain")
         if action:
             button.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
-        button.clicked.connect(action_)
+        button.clicked.connect(on_click)
         self.line.addWidget(button)
         return button
 

@@ -587,8 +587,8 @@ class Hypothesis(QWidget):
     def show_value(self, value: Mapping[str, Any], known: tuple[Compared, ...]) -> None:
         self.value, self.known = value, known
         key = next((key for key in ("groups", "conditions") if value.get(key)), "blocks")
-        entries_ = (value.get(key) for key in ("blocks", key, "conditions"))
-        blocks, named, conditions = (tuple(map(str, entry)) if isinstance(entry, tuple) else () for entry in entries_)
+        name_lists = (value.get(key) for key in ("blocks", key, "conditions"))
+        blocks, named, conditions = (tuple(map(str, entry)) if isinstance(entry, tuple) else () for entry in name_lists)
         pairs = {"conditions": conditions, "blocks": blocks if len(blocks) > 1 else ()} if key == "groups" else {}
         pair = next(((pair_key, names) for pair_key, names in pairs.items() if names), ("", ()))
         places = [(key, name if key == "blocks" else next(iter(blocks), ""), name, *pair) for name in named]
