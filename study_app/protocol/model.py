@@ -277,7 +277,7 @@ class StudyLiquid(Liquid):
 
 
 def scene_with(scene: SceneDefaults, device: DeviceNeeds, liquids: Sequence[StudyLiquid]) -> Scene:
-    """Return a scene with these liquids; they share one ball (`consistency.check_liquids`)."""
+    """Return a scene with these liquids; they share one ball, which `checks.consistency` verifies."""
     return Scene(
         **dict(scene) | {"body": liquids[0].body_in(scene)},
         rate_hz=device.rate_hz,

@@ -52,18 +52,19 @@ class TrialFeatures:
 
     Attributes
     ----------
-        force_mean_n, force_peak_n
+    force_mean_n, force_peak_n
         Mean and largest norm of the force sent [N].
-        speed_rms_mps
+    speed_rms_mps
         Root mean square of the hand's (estimated, not differenced) speed [m/s].
-        push_share
+    push_share
         Share, 0 to 1, of the force's power along the motion: Σ of positive F·v over Σ |F·v|. It is 0 for pure drag,
         and larger for a wake that carries the hand.
-        roughness_n
+    roughness_n
         Root mean square of the change of the force from one tick to the next [N].
-        delay_s
+    delay_s
         Mean age of the drawn position when it was drawn [s].
-        force_delay_s Delay of the force [s]; 0 in studies that do not delay it.
+    force_delay_s
+        Delay of the force [s]; 0 in studies that do not delay it.
     """
 
     force_mean_n: float
