@@ -1,4 +1,4 @@
-"""Exclusions from the analysis: by which rule or person, and why. Data are never deleted."""
+"""Exclusions from the analysis, each with its rule or person and its reason. Data are never deleted."""
 
 import contextlib
 import csv
@@ -23,8 +23,8 @@ from study_app.store.journals import journal
 from study_app.store.session_progress.progress import progress_of
 from study_app.text_tables import decoded, separator_of, wrong_length
 
-_NAMED_IDS = 6
-_WHOLE = re.compile("[0-9]{1,9}")
+_SHOWN_IDS = 6
+_INTEGER = re.compile("[0-9]{1,9}")
 MISSING_RULE = "missing"
 """The rule that excludes a session in which more trials are missing than the study permits."""
 
@@ -50,7 +50,7 @@ class Exclusion:
         return self.participant, self.session, self.trial
 
     def fields(self) -> dict[str, Any]:
-        """Return the fields for JSON, without ``key_open`` in a row of an earlier version, as that version has them."""
+        """Return the fields for JSON; ``key_open`` is omitted if None, as in earlier versions."""
         return {name: value for name, value in asdict(self).items() if (name, value) != ("key_open", None)}
 
 
@@ -110,7 +110,7 @@ def exclude(
             "person who decides"
         )
     if rule:
-        by, reason = _decided_by_person(rule, by, reason)
+        by, reason = _rule_and_reason(rule, by, reason)
     study = StudyFolder(folder)
     _check_recorded(study, participant, session, trial)
     at = (now if now is not None else datetime.now().astimezone()).isoformat(timespec="milliseconds")
@@ -170,22 +170,20 @@ def include(
     study = StudyFolder(folder)
     with lock_folder(folder):
         rows = exclusions(folder)
-        taken = next((row for row in rows if row.what == (participant, session, trial)), None)
-        if taken is None:
+        exclusion = next((row for row in rows if row.what == (participant, session, trial)), None)
+        if exclusion is None:
             name = describe_exclusion(
                 Exclusion(
                     participant=participant, session=session, trial=trial, rule_or_person="", reason="", excluded_at=""
                 )
             )
-            listed = "; ".join(describe_exclusion(row) for row in rows) or "none"
-            raise StoreError(f"{name} is not excluded; exclusions: {listed}")
-        at = (now if now is not None else datetime.now().astimezone()).isoformat(timespec="milliseconds")
-        key_open = bool(reveals(folder))
-        record = {"at": at, "by": by, "reason": reason, "key_open": key_open, "exclusion": taken.fields()}
-        if taken not in reversals(folder):
-            append_line(study.reversed_exclusions, json.dumps(record, ensure_ascii=False).encode() + b"\n")
-        write_file(study.exclusions, exclusion_bytes(tuple(row for row in rows if row is not taken)))
-    return taken
+            known = "; ".join(describe_exclusion(row) for row in rows) or "none"
+            raise StoreError(f"{name} is not excluded; exclusions: {known}")
+        if exclusion not in reversals(folder):
+            at = (now if now is not None else datetime.now().astimezone()).isoformat(timespec="milliseconds")
+            _append_reversal(study, exclusion, at=at, by=by, reason=reason)
+        write_file(study.exclusions, exclusion_bytes(tuple(row for row in rows if row is not exclusion)))
+    return exclusion
 
 
 def keep(folder: Path, participant: str, session: int, *, rule: str, by: str, reason: str) -> Exclusion:
@@ -198,7 +196,7 @@ def keep(folder: Path, participant: str, session: int, *, rule: str, by: str, re
         cannot be read or written.
     """
     by, reason = check_name_and_reason(by, reason, "keeping a session requires a name and a reason")
-    rule, decided = _decided_by_person(rule, by, reason)
+    rule, decided = _rule_and_reason(rule, by, reason)
     study = StudyFolder(folder)
     _check_recorded(study, participant, session, None)
     at = datetime.now().astimezone().isoformat(timespec="milliseconds")
@@ -210,14 +208,18 @@ def keep(folder: Path, participant: str, session: int, *, rule: str, by: str, re
             raise StoreError(f"{describe_exclusion(kept)} is excluded: include it without --rule")
         if any(row.what == kept.what and row.rule_or_person == rule for row in reversals(folder)):
             raise StoreError(f"{describe_exclusion(kept)} has already been kept, although the rule {rule} applies")
-        key_open = bool(reveals(folder))
-        record = {"at": at, "by": by, "reason": reason, "key_open": key_open, "exclusion": kept.fields()}
-        append_line(study.reversed_exclusions, json.dumps(record, ensure_ascii=False).encode() + b"\n")
+        _append_reversal(study, kept, at=at, by=by, reason=reason)
     return kept
 
 
-def _decided_by_person(rule: str, by: str, reason: str) -> tuple[str, str]:
-    """Return a planned rule, and the reason for a decision about it with the person who decided."""
+def _append_reversal(study: StudyFolder, exclusion: Exclusion, *, at: str, by: str, reason: str) -> None:
+    key_open = bool(reveals(study.path))
+    record = {"at": at, "by": by, "reason": reason, "key_open": key_open, "exclusion": exclusion.fields()}
+    append_line(study.reversed_exclusions, json.dumps(record, ensure_ascii=False).encode() + b"\n")
+
+
+def _rule_and_reason(rule: str, by: str, reason: str) -> tuple[str, str]:
+    """Return a planned rule, and the reason with the name of the person who decided; StoreError for another rule."""
     if rule not in RULES:
         raise StoreError(f"there is no exclusion rule {rule!r} ({did_you_mean(rule, RULES)})")
     return rule, f"{reason} (decided by {by})"
@@ -236,7 +238,7 @@ def exclusions(folder: Path) -> tuple[Exclusion, ...]:
     if content is None:
         return ()
     columns = header(EXCLUSIONS)
-    early = columns[:-1]  # of versions that did not write key_open
+    earlier_columns = columns[:-1]  # of versions that did not write key_open
     try:
         text = decoded(content)
         reader = csv.reader(io.StringIO(text, newline=""), strict=True)
@@ -247,7 +249,7 @@ def exclusions(folder: Path) -> tuple[Exclusion, ...]:
         raise StoreError(f"{path} is not valid CSV ({error}): save it as CSV in UTF-8, with commas") from error
     if (separator := separator_of(text.partition("\n")[0], columns)) != ",":
         raise StoreError(f"{path} uses {separator!r} as a separator: save it as CSV with commas")
-    if tuple(names[1]) not in (columns, early):
+    if tuple(names[1]) not in (columns, earlier_columns):
         raise StoreError(f"{path}: its columns must be {', '.join(columns)}, but are {', '.join(names[1])}")
     return tuple(_parse_exclusion(path, line, row, len(names[1])) for line, row in rows)
 
@@ -267,16 +269,16 @@ def dated_reversals(folder: Path) -> tuple[Reversal, ...]:
 def _parse_reversal(path: Path, number: int, line: bytes) -> Reversal:
     with contextlib.suppress(ValueError, KeyError, TypeError):
         record = parse_json(line)
-        taken = Exclusion(**record["exclusion"])
-        texts = (taken.participant, taken.rule_or_person, taken.reason, taken.excluded_at)
+        exclusion = Exclusion(**record["exclusion"])
+        texts = (exclusion.participant, exclusion.rule_or_person, exclusion.reason, exclusion.excluded_at)
         if (
             all(isinstance(text, str) for text in texts)
-            and isinstance(taken.session, int)
-            and isinstance(taken.key_open, bool | None)
+            and isinstance(exclusion.session, int)
+            and isinstance(exclusion.key_open, bool | None)
         ):
             key_open = record.get("key_open")
-            about = {name: str(record.get(name, "")) for name in ("at", "by", "reason")}
-            return Reversal(exclusion=taken, key_open=key_open if isinstance(key_open, bool) else None, **about)
+            details = {name: str(record.get(name, "")) for name in ("at", "by", "reason")}
+            return Reversal(exclusion=exclusion, key_open=key_open if isinstance(key_open, bool) else None, **details)
     raise StoreError(f"{path}, line {number} is not a reversed exclusion: remove it, or restore it from a backup")
 
 
@@ -286,12 +288,12 @@ def exclusion_bytes(rows: tuple[Exclusion, ...]) -> bytes:
 
 
 def _parse_exclusion(path: Path, line: int, row: list[str], length: int) -> Exclusion:
-    if wrong := wrong_length(row, length):
-        raise StoreError(f"{path}, line {line}: {wrong}")
-    participant, session, trial, by, reason, at, *later = row
-    key_open = later[0].lower() if later else MISSING  # a spreadsheet writes TRUE
+    if problem := wrong_length(row, length):
+        raise StoreError(f"{path}, line {line}: {problem}")
+    participant, session, trial, by, reason, at, *optional_cells = row
+    key_open = optional_cells[0].lower() if optional_cells else MISSING  # a spreadsheet writes TRUE
     flags = {"true": True, "false": False, MISSING: None}
-    if not (_WHOLE.fullmatch(session) and (trial == MISSING or _WHOLE.fullmatch(trial)) and key_open in flags):
+    if not (_INTEGER.fullmatch(session) and (trial == MISSING or _INTEGER.fullmatch(trial)) and key_open in flags):
         raise StoreError(
             f"{path}, line {line}: {','.join(row)!r} is not a valid exclusion (participant, session, trial or "
             f"{MISSING}, name, reason, time, and whether the key was open): correct or remove the row"
@@ -308,17 +310,17 @@ def _parse_exclusion(path: Path, line: int, row: list[str], length: int) -> Excl
 
 
 def _check_recorded(study: StudyFolder, participant: str, session: int, trial: int | None) -> None:
-    place = study.session(participant, session)
-    if place not in study.sessions():
-        known = [str(session.number) for session in study.sessions() if session.participant == participant]
+    folder = study.session(participant, session)
+    if folder not in study.sessions():
+        numbers = [str(session.number) for session in study.sessions() if session.participant == participant]
         ids = study.ids()
-        more = f" … {ids[-1]}" if len(ids) > _NAMED_IDS else ""
-        participants = f"participants: {', '.join(ids[:_NAMED_IDS]) or 'none'}{more}"
-        its = f"sessions of that participant: {', '.join(known)}" if known else participants
-        raise StoreError(f"{study.path} does not contain session {session} of participant {participant}; {its}")
+        more = f" … {ids[-1]}" if len(ids) > _SHOWN_IDS else ""
+        participants = f"participants: {', '.join(ids[:_SHOWN_IDS]) or 'none'}{more}"
+        available = f"sessions of that participant: {', '.join(numbers)}" if numbers else participants
+        raise StoreError(f"{study.path} does not contain session {session} of participant {participant}; {available}")
     if trial is None:
         return
-    presented = progress_of(journal.read(place.journal)).presented
+    presented = progress_of(journal.read(folder.journal)).presented
     if trial not in presented:
         listed = ", ".join(map(str, sorted(presented))) or "none"
         raise StoreError(

@@ -1,7 +1,7 @@
 """Groups of participants: assigned at random and sealed until the study is unblinded, or pre-existing and recorded.
 
 Each participant has an entry, claimed by creating a file in ``blinding/allocated`` exclusively, so that two programs
-get different entries; nobody else gets it, except a participant who replaces the first one.
+get different entries. Only a participant who replaces the first one can get the same entry.
 
 - **Randomised** (``NNN.json``): entries 1, 2 … in the order in which first sessions began. The group follows from entry
   and secret (`protocol.randomization.streams`); the file holds it sealed.
@@ -10,7 +10,7 @@ get different entries; nobody else gets it, except a participant who replaces th
   participant whom they replace.
 
 The place in the group assigns rows of squares. Folders that an earlier version began have entries without
-``place_in_group``: there the number in the participant's id goes on to assign them, and a replacement has an entry of
+``place_in_group``: there the number in the participant's id still assigns the rows, and a replacement has an entry of
 its own.
 """
 
@@ -79,8 +79,8 @@ class Claim:
     place_in_group: bool = False
 
 
-class Begun(NamedTuple):
-    """A participant's entry, pre-existing group and replaced participant from the first line of a journal."""
+class RecordedEntry(NamedTuple):
+    """A participant's entry, pre-existing group and replaced participant, as in the first line of a journal."""
 
     entry: int
     group: str | None
@@ -93,20 +93,20 @@ class Entries:
     def __init__(self, study: StudyFolder) -> None:
         self._study = study
         held = claims(study)
-        self.counts_places = _has_counted_places(held)
+        self.counts_places = _places_assign_rows(held)
         self._by_participant: dict[str, Claim] = {}
         self._last: dict[str | None, int] = {}
         for claim in held:
             self.add(claim)
 
     @cached_property
-    def begun(self) -> dict[str, Begun]:
+    def recorded(self) -> dict[str, RecordedEntry]:
         """The entries in the journals, read on first use."""
-        return entries_begun(self._study)
+        return recorded_entries(self._study)
 
     @cached_property
-    def _last_begun(self) -> int:
-        return max((begun.entry for begun in self.begun.values()), default=0)
+    def _last_recorded(self) -> int:
+        return max((recorded.entry for recorded in self.recorded.values()), default=0)
 
     def add(self, claim: Claim) -> None:
         """Add a claim."""
@@ -117,14 +117,14 @@ class Entries:
         """Return the claim of a participant."""
         return self._by_participant.get(participant) if participant else None
 
-    def last(self, group: str | None) -> int:
-        """Return the last entry of a pre-existing group or (without ``group``) the last one of all; 0 if there is none.
+    def last_entry(self, group: str | None) -> int:
+        """Return the last entry of a pre-existing ``group``, or of the whole study if None; 0 if there is none.
 
-        Without ``group`` the entries in journals are included.
+        Only the last entry of the whole study includes the entries in journals.
         """
         if group is not None:
             return self._last.get(group, 0)
-        return max(self._last_begun, *self._last.values(), 0)
+        return max(self._last_recorded, *self._last.values(), 0)
 
 
 def allocate(
@@ -149,7 +149,7 @@ def allocate(
         return known
     replaced = entries.claim_of(row_of) if entries.counts_places else None
     group = None if key.groups else group
-    entry = entries.last(group) if replaced is None else replaced.entry - 1
+    entry = entries.last_entry(group) if replaced is None else replaced.entry - 1
     try:
         study.allocated.mkdir(exist_ok=True)
         while True:
@@ -185,10 +185,10 @@ def allocation_of(study: StudyFolder, key: Key, participant: str, entries: Entri
         if not is_unchanged(claim, key):
             raise StoreError(f"{claim.path} has been changed: restore it from a backup")
         return _allocation(claim, key)
-    if (begun := entries.begun.get(participant)) is not None:
-        path = study.allocation(begun.entry, begun.group, None if begun.replaces is None else participant)
+    if (entry := entries.recorded.get(participant)) is not None:
+        path = study.allocation(entry.entry, entry.group, None if entry.replaces is None else participant)
         raise StoreError(
-            f"{path} is missing, although participant {participant} has entry {begun.entry}: restore it from a backup"
+            f"{path} is missing, although participant {participant} has entry {entry.entry}: restore it from a backup"
         )
     return None
 
@@ -223,43 +223,43 @@ def check_choice(
     protocol: Protocol, held: Sequence[Claim], participant: str, *, group: str | None, row_of: str | None
 ) -> None:
     """Raise StudyError if the group or replaced participant contradicts the protocol or the ``held`` claims."""
-    name, own = protocol.study.name, _claim_of(held, participant)
+    name, own_claim = protocol.study.name, _claim_of(held, participant)
     if group is not None and not protocol.asks_group:
         why = "assigns participants to its groups at random" if protocol.groups else "does not have groups"
         raise StudyError(f"group {group!r}: {name} {why}; omit the group")
     permitted = ", ".join(protocol.groups)
-    if protocol.asks_group and group is None and own is None:
+    if protocol.asks_group and group is None and own_claim is None:
         raise StudyError(
             f"the group is missing: {name} has pre-existing groups; specify the group of {participant} with --group: "
             f"{permitted}"
         )
     if group is not None and group not in protocol.groups:
         raise StudyError(f"group {group!r}: {name} does not have this group; permitted: {permitted}")
-    if protocol.asks_group and own is not None and own.group not in protocol.groups:
+    if protocol.asks_group and own_claim is not None and own_claim.group not in protocol.groups:
         raise StudyError(
-            f"participant {participant} is recorded in group {own.group}, which no longer exists in {name}"
+            f"participant {participant} is recorded in group {own_claim.group}, which no longer exists in {name}"
         )
-    if own is not None and group not in (None, own.group):
+    if own_claim is not None and group not in (None, own_claim.group):
         raise StudyError(
-            f"participant {participant} is recorded in group {own.group}, not {group}; specify {own.group}"
+            f"participant {participant} is recorded in group {own_claim.group}, not {group}; specify {own_claim.group}"
         )
     if row_of is not None and protocol.groups:
-        _check_replaced(held, participant, own, group=group, row_of=row_of)
+        _check_replaced(held, participant, own_claim, group=group, row_of=row_of)
 
 
 def _check_replaced(
-    held: Sequence[Claim], participant: str, own: Claim | None, *, group: str | None, row_of: str
+    held: Sequence[Claim], participant: str, own_claim: Claim | None, *, group: str | None, row_of: str
 ) -> None:
     replaced = _claim_of(held, row_of)
-    if not _has_counted_places(held):
+    if not _places_assign_rows(held):
         if enrolment_number(row_of) is None:
             raise StudyError(
                 f"participant {row_of!r} cannot be replaced: this folder is from an earlier version, which assigns "
                 "rows by the number in the ID; specify an ID with a number, such as P007"
             )
-    elif own is not None:
-        if own.replaces != row_of:
-            now = "nobody" if own.replaces is None else own.replaces
+    elif own_claim is not None:
+        if own_claim.replaces != row_of:
+            now = "nobody" if own_claim.replaces is None else own_claim.replaces
             raise StudyError(f"{row_of!r} cannot be replaced: {participant} is recorded as replacing {now}")
     elif replaced is None:
         raise StudyError(
@@ -282,16 +282,16 @@ def simulated_groups(
     held = claims(study)
     by_participant = {claim.participant: claim for claim in reversed(held)}
     sizes = Counter(claim.group for claim in held if claim.group in protocol.groups and claim.replaces is None)
-    dealt: dict[str, str | None] = {}
+    groups: dict[str, str | None] = {}
     for participant in participants:
         known = by_participant.get(participant)
-        own = group
-        if own is None and known is None and protocol.asks_group:
-            own = next_group(protocol.shares, sizes)
-            sizes[own] += 1
-        check_choice(protocol, () if known is None else (known,), participant, group=own, row_of=None)
-        dealt[participant] = own
-    return dealt
+        assigned = group
+        if assigned is None and known is None and protocol.asks_group:
+            assigned = next_group(protocol.shares, sizes)
+            sizes[assigned] += 1
+        check_choice(protocol, () if known is None else (known,), participant, group=assigned, row_of=None)
+        groups[participant] = assigned
+    return groups
 
 
 def session_protocol(study: StudyFolder, protocol: Protocol, participant: str, session: int) -> Protocol:
@@ -334,22 +334,22 @@ def claims(study: StudyFolder) -> list[Claim]:
     )
 
 
-def _has_counted_places(held: Iterable[Claim]) -> bool:
-    """Return whether places in groups assign rows of squares, which claims of an earlier version rule out."""
+def _places_assign_rows(held: Iterable[Claim]) -> bool:
+    """Return whether the place in a group assigns rows of squares, as in all folders but those of earlier versions."""
     return all(claim.place_in_group for claim in held if claim.participant)
 
 
 def is_unchanged(claim: Claim, key: Key) -> bool:
-    """Return whether an entry's file has the group that the key gives, or a pre-existing group."""
+    """Return whether an entry's file contains the group that the key assigns, or a pre-existing group."""
     if claim.group is not None or not key.groups:
         return claim.group is not None and not key.groups
     opened = open_text(_entry_owner(claim.entry, claim.participant), claim.sealed, key.nonce, frozenset({"group"}))
     return opened is not None and opened.get("group") == group_of(key.groups, key.nonce, claim.entry)
 
 
-def entries_begun(study: StudyFolder) -> dict[str, Begun]:
+def recorded_entries(study: StudyFolder) -> dict[str, RecordedEntry]:
     """Return the entry of each participant with a session, from the first lines of the journals."""
-    by_participant: dict[str, Begun] = {}
+    by_participant: dict[str, RecordedEntry] = {}
     for session in study.sessions():
         try:
             with open_regular(session.journal) as file:
@@ -358,7 +358,7 @@ def entries_begun(study: StudyFolder) -> dict[str, Begun]:
             continue
         if isinstance(start, dict) and isinstance(start.get("entry"), int):
             replaces = start.get("row_of") if start.get("place_in_group") else None
-            by_participant[session.participant] = Begun(start["entry"], start.get("group"), replaces)
+            by_participant[session.participant] = RecordedEntry(start["entry"], start.get("group"), replaces)
     return by_participant
 
 
@@ -374,25 +374,25 @@ def _claim_content(claim: Claim) -> dict[str, Any]:
         "place_in_group": claim.place_in_group or None,
         "sealed": claim.sealed or None,
     }
-    own = {"entry": claim.entry, "participant": claim.participant}
-    return own | {name: value for name, value in optional.items() if value is not None}
+    required = {"entry": claim.entry, "participant": claim.participant}
+    return required | {name: value for name, value in optional.items() if value is not None}
 
 
 def _read_claim(study: StudyFolder, path: Path) -> Claim:
     """Read the claim in an entry's file; it is empty if the file is damaged."""
     try:
-        held = parse_json(read_own(path, study.path))
+        content = parse_json(read_own(path, study.path))
         claim = Claim(
             path=path,
-            entry=held["entry"],
-            participant=held["participant"],
-            sealed=held.get("sealed", ""),
-            group=held.get("group"),
-            replaces=held.get("replaces"),
-            place_in_group=held.get("place_in_group", False),
+            entry=content["entry"],
+            participant=content["participant"],
+            sealed=content.get("sealed", ""),
+            group=content.get("group"),
+            replaces=content.get("replaces"),
+            place_in_group=content.get("place_in_group", False),
         )
-        named = study.allocation(claim.entry, claim.group, claim.participant if claim.replaces else None)
-        if named == path and _claim_content(claim) == held:
+        expected_path = study.allocation(claim.entry, claim.group, claim.participant if claim.replaces else None)
+        if expected_path == path and _claim_content(claim) == content:
             return claim
     except (StoreError, ValueError, KeyError, TypeError, AttributeError):
         pass

@@ -6,13 +6,15 @@ accidental reading, and its SHA-256 in every receipt proves that it is unchanged
 nonce prevents guessing the key from the hash among few possible keys. A real study's key comes from the operating
 system's randomness, a rehearsal's from its seed, and a folder holds one or the other.
 
-What can reveal a condition is encrypted with the nonce (see `sealing`): measures of a trial in the lines
-``trial_ended`` and ``interval_ended`` of a journal, what a trial with a design presents in its ``trial_started``, the
-numbers of samples and frames in ``recorded``, each as one text, ``sealed``; and the files of recordings.
+Fields that can reveal a condition are encrypted with the nonce (see `sealing`). In a journal these are the measures in
+``trial_ended`` and ``interval_ended``, the presented level in the ``trial_started`` of a trial with a design, and the
+numbers of samples and frames in ``recorded``; each line stores them as one text, ``sealed``. Recordings are encrypted
+as whole files.
 
 A file may leave the choice of effects and laws to the program (``effects = "auto"``) and its estimator to the format's
-default; another version may choose otherwise. So a receipt's protocol names the estimator, and effects and laws of each
-liquid, which reveal a condition, as one encrypted text, ``resolved``: resume and replay do not resolve them again.
+default; another version may choose otherwise. A receipt's protocol therefore names the estimator. The effects and laws
+of each liquid, which reveal a condition, are stored in the receipt as one encrypted text, ``resolved``. Resume and
+replay read these instead of resolving them again.
 """
 
 import base64
@@ -48,10 +50,11 @@ Codes: TypeAlias = dict[str, dict[str, str]]
 _NO_FILES: Final[Mapping[str, str]] = MappingProxyType({})
 _FORMATS: Final = (1, 2)
 """Formats of keys; keys of studies with designs have format 2, with stimuli, designs and methods."""
-_OF_DESIGNS: Final = ("conditions", "standard", "stimulus", "standards", "method")
-_OF_RECEIPT: Final = ("codes", "slots", "order", "compares")
+_DESIGN_KEYS: Final = ("conditions", "standard", "stimulus", "standards", "method")
+"""Keys of a block with a design that only the sealed key contains."""
+_RECEIPT_KEYS: Final = ("codes", "slots", "order", "compares")
 """Keys that a receipt adds to a block with a design."""
-_SEALED_IN: Final[Mapping[type[events.Event], frozenset[str]]] = {
+_SEALED_FIELDS: Final[Mapping[type[events.Event], frozenset[str]]] = {
     events.TrialStarted: frozenset({"level", "standard", "arrangement", "catch"}),
     events.IntervalEnded: SEALED | {"reached_s"},
     events.Allocated: frozenset({"group"}),
@@ -63,7 +66,7 @@ _SEALED_IN: Final[Mapping[type[events.Event], frozenset[str]]] = {
 
 @dataclass(frozen=True, slots=True)
 class Key:
-    """The opened key. Never print, log or show its content before it was revealed.
+    """The opened key. Never print, log or show its content before it is revealed.
 
     ``codes`` is block → code → condition id, or track of a block with a design; ``tables`` holds the protocol's tables
     ``conditions`` and ``liquids``, for studies with designs also ``stimuli``, ``designs``, ``methods`` and the
@@ -94,7 +97,7 @@ class Key:
 def sealed_hash(folder: Path) -> str | None:
     """Return the SHA-256 of a study's sealed key, as in its receipts; None if the key is missing or unreadable."""
     try:
-        return hashlib.sha256(journal.as_written(read_own(StudyFolder(folder).key, folder))).hexdigest()
+        return hashlib.sha256(journal.normalized_text(read_own(StudyFolder(folder).key, folder))).hexdigest()
     except StoreError:
         return None
 
@@ -109,7 +112,7 @@ def open_or_draw_key(
     study = StudyFolder(folder)
     drawn: Literal["system", "seed"] = "system" if random is None else "seed"
     if not is_there(study.key):
-        _refuse_if_lost(study)
+        _check_key_exists(study)
         content = _sealed_key(protocol, drawn, random or secrets.SystemRandom().random, files)
         create_folder(study.blinding, {study.key.name: content}, mode=0o600)
     key = verified_key(study)
@@ -119,7 +122,7 @@ def open_or_draw_key(
             f"{folder} contains {kinds[key.drawn]}, which must not be mixed with {kinds[drawn]}: use another results "
             "folder"
         )
-    _refuse_other_conditions(study, key, protocol)
+    _check_same_conditions(study, key, protocol)
     return key
 
 
@@ -133,10 +136,10 @@ def check_conditions(folder: Path, protocol: Protocol) -> None:
     """
     study = StudyFolder(folder)
     if is_there(study.key):
-        _refuse_other_conditions(study, verified_key(study), protocol)
+        _check_same_conditions(study, verified_key(study), protocol)
 
 
-def _refuse_other_conditions(study: StudyFolder, key: Key, protocol: Protocol) -> None:
+def _check_same_conditions(study: StudyFolder, key: Key, protocol: Protocol) -> None:
     if key.tables_hash != _tables_hash(protocol):
         raise StoreError(
             f"{study.key} was sealed for conditions that differ from this protocol (its liquids, conditions, stimuli, "
@@ -168,8 +171,8 @@ def reveal(folder: Path, by: str, reason: str) -> Codes:
         )
     key = verified_key(study)
     record = {"by": by, "reason": reason, "key_hash": key.hash}
-    known = reveals(folder)
-    if not (known and record.items() <= known[-1].items()):
+    earlier = reveals(folder)
+    if not (earlier and record.items() <= earlier[-1].items()):
         at = datetime.now().astimezone().isoformat(timespec="seconds")
         line = json.dumps({"at": at, **record}, ensure_ascii=False).encode("utf-8", "backslashreplace")
         append_line(study.reveals, line + b"\n")
@@ -194,7 +197,7 @@ def reveals(folder: Path) -> tuple[dict[str, str], ...]:
 
 
 def unreadable_reveals(folder: Path) -> tuple[tuple[int, bool], ...]:
-    """Return the number of each invalid line, and whether a power cut may have truncated it."""
+    """Return the line number of each invalid reveal, and whether a power cut may have truncated that line."""
     lines = [(number, line, record) for number, line, record in _reveal_lines(folder) if record is None]
     begins = b'{"at": "'
     return tuple((number, line[:8] == begins[: len(line)] and not line.endswith(b"}")) for number, line, _ in lines)
@@ -215,9 +218,9 @@ def _reveal_lines(folder: Path) -> Iterator[tuple[int, bytes, dict[str, str] | N
 
 
 def _is_reveal(record: object) -> bool:
-    """Return whether a line records when, by whom and why the key was opened, and which key."""
+    """Return whether ``record`` has the time, person, reason and key hash of a reveal."""
     return (
-        _is_texts(record)
+        _is_text_mapping(record)
         and isinstance(record, dict)
         and events.is_valid_value("at", record.get("at"))
         and all(record.get(name, "").strip() for name in ("by", "reason", "key_hash"))
@@ -244,31 +247,31 @@ def _sealed_tables(protocol: Protocol) -> dict[str, Any]:
     """Return the tables that a receipt omits; ``blocks`` has the presented values of each block with a design."""
     tables = protocol.model_dump(mode="json", include={"conditions", "liquids", "stimuli", "designs", "methods"})
     if protocol.design_questions:
-        named = {name: protocol.blocks[name] for name in protocol.design_questions}
+        designed = {name: protocol.blocks[name] for name in protocol.design_questions}
         tables["blocks"] = {
-            name: {key: value for key, value in block.model_dump(mode="json").items() if key in _OF_DESIGNS}
-            for name, block in named.items()
+            name: {key: value for key, value in block.model_dump(mode="json").items() if key in _DESIGN_KEYS}
+            for name, block in designed.items()
         }
     if protocol.analysis is not None:
-        telling = protocol.analysis.model_dump(mode="json", include={"published", "contrasts"})
-        if hidden := {key: values for key, values in telling.items() if values}:
-            tables["analysis"] = hidden
+        analysis = protocol.analysis.model_dump(mode="json", include={"published", "contrasts"})
+        if revealing := {key: values for key, values in analysis.items() if values}:
+            tables["analysis"] = revealing
     return tables
 
 
 def _tables_hash(protocol: Protocol) -> str:
     """Return the hash of the conditions as written by their author, without defaults of later versions."""
-    written = {
+    tables = {
         **protocol.model_dump(
             mode="json", include={"conditions", "liquids", "stimuli", "designs", "methods"}, exclude_unset=True
         ),
         "blocks": {name: [block_codes(protocol, block), block.conditions] for name, block in protocol.blocks.items()},
     }
     if protocol.design_questions:
-        written["designs"] = _sealed_tables(protocol)["blocks"]
+        tables["designs"] = _sealed_tables(protocol)["blocks"]
     if protocol.randomises:
-        written["groups"] = protocol.shares
-    return hashlib.sha256(json.dumps(written, sort_keys=True).encode()).hexdigest()
+        tables["groups"] = protocol.shares
+    return hashlib.sha256(json.dumps(tables, sort_keys=True).encode()).hexdigest()
 
 
 def verified_key(study: StudyFolder) -> Key:
@@ -306,7 +309,7 @@ def read_key(folder: Path) -> Key:
         The key is missing or invalid.
     """
     path = StudyFolder(folder).key
-    sealed = journal.as_written(read_own(path, folder))
+    sealed = journal.normalized_text(read_own(path, folder))
     try:
         content = parse_json(base64.b64decode(b"".join(sealed.split()), validate=True))
         if content["format"] not in _FORMATS:
@@ -330,28 +333,28 @@ def read_key(folder: Path) -> Key:
 
 
 def _check_content(content: dict[str, Any]) -> None:
-    """Raise ValueError, KeyError, TypeError or AttributeError for a key with codes or conditions of a wrong type."""
+    """Raise ValueError, KeyError, TypeError or AttributeError if the key's codes or conditions have a wrong type."""
     conditions = content["tables"]["conditions"].values()
     if (
         content["drawn"] not in ("system", "seed")
-        or not all(map(_is_texts, content["codes"].values()))
+        or not all(map(_is_text_mapping, content["codes"].values()))
         or not isinstance(content["tables"]["liquids"], dict)
-        or not _is_texts(content.get("files", {}))
+        or not _is_text_mapping(content.get("files", {}))
         or not all(type(share) is int and share > 0 for share in content.get("groups", {}).values())
         or not all(isinstance(condition["delay_ms"], int | float) for condition in conditions)
     ):
         raise ValueError("its codes or conditions are invalid")
 
 
-def _is_texts(value: object) -> bool:
+def _is_text_mapping(value: object) -> bool:
     return isinstance(value, dict) and all(isinstance(text, str) for text in value.values())
 
 
-def _refuse_if_lost(study: StudyFolder) -> None:
-    under = [session for session in study.sessions() if is_there(session.receipt)]
-    if under and not is_there(study.key):  # checked again: another program may have drawn the key in the meantime
+def _check_key_exists(study: StudyFolder) -> None:
+    used_by = [session for session in study.sessions() if is_there(session.receipt)]
+    if used_by and not is_there(study.key):  # checked again: another program may have drawn the key in the meantime
         raise StoreError(
-            f"{study.key} is missing, although {counted(len(under), 'session')} used it: restore it from a backup; "
+            f"{study.key} is missing, although {counted(len(used_by), 'session')} used it: restore it from a backup; "
             "without it, codes cannot be assigned to conditions"
         )
 
@@ -369,20 +372,20 @@ def complete_protocol(published: Mapping[str, Any], key: Key) -> Protocol:
     for name, block in blocks.items():
         if (design := key.tables.get("blocks", {}).get(name)) is not None:
             questionnaires.pop(block.pop("questionnaire"), None)
-            for written in (*_OF_RECEIPT, *(("repetitions",) if design.get("stimulus") else ())):
-                block.pop(written, None)
-            block |= {what: value for what, value in design.items() if value}
+            for receipt_key in (*_RECEIPT_KEYS, *(("repetitions",) if design.get("stimulus") else ())):
+                block.pop(receipt_key, None)
+            block |= {field_name: value for field_name, value in design.items() if value}
         else:
             block["conditions"] = [key.condition(name, code) for code in block.pop("codes")]
     tables = {name: table for name, table in key.tables.items() if name != "blocks"}
     if "analysis" in tables:
         tables["analysis"] = {**published["analysis"], **tables["analysis"]}
-    whole = {**published, **tables, "questionnaires": questionnaires, "blocks": blocks}
-    if needs_upgrade(whole):
-        whole = upgraded_tables(whole)
-    if not whole.get("sequence"):  # each group has its own, or each session
-        whole.pop("sequence", None)
-    return Protocol.model_validate(whole, context=RECORDED)
+    complete = {**published, **tables, "questionnaires": questionnaires, "blocks": blocks}
+    if needs_upgrade(complete):
+        complete = upgraded_tables(complete)
+    if not complete.get("sequence"):  # each group has its own, or each session
+        complete.pop("sequence", None)
+    return Protocol.model_validate(complete, context=RECORDED)
 
 
 def seal_event(start: events.SessionStarted, event: events.Event, key: Key) -> events.Event:
@@ -391,7 +394,7 @@ def seal_event(start: events.SessionStarted, event: events.Event, key: Key) -> e
         own = own_code(list(key.codes[event.block]), key.nonce, start.participant, event.block, event.code)
         text = seal_values([*_line_owner(start, event), "code"], {"code": event.code}, key.nonce)
         event = replace(event, code=own, sealed_code=text)
-    line, names = event.line(), _SEALED_IN.get(type(event), frozenset())
+    line, names = event.line(), _SEALED_FIELDS.get(type(event), frozenset())
     measured = {name: value for name, value in line.items() if name in names}
     if not start.measures_sealed or not measured:
         return event
@@ -449,13 +452,13 @@ def opened_key(folder: StudyFolder) -> Key | None:
 
 def _open_event(start: events.SessionStarted, line: events.Event, key: Key) -> events.Event:
     opened: dict[str, Any] = {}
-    for name, more, names in (
-        ("sealed", [], _SEALED_IN.get(type(line), frozenset())),
+    for name, suffix, names in (
+        ("sealed", [], _SEALED_FIELDS.get(type(line), frozenset())),
         ("sealed_code", ["code"], frozenset({"code"})),
     ):
         if (text := getattr(line, name, None)) is None:
             continue
-        if (measured := open_text([*_line_owner(start, line), *more], text, key.nonce, names)) is None:
+        if (measured := open_text([*_line_owner(start, line), *suffix], text, key.nonce, names)) is None:
             raise StoreError(
                 f"line {line.n} of the journal cannot be decrypted with the study's key: it has been changed; restore "
                 "the journal from a backup"
@@ -469,8 +472,8 @@ def _line_owner(start: events.SessionStarted, line: Any) -> list[object]:
     if isinstance(line, events.Allocated):
         return ["allocated", line.entry, start.participant]
     trial, attempt, interval = line.which
-    whose = [start.participant, start.session, trial, attempt]
-    return whose if isinstance(line, events.TrialEnded) else [*whose, line.event, interval]
+    owner = [start.participant, start.session, trial, attempt]
+    return owner if isinstance(line, events.TrialEnded) else [*owner, line.event, interval]
 
 
 def sealed_model(protocol: Protocol, participant: str, session: int, key: Key) -> str:
@@ -490,8 +493,8 @@ def recorded_protocol(protocol: Protocol, receipt: Mapping[str, Any], key: Key) 
     """
     recorded: dict[str, Any] = {}
     if (text := receipt.get("resolved")) is not None:
-        whose = _session_owner(receipt["participant"], receipt["session"])
-        opened = open_text(whose, str(text), key.nonce, frozenset({"liquids"}))
+        owner = _session_owner(receipt["participant"], receipt["session"])
+        opened = open_text(owner, str(text), key.nonce, frozenset({"liquids"}))
         if not opened:
             raise StoreError(
                 f"the field “resolved” in the receipt of {receipt['participant']} cannot be decrypted with the study's "
@@ -512,8 +515,8 @@ def protocol_errors(receipt: Path) -> Iterator[None]:
     """Convert errors raised while a protocol is made from receipt and key into `StoreError`."""
     try:
         yield
-    except KeyError as lacking:
-        raise StoreError(f"{receipt} does not contain {lacking}: restore it from a backup") from lacking
+    except KeyError as error:
+        raise StoreError(f"{receipt} does not contain {error}: restore it from a backup") from error
     except (AttributeError, TypeError, ValueError):  # the reason is omitted, since it could reveal conditions
         raise StoreError(
             f"{receipt} and the study's key cannot be combined into a protocol that this version can run: restore both "

@@ -192,8 +192,8 @@ def test_sessions_under_two_keys_write_the_same_but_for_sealed_fields(first: Pat
 def test_a_planted_leak_makes_them_differ(first: Path, protocol: Path, blindly: Any, tmp_path: Path) -> None:
     """One measure of one event is not sealed."""
     with blindly.context() as patch:
-        left = {**blinding._SEALED_IN, IntervalEnded: SEALED - {"force_peak_n"}}
-        patch.setattr(blinding, "_SEALED_IN", left)
+        left = {**blinding._SEALED_FIELDS, IntervalEnded: SEALED - {"force_peak_n"}}
+        patch.setattr(blinding, "_SEALED_FIELDS", left)
         other = said_in(run(protocol, tmp_path / "planted", 3))
     one = said_in(first)
     assert {name.rpartition("/")[2] for name in one if one[name] != other.get(name)} == {"journal.jsonl"}

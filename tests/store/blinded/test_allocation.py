@@ -245,11 +245,11 @@ def test_the_entries_are_read_once_however_many_participants_follow(
     source = tmp_path / "grouped.toml"
     source.write_bytes(SOURCE)
     reads = Counter[str]()
-    for name in ("claims", "entries_begun"):
+    for name in ("claims", "recorded_entries"):
         monkeypatch.setattr(allocation, name, counting(getattr(allocation, name), reads))
     for people in (2, 6):
         rehearse_answers(str(source), participants=people, seed=3, results=tmp_path / str(people), features=_felt())
-    assert reads == {"claims": 2 * 2, "entries_begun": 2}, "before the participants, and once for all of them"
+    assert reads == {"claims": 2 * 2, "recorded_entries": 2}, "before the participants, and once for all of them"
     assert [claim.entry for claim in claims(StudyFolder(tmp_path / "6"))] == [1, 2, 3, 4, 5, 6]
 
 
