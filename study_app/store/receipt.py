@@ -1,9 +1,9 @@
 """The receipt, metadata of a session for readers of the results: everything except the conditions.
 
 The receipt holds the protocol without its liquids, its conditions and the blocks' lists of conditions (which are sealed
-in the key), the SHA-256 of the whole protocol file and of the sealed key, the seed and what it seeds, versions, device,
-screens and the clock's origin. It is written before the first trial, when the session is resumed, and once more, with
-the status, at the end.
+in the key), the SHA-256 of the whole protocol file and of the sealed key, the seed and its generator, versions, device,
+screens and the clock's origin. It is written before the first trial, at each resumption, and with the final status at
+the end.
 """
 
 import hashlib
@@ -29,7 +29,7 @@ GENERATOR = (
     "used, under Fisher-Yates in Durstenfeld's form"
 )
 UNFINISHED = "unfinished"
-_CHANGING = ("status", "reason", "ended_at", "resumed", "outlets_lost")
+_LATER_FIELDS = ("status", "reason", "ended_at", "resumed", "outlets_lost")
 
 _LIBRARIES = ("numpy", "numba", "pydantic", "PySide6-Essentials", "pyqtgraph", "pyarrow")
 
@@ -65,10 +65,10 @@ def without_conditions(protocol: Protocol) -> dict[str, Any]:
         table["codes"] = list(block_codes(protocol, block))
         table["compares"] = protocol.compared_in(name)
         if block.design is not None:
-            ordered = order_of(protocol, block)
-            asks = f"{name}{ANSWER}"
-            table |= {"order": ordered.order, "slots": list(ordered.slots), "questionnaire": asks}
-            shown["questionnaires"][asks] = protocol.design_questions[name].model_dump(mode="json")
+            orders = order_of(protocol, block)
+            questionnaire = f"{name}{ANSWER}"
+            table |= {"order": orders.order, "slots": list(orders.slots), "questionnaire": questionnaire}
+            shown["questionnaires"][questionnaire] = protocol.design_questions[name].model_dump(mode="json")
     return shown
 
 
@@ -84,16 +84,16 @@ def versions() -> dict[str, str]:
 
 def plug_ins_of(protocol: Protocol, device: str, outlets: Iterable[str]) -> list[dict[str, str]]:
     """Return the plug-ins that a session uses for its protocol, device and outlets (by title)."""
-    sinks = registry("outlet")
-    asked = [
+    outlets_registry = registry("outlet")
+    used_kinds = [
         *(("task", task.kind) for task in protocol.tasks.values()),
         *(("method", method.kind) for method in protocol.methods.values()),
         *(("question", item.kind_id) for form in protocol.questionnaires.values() for item in form.items),
         ("device", device.partition(":")[0]),
     ]
-    if others := set(outlets) - {kind.title for kind in sinks.own.values()}:
-        asked += [("outlet", kind.name) for kind in sinks.others.values() if kind.title in others]
-    plug_ins = {plug_in for kind, name in asked if (plug_in := registry(kind).plug_in(name)) is not None}
+    if others := set(outlets) - {kind.title for kind in outlets_registry.own.values()}:
+        used_kinds += [("outlet", kind.name) for kind in outlets_registry.others.values() if kind.title in others]
+    plug_ins = {plug_in for kind, name in used_kinds if (plug_in := registry(kind).plug_in(name)) is not None}
     return [plug_in.described for plug_in in sorted(plug_ins, key=lambda plug_in: (plug_in.kind, plug_in.name))]
 
 
@@ -124,14 +124,14 @@ def write(path: Path, receipt: Mapping[str, Any]) -> None:
     write_file(path, f"{text}\n".encode("utf-8", "backslashreplace"))
 
 
-def digest(held: Mapping[str, Any]) -> str:
+def digest(record: Mapping[str, Any]) -> str:
     """Return the SHA-256 of a receipt, or of one entry of its ``resumed``, without the fields that change later."""
-    lasting = {name: value for name, value in held.items() if name not in _CHANGING}
-    return hashlib.sha256(json.dumps(plain_json(lasting), sort_keys=True).encode()).hexdigest()
+    unchanging = {name: value for name, value in record.items() if name not in _LATER_FIELDS}
+    return hashlib.sha256(json.dumps(plain_json(unchanging), sort_keys=True).encode()).hexdigest()
 
 
 def read(path: Path) -> dict[str, Any]:
-    """Return the receipt.
+    """Read and check a receipt.
 
     Raises
     ------
@@ -153,12 +153,12 @@ def read(path: Path) -> dict[str, Any]:
 def began_at(receipt: Mapping[str, Any]) -> str | None:
     """Return the time when a person began a session, as ISO 8601; None if the receipt does not contain it.
 
-    A pilot played from a later step begins with steps answered by a simulated participant, and is resumed at once, at
-    the time when it is played.
+    A pilot that is played from a later step begins with steps answered by a simulated participant. It is resumed
+    immediately, and the time of that resumption is returned.
     """
-    first = next(iter(receipt.get("resumed") or ()), None)
-    skipped = isinstance(first, dict) and bool((receipt.get("screens") or {}).get("steps"))
-    return first.get("at") if isinstance(first, dict) and skipped else receipt.get("started_at")
+    first_resume = next(iter(receipt.get("resumed") or ()), None)
+    skips_steps = isinstance(first_resume, dict) and bool((receipt.get("screens") or {}).get("steps"))
+    return first_resume.get("at") if isinstance(first_resume, dict) and skips_steps else receipt.get("started_at")
 
 
 def has_other_format(receipt: Mapping[str, Any], start: SessionStarted) -> bool:

@@ -1,7 +1,7 @@
 """A zip file for support: versions, settings, log, last error, and the report on a device.
 
-It holds no participant's id, no answer, no value of a liquid and nothing of a key. Of a study it reads nothing but the
-traces of crashes, and of these the places in the source.
+It contains no participant's ID, no answer, no value of a liquid and no part of a key. From a study it contains only the
+source locations in crash traces.
 """
 
 import io
@@ -18,15 +18,15 @@ from study_app.store.files.atomic import write_file
 from study_app.workspace import workspace
 
 NAME: Final = "liquid-study-support.zip"
-_CRASHES: Final = 3
+_MAX_CRASHES: Final = 3
 _DRIVERS: Final = ("pyusb", "libusb-package", "hidapi")
 _PRIVATE: Final = frozenset({"operator", "firmware", "workspace", "recent", "camera", "proofs", "stamps", "stamp_root"})
 """Settings with initials, paths that may name a person, or an address that may contain a password."""
-_PLACE: Final = re.compile(r'^ *(File "[^"]*", line \d+ in \S+|<no Python frame>)$')
+_SOURCE_LOCATION: Final = re.compile(r'^ *(File "[^"]*", line \d+ in \S+|<no Python frame>)$')
 _HEADING: Final = re.compile(
     r"^(Fatal Python error: [\w \-]+|(Current thread|Thread) 0x[0-9a-f]+ \(most recent call first\):)$"
 )
-_ABOUT: Final = """Information about this machine and liquid-study, for support.
+_README: Final = """Information about this machine and liquid-study, for support.
 
 versions.json    versions of the program, Python, the system and libraries
 settings.json    this machine's settings, without initials, folders or the camera's address
@@ -47,34 +47,34 @@ def write_support(path: Path, diagnosis: str = "") -> None:
     StoreError
         It cannot be written.
     """
-    made = io.BytesIO()
-    with zipfile.ZipFile(made, "w", zipfile.ZIP_DEFLATED) as packed:
-        for name, text in _parts(diagnosis):
-            packed.writestr(name, text.replace(str(Path.home()), "~"))
-    write_file(path, made.getvalue())
+    content = io.BytesIO()
+    with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, text in _zip_files(diagnosis):
+            archive.writestr(name, text.replace(str(Path.home()), "~"))
+    write_file(path, content.getvalue())
 
 
-def _parts(diagnosis: str) -> Iterator[tuple[str, str]]:
-    settings, trouble = workstation.load_or_default()
+def _zip_files(diagnosis: str) -> Iterator[tuple[str, str]]:
+    settings, problem = workstation.load_or_default()
     log = read_log()
-    yield "README.txt", _ABOUT
+    yield "README.txt", _README
     yield "versions.json", _json(receipt.versions() | {name: receipt.library_version(name) for name in _DRIVERS})
-    yield "settings.json", _json(_settings(settings) | ({"problem": "the file cannot be used"} if trouble else {}))
+    yield "settings.json", _json(_settings(settings) | ({"problem": "the file cannot be used"} if problem else {}))
     yield "log.txt", log
     yield "last-error.txt", last_error(log)
     if diagnosis:
         yield "diagnosis.txt", diagnosis
-    for number, trace in enumerate(_crashes(workspace().results), start=1):
+    for number, trace in enumerate(_crash_traces(workspace().results), start=1):
         yield f"crash-{number}.txt", trace
 
 
 def _settings(settings: workstation.MachineSettings) -> dict[str, object]:
     """Return the settings; for private ones only whether they are set."""
-    held = settings.model_dump(mode="json", exclude={"benches": {"__all__": {"report"}}})
-    return {name: bool(value) if name in _PRIVATE else value for name, value in held.items()}
+    values = settings.model_dump(mode="json", exclude={"benches": {"__all__": {"report"}}})
+    return {name: bool(value) if name in _PRIVATE else value for name, value in values.items()}
 
 
-def _crashes(results: Path) -> Iterator[str]:
+def _crash_traces(results: Path) -> Iterator[str]:
     """Yield the lines with source locations of the newest crash traces of the sessions in ``results``."""
     traces = []
     for path in results.glob("*/data/sub-*/ses-*/crash.txt"):
@@ -82,8 +82,8 @@ def _crashes(results: Path) -> Iterator[str]:
             traces.append((path.stat().st_mtime_ns, path.read_text(encoding="utf-8", errors="replace")))
         except OSError:
             continue
-    for _, trace in sorted(traces, reverse=True)[:_CRASHES]:
-        lines = [line for line in trace.splitlines() if _PLACE.match(line) or _HEADING.match(line)]
+    for _, trace in sorted(traces, reverse=True)[:_MAX_CRASHES]:
+        lines = [line for line in trace.splitlines() if _SOURCE_LOCATION.match(line) or _HEADING.match(line)]
         yield re.sub(r'(?<=File ")[^"]*', lambda path: source_place(path[0]), "\n".join(lines))
 
 

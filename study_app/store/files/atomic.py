@@ -1,6 +1,7 @@
-"""Atomic writing: neither a reader nor the next start after a power cut ever finds a partial file.
+"""Atomic writing, so that neither a reader nor the next start after a power cut finds a partial file.
 
-Reading: regular files alone, within the study's folder, and JSON that users may have changed.
+The functions for reading accept only regular files, if required within the study's folder, and JSON that users may have
+changed.
 """
 
 import contextlib
@@ -21,19 +22,19 @@ from typing import Any, BinaryIO
 from study_app.errors import StoreError
 
 OLD_S = 3600.0  # longer than any time between the last write of a temporary file and its renaming
-_NO_FLUSH = (errno.EINVAL, errno.EBADF, errno.ENOTSUP)  # error numbers of folders that cannot be flushed
-_MOVE_AGAIN_S = (0.01, 0.05, 0.2)
-_LARGEST_FILE_BYTES = 1 << 30  # of a results folder, whose files have megabytes
-_MOST_LEVELS = 64  # greatest depth of JSON, so that values can be processed recursively
+_CANNOT_FLUSH = (errno.EINVAL, errno.EBADF, errno.ENOTSUP)  # error numbers of folders that cannot be flushed
+_MOVE_RETRY_S = (0.01, 0.05, 0.2)
+_MAX_FILE_BYTES = 1 << 30  # of a results folder, whose files have megabytes
+_MAX_JSON_DEPTH = 64  # greatest depth of JSON, so that values can be processed recursively
 _TEMPORARY = re.compile(r"\.[^.].*\.[0-9a-f]{8}\.tmp")  # not of hidden files: markers are created and removed
 
 
 def write_file(path: Path, content: bytes | bytearray, *, waits: bool = True) -> None:
     """Write ``content`` to ``path``, replacing an existing file in one step.
 
-    Written under a temporary name, flushed to the disk, renamed over the old file, and the folder's entry flushed. On
-    any failure before the renaming the old file is untouched; no temporary file is left. Without ``waits`` nothing is
-    flushed: for files that can be recreated, since a power cut may then lose them.
+    The content is written under a temporary name, flushed to the disk and renamed over the old file; then the folder's
+    entry is flushed. If anything fails before the renaming, the old file is untouched and no temporary file is left.
+    Without ``waits`` nothing is flushed, so that a power cut may lose the file: use it for files that can be recreated.
 
     Raises
     ------
@@ -41,17 +42,17 @@ def write_file(path: Path, content: bytes | bytearray, *, waits: bool = True) ->
         The file cannot be written, for the reason in the message; or, as the message says, it was written, but the
         folder's entry could not be flushed.
     """
-    with _temporary_file(path, path) as half:
-        write_new_file(half, content, waits=waits)
-        move(half, path)
+    with _temporary_file(path, path) as temporary:
+        write_new_file(temporary, content, waits=waits)
+        move(temporary, path)
     if waits:
         flush_entry(path)
 
 
-def move(half: Path, path: Path) -> None:
+def move(temporary: Path, path: Path) -> None:
     """Rename a folder, or a file over the old one; retry while a viewer or virus scanner holds it on Windows."""
-    rename = half.rename if half.is_dir() else half.replace
-    for pause_s in _MOVE_AGAIN_S:
+    rename = temporary.rename if temporary.is_dir() else temporary.replace
+    for pause_s in _MOVE_RETRY_S:
         with contextlib.suppress(PermissionError):
             rename(path)
             return
@@ -60,16 +61,16 @@ def move(half: Path, path: Path) -> None:
 
 
 @contextlib.contextmanager
-def _temporary_file(path: Path, written: Path) -> Iterator[Path]:
-    """Yield a temporary path next to ``path`` and remove its file at the end; errors name ``written``."""
-    half = temporary_path(path)
+def _temporary_file(path: Path, target: Path) -> Iterator[Path]:
+    """Yield a temporary path next to ``path`` and remove its file at the end; errors name ``target``."""
+    temporary = temporary_path(path)
     try:
-        yield half
+        yield temporary
     except OSError as error:
-        raise cannot_write(written, error) from error
+        raise cannot_write(target, error) from error
     finally:
         with contextlib.suppress(OSError):
-            half.unlink(missing_ok=True)
+            temporary.unlink(missing_ok=True)
 
 
 def create_folder(path: Path, files: Mapping[str, bytes], *, waits: bool = True, mode: int = 0o666) -> bool:
@@ -77,30 +78,29 @@ def create_folder(path: Path, files: Mapping[str, bytes], *, waits: bool = True,
 
     The folder is filled under a temporary name and renamed into place, which no system does over a folder that is not
     empty: of two programs exactly one succeeds, and the other finds complete files. Without ``waits`` nothing is
-    flushed: for files that can be recreated, since a power cut may then lose them. ``mode`` limits the files'
-    permissions.
+    flushed (see `write_file`). ``mode`` limits the files' permissions.
     """
-    half = temporary_path(path)
+    temporary = temporary_path(path)
     try:
-        half.mkdir()
+        temporary.mkdir()
         for name, content in files.items():
-            write_new_file(half / name, content, waits=waits, mode=mode)
+            write_new_file(temporary / name, content, waits=waits, mode=mode)
         if waits:
-            sync_folder(half)
-        move(half, path)
+            sync_folder(temporary)
+        move(temporary, path)
     except OSError as error:
         if any((path / name).exists() for name in files):
             return False
         raise cannot_write(path, error) from error
     finally:
-        shutil.rmtree(half, ignore_errors=True)
+        shutil.rmtree(temporary, ignore_errors=True)
     if waits:
         flush_entry(path)
     return True
 
 
 def make_folder(path: Path, *, waits: bool = True) -> None:
-    """Create a folder, which several programs may share, with those above it; with ``waits`` flush them to the disk.
+    """Create a folder and its parents unless they exist; with ``waits`` flush the new ones to the disk.
 
     Raises
     ------
@@ -125,16 +125,16 @@ def copy_folder(folder: Path, to: Path) -> None:
     StoreError
         It cannot be written.
     """
-    half = temporary_path(to)
+    temporary = temporary_path(to)
     try:
         to.parent.mkdir(parents=True, exist_ok=True)
-        shutil.copytree(folder, half, copy_function=copy_file)
-        sync_folders(half)
-        move(half, to)
+        shutil.copytree(folder, temporary, copy_function=copy_file)
+        sync_folders(temporary)
+        move(temporary, to)
     except OSError as error:  # shutil.Error, too
         raise cannot_write(to, error) from error
     finally:
-        shutil.rmtree(half, ignore_errors=True)
+        shutil.rmtree(temporary, ignore_errors=True)
     flush_entry(to)
 
 
@@ -185,19 +185,20 @@ def temporary_path(path: Path) -> Path:
     return path.with_name(f".{path.name}.{secrets.token_hex(4)}.tmp")
 
 
-def temporary_files(folder: Path, of: str = "") -> tuple[Path, ...]:
-    """Return the temporary files directly in ``folder``, ``of`` a given name if set; their programs may still run."""
+def temporary_files(folder: Path, name: str = "") -> tuple[Path, ...]:
+    """Return the temporary files directly in ``folder``, ``name`` a given name if set; their programs may still run."""
     paths = (path for path in folder.glob(".*.tmp") if _TEMPORARY.fullmatch(path.name))
-    return tuple(sorted(path for path in paths if not of or path.name[1:-13] == of))  # without ".", and ".01234567.tmp"
+    # A temporary name is "." + name + ".01234567.tmp".
+    return tuple(sorted(path for path in paths if not name or path.name[1:-13] == name))
 
 
-def remove_old_temporary_files(folder: Path, of: str = "") -> None:
-    """Remove old temporary files, ``of`` a name if set, from a folder into which other programs may be writing.
+def remove_old_temporary_files(folder: Path, name: str = "") -> None:
+    """Remove old temporary files, ``name`` a name if set, from a folder into which other programs may be writing.
 
-    Only files too old to be in use are removed, by the time that the folder's disk gives to new files: this computer's
-    clock may differ from that of another one that is writing. A file that cannot be removed is left.
+    Only files too old to be in use are removed. Their age is measured with a new file on the same disk, because the
+    clock of another computer that writes there may differ. A file that cannot be removed is left.
     """
-    if not (paths := temporary_files(folder, of)):
+    if not (paths := temporary_files(folder, name)):
         return
     with contextlib.suppress(OSError, StoreError), _temporary_file(folder / "time", folder) as probe:
         write_new_file(probe, b"", waits=False)
@@ -238,18 +239,18 @@ def probe_free_bytes(folder: Path) -> int:
     StoreError
         Nothing can be written there.
     """
-    place = next(path for path in (folder, *folder.absolute().parents) if is_there(path))
-    with _temporary_file(place / "probe", folder) as path:
+    existing = next(path for path in (folder, *folder.absolute().parents) if is_there(path))
+    with _temporary_file(existing / "probe", folder) as path:
         write_new_file(path, b"probe\n")
-        return shutil.disk_usage(place).free
+        return shutil.disk_usage(existing).free
 
 
 def flush_file(descriptor: int) -> None:
     """Flush a file to the medium: on macOS, where fsync leaves data in the drive's memory, with F_FULLFSYNC.
 
-    Some drives do not offer it (network, USB); then fsync must do.
+    Drives that do not support it, such as network and USB drives, are flushed with fsync.
     """
-    if sys.platform == "darwin":  # never run
+    if sys.platform == "darwin":  # not covered by tests
         import fcntl  # noqa: PLC0415 - Windows does not have it
 
         with contextlib.suppress(OSError):
@@ -269,7 +270,7 @@ def sync_folder(path: Path) -> None:
     try:
         flush_file(descriptor)
     except OSError as error:
-        if error.errno not in _NO_FLUSH:
+        if error.errno not in _CANNOT_FLUSH:
             raise
     finally:
         os.close(descriptor)
@@ -299,7 +300,7 @@ def flush_entry(path: Path) -> None:
 
 
 def cannot_write(path: Path, error: OSError) -> StoreError:
-    """Return the one-line error for ``path``: what, why, and what to do."""
+    """Return a one-line error that names ``path``, the system's reason and the remedies."""
     blocked = isinstance(error, FileExistsError | NotADirectoryError) or (
         isinstance(error, FileNotFoundError) and any(map(os.path.isfile, path.parents))  # on Windows
     )
@@ -335,21 +336,21 @@ def refuse_special_files(path: Path) -> None:
     StoreError
         The folder contains such a file; the message names its path and type.
     """
-    for inside in (path, *paths_in(path)):
-        if inside.is_symlink():
-            raise StoreError(f"{inside} is a link to {inside.readlink()}: replace the link with its target")
-        if is_there(inside) and not inside.is_file() and not inside.is_dir():
-            raise StoreError(f"{inside} is neither a file nor a folder: remove it")
+    for entry in (path, *paths_in(path)):
+        if entry.is_symlink():
+            raise StoreError(f"{entry} is a link to {entry.readlink()}: replace the link with its target")
+        if is_there(entry) and not entry.is_file() and not entry.is_dir():
+            raise StoreError(f"{entry} is neither a file nor a folder: remove it")
 
 
 def cannot_read(path: Path, error: OSError) -> StoreError:
-    """Return the one-line error for ``path``: what, why, and what to do."""
+    """Return a one-line error that names ``path``, the system's reason and the remedies."""
     return StoreError(
         f"{path} cannot be read ({system_message(error)}): correct its permissions, or restore it from a backup"
     )
 
 
-def open_regular(path: Path, *, largest_bytes: float = _LARGEST_FILE_BYTES) -> BufferedReader:
+def open_regular(path: Path, *, largest_bytes: float = _MAX_FILE_BYTES) -> BufferedReader:
     """Open a regular file for reading; raise OSError for a folder, device, pipe or larger file."""
     status = path.stat()
     if not stat.S_ISREG(status.st_mode):
@@ -360,7 +361,7 @@ def open_regular(path: Path, *, largest_bytes: float = _LARGEST_FILE_BYTES) -> B
 
 
 def read_regular(path: Path) -> bytes:
-    """Return the content of a regular file; it raises the errors of `open_regular`."""
+    """Return the content of a regular file; raise OSError as `open_regular`."""
     with open_regular(path) as file:
         return file.read()
 
@@ -378,7 +379,7 @@ def read_if_there(path: Path) -> bytes | None:
 def read_own(path: Path, root: Path) -> bytes:
     """Return the content of a file, which must lie under ``root`` after links are resolved."""
     try:
-        real = Path(os.path.realpath(path, strict=True))  # raises OSError for a loop of links, with every Python
+        real = Path(os.path.realpath(path, strict=True))  # OSError for a loop of links
         if not real.is_relative_to(root.resolve()):
             raise StoreError(
                 f"{path} contains a link to {real}, which is outside {root}: replace the link with the file itself"
@@ -406,7 +407,7 @@ def parse_json(content: bytes | str) -> Any:
     except RecursionError as error:
         raise ValueError("it is nested too deeply") from error
     level = [value]
-    for _ in range(_MOST_LEVELS):
+    for _ in range(_MAX_JSON_DEPTH):
         containers = (value for value in level if isinstance(value, dict | list))
         level = [
             inner

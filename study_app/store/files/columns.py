@@ -1,7 +1,7 @@
 """The column dictionary: the single definition of every column of every table.
 
-Headers, ``dataset_description.json`` and every check of a finished folder are made from these lines. Columns of one
-name mean the same in every table.
+Headers, ``dataset_description.json`` and the checks of a finished folder are derived from it. A column has the same
+meaning in every table.
 """
 
 from dataclasses import replace
@@ -41,14 +41,14 @@ CODE = Column(
     "Code for the condition presented (L1, D3 ...); the sealed key states which condition it stands for.",
 )
 _SESSION_COLUMNS = (STUDY, _PARTICIPANT, SESSION, _SIMULATED, _PILOT)
-"""Which session a row is about."""
+"""Columns that identify the session of a row."""
 _TRIAL_COLUMNS = (_TRIAL, _ATTEMPT, BLOCK, _PHASE, _PART, _INDEX)
-"""Which trial of it."""
+"""Columns that identify the trial of a row."""
 _INVALID = (
     "invalid",
     "an interval was not delivered as requested, so the question was not asked and the trial was repeated",
 )
-_NOT_OF_INTERVALS = ("of", "trial_started_at", "trial_started_s", "marked", "notes")
+_TRIAL_ONLY = ("of", "trial_started_at", "trial_started_s", "marked", "notes")
 _LEVEL = "distance of the comparison from its standard, or the value itself, depending on the protocol"
 PARTICIPANTS: tuple[Column, ...] = (
     *_SESSION_COLUMNS,
@@ -273,7 +273,7 @@ _TRIALS: tuple[Column, ...] = (
 )
 
 
-_OUTCOME = [column.name for column in _TRIALS].index("outcome")
+_OUTCOME_INDEX = [column.name for column in _TRIALS].index("outcome")
 
 
 DELIVERED: tuple[Column, ...] = (
@@ -322,7 +322,7 @@ _VIDEO: tuple[Column, ...] = (
 
 
 INTERVALS: tuple[Column, ...] = (
-    *(column for column in _TRIALS[: _TRIALS.index(CODE) + 1] if column.name not in _NOT_OF_INTERVALS),
+    *(column for column in _TRIALS[: _TRIALS.index(CODE) + 1] if column.name not in _TRIAL_ONLY),
     Column("interval", "integer", "Number of the interval in the trial, counting from 1.", minimum=1),
     Column(
         "interval_started_s", "number", "Time at which the interval began, on the session's clock.", unit="s", minimum=0
@@ -345,7 +345,7 @@ INTERVALS: tuple[Column, ...] = (
         "requested.",
     ),
     *DELIVERED,
-    *(column for column in _TRIALS[_OUTCOME:] if column.name not in _NOT_OF_INTERVALS),
+    *(column for column in _TRIALS[_OUTCOME_INDEX:] if column.name not in _TRIAL_ONLY),
     *_VIDEO,
 )
 """Intervals of the trials of a study with designs."""
@@ -363,7 +363,7 @@ _TABLES = {"responses": RESPONSES, "trials": TRIALS, "intervals": INTERVALS, "pa
 
 
 SEALED = frozenset(column.name for column in (*TRIALS, *DELIVERED) if column.sealed)
-"""Columns of a trial that no table has before the key was opened (see ``blinding``)."""
+"""Columns of a trial that tables omit until the key is opened (see ``blinding``)."""
 
 
 def every_column(*, intervals: bool = False) -> tuple[Column, ...]:

@@ -1,8 +1,8 @@
 """Tables as CSV: their columns, the values of their cells, and the files.
 
-Comma, UTF-8, RFC 4180 quoting, one line feed a record, ``n/a`` where nothing is known. Numbers are written in full. A
-text that a spreadsheet would compute has an apostrophe before it, and so is shown as it is (OWASP, "CSV Injection");
-numbers are not texts: a negative number stays a number.
+Files are UTF-8 with commas, RFC 4180 quoting and one line feed per record. Missing values are ``n/a``. Numbers have
+full precision. A text that a spreadsheet would evaluate is preceded by an apostrophe, so that it is shown unchanged
+(OWASP, "CSV Injection"). Numbers are exempt, so that a negative number stays a number.
 """
 
 import csv
@@ -37,23 +37,23 @@ def unguard_formula(cell: str) -> str:
     return cell[1:] if cell.startswith("'") and _FORMULA.match(cell) else cell
 
 
-class _Cells(NamedTuple):
+class _CellFormat(NamedTuple):
     description: str
     pattern: str
     read: Callable[[str], Any]
 
 
-def _number(cell: str) -> float:
-    """Return a cell's number, as int if it has no fraction, so that it is written again exactly as it was read."""
+def _parse_number(cell: str) -> float:
+    """Return a cell's number, as int if it has no fraction, so that it is written back exactly as it was read."""
     return int(cell) if re.fullmatch("-?[0-9]{1,15}", cell) else float(cell)
 
 
-_KINDS: Final[dict[Kind, _Cells]] = {
-    "text": _Cells("a text", r"[\s\S]*", unguard_formula),
-    "integer": _Cells("a whole number", r"-?[0-9]{1,18}", int),
-    "number": _Cells("a number", r"-?[0-9]+(\.[0-9]+)?(e[+-]?[0-9]+)?", _number),
-    "flag": _Cells("true or false", "true|false", "true".__eq__),
-    "time": _Cells(
+_KINDS: Final[dict[Kind, _CellFormat]] = {
+    "text": _CellFormat("a text", r"[\s\S]*", unguard_formula),
+    "integer": _CellFormat("a whole number", r"-?[0-9]{1,18}", int),
+    "number": _CellFormat("a number", r"-?[0-9]+(\.[0-9]+)?(e[+-]?[0-9]+)?", _parse_number),
+    "flag": _CellFormat("true or false", "true|false", "true".__eq__),
+    "time": _CellFormat(
         "a time with a time zone", r"[0-9]{4}(-[0-9]{2}){2}T[0-9]{2}(:[0-9]{2}){2}\.[0-9]{3}[+-][0-9]{2}:[0-9]{2}", str
     ),
 }
@@ -65,8 +65,8 @@ class Column:
 
     ``kind``: flags are ``true`` or ``false``, times ISO 8601 with zone. ``levels`` are all permitted values, if they
     are few, each with its meaning. With ``may_miss``, a cell can be ``n/a``. A ``sealed`` column can reveal the
-    condition: no table has it before the study's key is opened. For a trial of intervals ``of_trial`` is the sum,
-    maximum or mean of its intervals.
+    condition, and tables omit it until the study's key is opened. ``of_trial`` tells how a trial's value is computed
+    from its intervals.
     """
 
     name: str
@@ -94,8 +94,8 @@ class Column:
         if re.fullmatch(self.pattern, cell):
             value = _KINDS[self.kind].read(cell)
             low, high = (-math.inf if self.minimum is None else self.minimum), self.maximum
-            bounded = self.kind in {"integer", "number"}
-            if not bounded or (low <= value <= (math.inf if high is None else high) and math.isfinite(value)):
+            is_numeric = self.kind in {"integer", "number"}
+            if not is_numeric or (low <= value <= (math.inf if high is None else high) and math.isfinite(value)):
                 return value
         raise ValueError(f"{(cell if len(cell) <= 40 else cell[:39] + '…')!r} is not {self.permitted}")
 
@@ -119,13 +119,13 @@ class Column:
     def variable(self) -> dict[str, Any]:
         """The column as a schema.org PropertyValue."""
         meanings = "; ".join(f"{level}: {meaning}" for level, meaning in self.levels)
-        described = {
+        entry = {
             "@type": "PropertyValue",
             "name": self.name,
             "description": f"{self.description} Levels: {meanings}." if meanings else self.description,
         }
-        more = {"unitText": self.unit or None, "minValue": self.minimum, "maxValue": self.maximum}
-        return described | {name: value for name, value in more.items() if value is not None}
+        optional_entries = {"unitText": self.unit or None, "minValue": self.minimum, "maxValue": self.maximum}
+        return entry | {name: value for name, value in optional_entries.items() if value is not None}
 
 
 optional = partial(Column, may_miss=True)
@@ -133,7 +133,7 @@ optional = partial(Column, may_miss=True)
 
 
 def unsealed_columns(columns: tuple[Column, ...]) -> tuple[Column, ...]:
-    """Return the columns that a table has before the key is opened."""
+    """Return the columns that are not sealed."""
     return tuple(column for column in columns if not column.sealed)
 
 
@@ -185,14 +185,14 @@ def read_cells(table: bytes) -> list[list[str]]:
 def read_table(table: bytes, columns: Sequence[Column]) -> list[Row]:
     """Return the rows of a table written by `csv_bytes`, with the given columns; missing values are None."""
     names, *rows = read_cells(table)
-    places = [(column, names.index(column.name)) for column in columns]
+    indices = [(column, names.index(column.name)) for column in columns]
     return [
-        {column.name: None if row[at] == MISSING else column.value(row[at]) for column, at in places} for row in rows
+        {column.name: None if row[at] == MISSING else column.value(row[at]) for column, at in indices} for row in rows
     ]
 
 
 def table_problems(table: bytes, columns: Sequence[Column]) -> Iterator[str]:
-    """Yield a sentence on each problem of a table; of each column only the first bad cell is reported."""
+    """Yield a sentence on each problem of a table, but only the first invalid cell of each column."""
     expected = header(tuple(columns))
     try:
         names, *rows = read_cells(table)
@@ -229,14 +229,14 @@ def has_same_cells(held: bytes, table: bytes) -> bool:
         return False
     if not set(held_names) <= set(names):
         return False
-    places = [names.index(name) for name in held_names]
-    return [[unguard_formula(row[place]) for place in places] for row in rows] == [
+    indices = [names.index(name) for name in held_names]
+    return [[unguard_formula(row[index]) for index in indices] for row in rows] == [
         [unguard_formula(cell) for cell in row] for row in held_rows
     ]
 
 
 def write_columns(path: Path, table: np.recarray[Any, Any]) -> None:
-    """Write a table of named columns as CSV in full precision; either the whole file or nothing.
+    """Write a table of named columns as CSV in full precision, atomically.
 
     Raises
     ------
@@ -255,7 +255,7 @@ def write_columns(path: Path, table: np.recarray[Any, Any]) -> None:
 
 
 def csv_text_of(rows: Iterable[Iterable[Any]]) -> str:
-    """Return rows of cells, beginning with the header, as CSV text with commas and line feeds."""
+    """Return rows of cells, the header first, as CSV text with commas and line feeds."""
     text = io.StringIO(newline="")
     csv.writer(text, lineterminator="\n").writerows(rows)
     return text.getvalue()

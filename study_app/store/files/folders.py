@@ -29,7 +29,7 @@ from study_app.errors import StoreError
 from study_app.protocol.source import unprintable_character
 
 ReportProgress: TypeAlias = Callable[[str, float], object]
-"""Called with what is being done and the share that is done."""
+"""Callback with the current step and the fraction done."""
 REBUILT = "rebuilt.txt"
 FINGERPRINTS = "fingerprints.txt"
 PREREGISTRATION = "preregistration.md"
@@ -41,7 +41,7 @@ RECORDING_NAME = re.compile(r"recordings/trial-[0-9]{3,}(_attempt-[0-9]+)?(_inte
 _SESSION_FOLDER = re.compile(r"ses-([0-9]{2})")
 
 
-class _Within:
+class _FixedPath:
     """Descriptor of a file or folder with a fixed name in its owner's folder ``path``."""
 
     def __init__(self, *names: str) -> None:
@@ -59,17 +59,17 @@ class SessionFolder:
     participant: str
     number: int
 
-    journal = _Within("journal.jsonl")
+    journal = _FixedPath("journal.jsonl")
     """The journal: one line per event."""
-    receipt = _Within("receipt.json")
+    receipt = _FixedPath("receipt.json")
     """The receipt: protocol, seed, versions, device, hashes."""
-    checksums = _Within("checksums.sha256")
+    checksums = _FixedPath("checksums.sha256")
     """SHA-256 of every file at the session's end."""
-    rebuilt = _Within(REBUILT)
+    rebuilt = _FixedPath(REBUILT)
     """When and why checksums or fingerprint were made again after the session had ended."""
-    crash = _Within("crash.txt")
+    crash = _FixedPath("crash.txt")
     """The stack trace of a crash; it exists while the session runs and after a crash."""
-    recordings = _Within("recordings")
+    recordings = _FixedPath("recordings")
     """Samples and frames of the trials."""
 
     def table(self, study: str, name: str) -> Path:
@@ -85,25 +85,25 @@ class StudyFolder:
 
     path: Path
 
-    description = _Within("dataset_description.json")
+    description = _FixedPath("dataset_description.json")
     """The Psych-DS description of every column."""
-    ignore = _Within(".psychds-ignore")
+    ignore = _FixedPath(".psychds-ignore")
     """Paths that validators of Psych-DS ignore."""
-    exclusions = _Within("exclusions.csv")
+    exclusions = _FixedPath("exclusions.csv")
     """Exclusions from the analysis, with who decided and the reason."""
-    reversed_exclusions = _Within("exclusions_reversed.jsonl")
+    reversed_exclusions = _FixedPath("exclusions_reversed.jsonl")
     """Reversed exclusions, with who decided and the reason."""
-    fingerprints = _Within(FINGERPRINTS)
+    fingerprints = _FixedPath(FINGERPRINTS)
     """The fingerprint of every session that ended."""
-    withdrawals = _Within("withdrawals.jsonl")
+    withdrawals = _FixedPath("withdrawals.jsonl")
     """A tombstone for each participant whose data were erased."""
-    preregistration = _Within(PREREGISTRATION)
+    preregistration = _FixedPath(PREREGISTRATION)
     """The plan of the study, if it was preregistered."""
-    blinding = _Within("blinding")
+    blinding = _FixedPath("blinding")
     """The folder of key and reveals."""
-    key = _Within("blinding", "key.sealed")
+    key = _FixedPath("blinding", "key.sealed")
     """The sealed key: which code stands for which condition."""
-    allocated = _Within("blinding", "allocated")
+    allocated = _FixedPath("blinding", "allocated")
     """The folder of the participants' entries in the allocation to groups."""
 
     def allocation(self, entry: int, group: str | None = None, replacement: str | None = None) -> Path:
@@ -111,9 +111,9 @@ class StudyFolder:
         parts = (group, f"{entry:03d}", replacement)
         return self.allocated / f"{'-'.join(part for part in parts if part is not None)}.json"
 
-    reveals = _Within("blinding", "reveals.jsonl")
+    reveals = _FixedPath("blinding", "reveals.jsonl")
     """Who opened the key, when and why."""
-    data = _Within("data")
+    data = _FixedPath("data")
     """The folder of all tables."""
 
     def participants(self, study: str) -> Path:
@@ -125,7 +125,7 @@ class StudyFolder:
         return SessionFolder(self.data / f"sub-{participant}" / f"ses-{number:02d}", participant, number)
 
     def sessions(self) -> tuple[SessionFolder, ...]:
-        """Return the sessions that were begun, by participant and number; copies with other names are none."""
+        """Return the session folders by participant and number, without folders of other names, such as copies."""
         try:
             paths = list(self.data.glob("sub-*/ses-*"))
         except FileNotFoundError:  # a participant was withdrawn in the meantime
@@ -144,7 +144,7 @@ class StudyFolder:
 
 
 def check_study_name(name: object) -> str:
-    """Return ``name`` if a protocol can have it as the study's name.
+    """Return ``name`` if it is permitted as a study's name.
 
     Raises
     ------
@@ -167,8 +167,8 @@ def locate_session(path: Path) -> tuple[StudyFolder, SessionFolder]:
     folder = path.resolve()
     number = _SESSION_FOLDER.fullmatch(folder.name)
     participant = folder.parent.name.removeprefix("sub-")
-    named = number is not None and folder.parent.name.startswith("sub-") and ID_PATTERN.fullmatch(participant)
-    if not named or folder.parent.parent.name != "data" or not folder.is_dir():
+    is_session = number is not None and folder.parent.name.startswith("sub-") and ID_PATTERN.fullmatch(participant)
+    if not is_session or folder.parent.parent.name != "data" or not folder.is_dir():
         raise StoreError(
             f"{path} is not a session folder: specify one such as results/rek2024/data/sub-P007/ses-01, or a name that "
             "liquid-study sessions lists"
@@ -183,15 +183,15 @@ def study_folder(results: Path, study: str, *, pilot: bool = False) -> StudyFold
 
 def rehearsal_folder(results: Path, study: str) -> Path:
     """Return a new path for the folder of a rehearsal, separate from participants' data."""
-    return _free_folder(results, f"{study}-rehearsal")
+    return _unused_folder(results, f"{study}-rehearsal")
 
 
 def kept_pilot_folder(results: Path, study: str) -> Path:
     """Return a new path for the folder of a stored pilot; each pilot has its own key and therefore its own folder."""
-    return _free_folder(results, f"{study}-pilot")
+    return _unused_folder(results, f"{study}-pilot")
 
 
-def _free_folder(results: Path, name: str) -> Path:
+def _unused_folder(results: Path, name: str) -> Path:
     """Return the first of NAME-1, NAME-2 … that does not exist."""
     number = 1
     while (folder := results / f"{name}-{number}").exists():
@@ -199,17 +199,17 @@ def _free_folder(results: Path, name: str) -> Path:
     return folder
 
 
-def check_name_and_reason(by: str, reason: str, why: str) -> tuple[str, str]:
+def check_name_and_reason(by: str, reason: str, purpose: str) -> tuple[str, str]:
     """Return a person's name and a reason as stored with the data, with single spaces.
 
     Raises
     ------
     StoreError
-        Name or reason is empty (``why`` states their purpose) or contains unprintable characters.
+        Name or reason is empty (``purpose`` states why they are required) or contains unprintable characters.
     """
     for name, text in (("by", by), ("reason", reason)):
         if not text.strip():
-            raise StoreError(f"--{name} is empty: {why}")
+            raise StoreError(f"--{name} is empty: {purpose}")
         if (letter := unprintable_character(text, "\t\n\r")) is not None:
             raise StoreError(f"--{name} contains the character U+{ord(letter):04X}, which cannot be printed: remove it")
     return " ".join(by.split()), " ".join(reason.split())

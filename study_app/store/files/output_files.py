@@ -1,7 +1,8 @@
 """Files and folders written for the user, all or none, and the list of outputs made from a study's results.
 
-A withdrawal must reach what this machine's user made from the results: ``outputs.jsonl`` of the program's data folder
-has a line for every output. Results folders hold no such list: reading them never changes them.
+A withdrawal must also reach the files that the user of this machine made from the results. ``outputs.jsonl`` in the
+program's data folder therefore has a line for every output. It is not in the results folder, which reading must not
+change.
 """
 
 import contextlib
@@ -37,7 +38,7 @@ NAME: Final = "outputs.jsonl"
 
 
 class FileCopy(NamedTuple):
-    """A file to copy in parts, since it may exceed the memory, with its expected SHA-256."""
+    """A file to copy in chunks, since it may exceed the memory, with its expected SHA-256."""
 
     source: Path
     sha256: str
@@ -47,8 +48,7 @@ def write_files(to: Path, files: Mapping[str, bytes | FileCopy]) -> tuple[Path, 
     """Write ``files`` (name → content) into the folder ``to``, which is created; replace older files.
 
     All are written under temporary names and flushed before the first is renamed, so that neither a full disk nor a
-    file that another program has open changes anything. Old temporary files of killed programs there are removed at
-    the end.
+    file that another program has open changes anything. Old temporary files of killed programs are removed at the end.
 
     Raises
     ------
@@ -60,17 +60,17 @@ def write_files(to: Path, files: Mapping[str, bytes | FileCopy]) -> tuple[Path, 
         if not (to / name).resolve().is_relative_to(to.resolve()):
             raise AnalysisError(f"{name!r} would be written outside {to}: nothing was written")
     staged = {name: temporary_path(to / name) for name in files}
-    within = sorted({folder for path in staged.values() for folder in (path.parent, *path.parent.parents)})
-    created = [folder for folder in within if folder.is_relative_to(to) and not folder.exists()]
+    folders = sorted({parent for path in staged.values() for parent in (path.parent, *path.parent.parents)})
+    created = [parent for parent in folders if parent.is_relative_to(to) and not parent.exists()]
     try:
         to.mkdir(parents=True, exist_ok=True)
-        for folder in created:
-            folder.mkdir(exist_ok=True)
+        for parent in created:
+            parent.mkdir(exist_ok=True)
         for name, content in files.items():
             if isinstance(content, FileCopy):
                 with staged[name].open("xb", buffering=0) as file:
-                    for part in _file_parts(content):
-                        write_all(file, part)
+                    for chunk in _read_chunks(content):
+                        write_all(file, chunk)
                     flush_file(file.fileno())
             else:
                 write_new_file(staged[name], content)
@@ -82,23 +82,23 @@ def write_files(to: Path, files: Mapping[str, bytes | FileCopy]) -> tuple[Path, 
         for path in staged.values():
             with contextlib.suppress(OSError):
                 path.unlink(missing_ok=True)
-        for folder in reversed(created):
+        for parent in reversed(created):
             with contextlib.suppress(OSError):
-                folder.rmdir()
+                parent.rmdir()
         if isinstance(error, AnalysisError):
             raise
-        why = "it is a file, not a folder" if to.is_file() else error.strerror or type(error).__name__
+        reason = "it is a file, not a folder" if to.is_file() else error.strerror or type(error).__name__
         raise AnalysisError(
-            f"{to} cannot be written ({why}): choose another folder with --to, free disk space, or correct the "
+            f"{to} cannot be written ({reason}): choose another folder with --to, free disk space, or correct the "
             "permissions"
         ) from error
-    for folder in {path.parent for path in staged.values()}:
-        remove_old_temporary_files(folder)
+    for parent in {path.parent for path in staged.values()}:
+        remove_old_temporary_files(parent)
     return tuple(to / name for name in files)
 
 
 def _refuse_open_file(path: Path) -> None:
-    """Raise an error for an existing file that another program has open: Windows does not rename it, even to itself."""
+    """Raise an error if another program has the file open: Windows then does not rename it, even to its own name."""
     if path.exists():
         try:
             move(path, path)
@@ -109,14 +109,14 @@ def _refuse_open_file(path: Path) -> None:
             ) from error
 
 
-def _file_parts(copied: FileCopy) -> Iterator[bytes]:
-    """Yield the content of a file to copy in parts; errors name this file, not the folder that is written."""
+def _read_chunks(copied: FileCopy) -> Iterator[bytes]:
+    """Yield the content of a file in chunks; errors name this file, not the target folder."""
     digest = hashlib.sha256()
     try:
         with open_regular(copied.source, largest_bytes=math.inf) as file:
-            while part := file.read(_CHUNK_BYTES):
-                digest.update(part)
-                yield part
+            while chunk := file.read(_CHUNK_BYTES):
+                digest.update(chunk)
+                yield chunk
     except OSError as error:
         raise AnalysisError(
             f"{copied.source} cannot be read ({system_message(error)}): nothing was written; correct its permissions, "
@@ -154,7 +154,7 @@ def write_output(
     AnalysisError
         The files cannot be written; nothing was written.
     """
-    written = write_files(to, files)
+    paths = write_files(to, files)
     at = datetime.now().astimezone().isoformat(timespec="seconds")
     line = {"study": str(study.resolve()), "to": str(to.resolve()), "at": at, "files": [*files]}
     try:
@@ -166,7 +166,7 @@ def write_output(
                 f"the output in {to} could not be added to the list of outputs ({error}), so the withdraw command "
                 "will not list it: keep a note of the folder"
             )
-    return written
+    return paths
 
 
 def outputs(study: Path) -> tuple[Output, ...]:
@@ -178,10 +178,10 @@ def outputs(study: Path) -> tuple[Output, ...]:
         lines = []
     for line in lines:
         try:
-            held = parse_json(line)
-            if held["study"] == str(study.resolve()):
-                names = tuple(map(str, held["files"]))
-                latest[held["to"], names] = Output(Path(held["to"]), str(held["at"]), names)
+            record = parse_json(line)
+            if record["study"] == str(study.resolve()):
+                names = tuple(map(str, record["files"]))
+                latest[record["to"], names] = Output(Path(record["to"]), str(record["at"]), names)
         except (ValueError, KeyError, TypeError):  # a partly written line
             continue
     return tuple(latest.values())
