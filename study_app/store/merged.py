@@ -3,13 +3,13 @@
 ::
 
     pooled/
-      sites.json      which sites there are; a folder below sites/ that it does not list does not count
+      sites.json      the list of sites; a folder below sites/ that it does not list is ignored
       sites/A/        the results folder of site A, as it was (see `store.files.folders`), with its sealed key
       sites/B/
 
-There are no merged tables on the disk: whoever reads the folder makes them from the sites, so that a withdrawal, an
-exclusion or an opened key at a site is in them at once. In them a participant is SITE-ID, such as A-P007. Neither a
-site nor an ID holds a dash, so that equal IDs of two sites are two participants.
+Merged tables are not stored. They are made from the sites whenever the folder is read, so that they reflect a
+withdrawal, an exclusion or an opened key at once. Their participants are named SITE-ID, such as A-P007. Neither a
+site's name nor an ID contains a dash, so that equal IDs at two sites are two participants.
 """
 
 import json
@@ -70,13 +70,13 @@ class Merged:
 
     def content(self) -> bytes:
         """Return the content of ``sites.json``."""
-        held = {
+        content = {
             "format": _FORMAT,
             "study": self.study,
             "protocol_hash": self.protocol_hash,
             "sites": [asdict(site) for site in self.sites],
         }
-        return f"{json.dumps(held, indent=2)}\n".encode()
+        return f"{json.dumps(content, indent=2)}\n".encode()
 
 
 def read_merged(folder: Path) -> Merged | None:
@@ -89,16 +89,16 @@ def read_merged(folder: Path) -> Merged | None:
     """
     path = folder / MANIFEST
     try:
-        held = parse_json(read_regular(path))
-        if held["format"] not in (1, _FORMAT):
-            shown = shorten_value(held["format"])
+        content = parse_json(read_regular(path))
+        if content["format"] not in (1, _FORMAT):
+            shown = shorten_value(content["format"])
             raise StoreError(
                 f"{path} has format {shown}, but this version reads only formats 1 and {_FORMAT}: install a newer "
                 "version"
             )
-        sites = tuple(Site(**site) for site in held["sites"])
-        if sites and all(map(_is_site, sites)) and is_valid_value("protocol_hash", held["protocol_hash"]):
-            merged = Merged(folder, check_study_name(held["study"]), held["protocol_hash"], sites)
+        sites = tuple(Site(**site) for site in content["sites"])
+        if sites and all(map(_is_site, sites)) and is_valid_value("protocol_hash", content["protocol_hash"]):
+            merged = Merged(folder, check_study_name(content["study"]), content["protocol_hash"], sites)
             _refuse_links(merged)
             return merged
     except (FileNotFoundError, NotADirectoryError):
@@ -111,18 +111,18 @@ def read_merged(folder: Path) -> Merged | None:
 
 
 def _is_site(site: Site) -> bool:
-    named = isinstance(site.name, str) and ID_PATTERN.fullmatch(site.name) is not None
-    typed = (
+    has_name = isinstance(site.name, str) and ID_PATTERN.fullmatch(site.name) is not None
+    has_valid_fields = (
         is_valid_value("at", site.merged_at)
         and is_valid_value("key_hash", site.key_hash)
         and isinstance(site.sessions, int)
         and isinstance(site.withdrawals, int | None)
     )
-    return named and typed
+    return has_name and has_valid_fields
 
 
 def _refuse_links(merged: Merged) -> None:
-    """Raise an error if a site's folder is a link: the files elsewhere would be read as if they were the copy."""
+    """Raise an error if a site's folder is a link to a folder outside the merged study."""
     for folder in map(merged.folder, merged.names):
         if not (real := _resolved_path(folder)).is_relative_to(_resolved_path(merged.path)):
             raise StoreError(
@@ -158,14 +158,14 @@ def locate_participant(folder: Path, participant: str) -> tuple[Path, str]:
     folders = folders_of(folder)
     if "" in folders:
         return folder, participant
-    site, dash, own = participant.partition(DASH)
-    if (place := folders.get(f"{site}{dash}")) is None or not own:
+    site, dash, local_id = participant.partition(DASH)
+    if (site_folder := folders.get(f"{site}{dash}")) is None or not local_id:
         known = ", ".join(name.removesuffix(DASH) for name in folders)
         raise StoreError(
             f"{folder} contains several sites ({known}), but {participant!r} does not include the site: specify "
             f"SITE-ID, such as {next(iter(folders))}P007"
         )
-    return place, own
+    return site_folder, local_id
 
 
 def session_in(folder: Path, participant: str, number: int) -> SessionFolder:
@@ -176,8 +176,8 @@ def session_in(folder: Path, participant: str, number: int) -> SessionFolder:
     StoreError
         The study is merged, and the ID names none of its sites.
     """
-    place, own = locate_participant(folder, participant)
-    return StudyFolder(place).session(own, number)
+    site_folder, local_id = locate_participant(folder, participant)
+    return StudyFolder(site_folder).session(local_id, number)
 
 
 def all_exclusions(folder: Path) -> tuple[Exclusion, ...]:
@@ -190,8 +190,8 @@ def all_exclusions(folder: Path) -> tuple[Exclusion, ...]:
     """
     return tuple(
         replace(row, participant=f"{prefix}{row.participant}")
-        for prefix, place in folders_of(folder).items()
-        for row in exclusions(place)
+        for prefix, site_folder in folders_of(folder).items()
+        for row in exclusions(site_folder)
     )
 
 
@@ -202,9 +202,9 @@ def sessions_in(folders: Iterable[Path]) -> tuple[SessionFolder, ...]:
 
 def merged_above(folder: Path) -> Path | None:
     """Return the merged study that contains ``folder`` as the copy of a site, or None."""
-    place = _resolved_path(folder)
-    inside = place.parent.name == FOLDER and (place.parents[1] / MANIFEST).is_file()
-    return place.parents[1] if inside else None
+    resolved = _resolved_path(folder)
+    is_copy = resolved.parent.name == FOLDER and (resolved.parents[1] / MANIFEST).is_file()
+    return resolved.parents[1] if is_copy else None
 
 
 def refuse_merged(folder: Path) -> None:

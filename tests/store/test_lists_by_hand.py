@@ -577,7 +577,7 @@ def test_sites_of_another_kind_and_sessions_of_two_sites_are_not_merged(changed:
         SimpleNamespace(name="south", **south),
     )
     with pytest.raises(StoreError, match=f"^{escape(sentence)}") if sentence else nullcontext():
-        merge._check_alike(sources, "c" * 64)
+        merge._check_same_protocol(sources, "c" * 64)
         merge._check_sessions(sources)
 
 

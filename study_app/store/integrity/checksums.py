@@ -1,9 +1,9 @@
 """The proofs that a session has not changed since its end: ``checksums.sha256`` and the study's list of fingerprints.
 
 ``checksums.sha256`` has the SHA-256 of every file at the session's end, in the format of ``sha256sum -c``. The
-fingerprint of a session is the beginning of a SHA-256 over its checksums, but for those of its tables, which are made
-from the journal and compared with it by `verify`. Each study's ``fingerprints.txt`` has a line for every session that
-ended; a copy of it that is kept elsewhere proves that none of them was changed, added or removed since.
+fingerprint of a session is the beginning of a SHA-256 of its checksums without those of its tables, which `verify`
+compares with the journal. Each study's ``fingerprints.txt`` has a line for every session that ended. A copy of it that
+is kept elsewhere proves that no session was changed, added or removed since.
 """
 
 import base64
@@ -30,12 +30,12 @@ from study_app.store.files.folders import REBUILT, SessionFolder, StudyFolder
 from study_app.store.journals.journal_events import Event, Recorded
 
 _LINE = re.compile(r"([0-9a-f]{64})  (.+)")
-_OWN = re.compile(
+_SESSION_FILE = re.compile(
     r"journal\.jsonl|journal-torn-\d+\.txt|receipt\.json|checksums\.sha256|rebuilt\.txt|crash\.txt|"
     r"subject-[A-Za-z0-9]+_session-\d\d_task-[a-z0-9]+_description-[a-z]+_data\.csv|"
     r"trial-\d{3,}(_attempt-\d+)?(_interval-\d+)?(_frames)?\.\w+"
 )
-_SYSTEM = (
+_SYSTEM_FILE = (
     r"desktop\.ini|(?:eh)?thumbs(?:_vista)?\.db(?::.*)?|folder\.jpg|icon\r|~\$.*|~syncthing~.*|~wr[a-z]\d+\.tmp|"
     r".*\(.*conflicted copy.*\).*|.*(?-i:-(?:DESKTOP|LAPTOP)-[A-Z0-9]{4,12})(?:-\d+)?\..*|@eaDir|__MACOSX|"
     r"\$RECYCLE\.BIN|System Volume Information|lost\+found|"
@@ -43,8 +43,8 @@ _SYSTEM = (
     r"(?:\.(?:jsonl|json|sha256|txt|csv|parquet)(?:~|\.bak)|(?:[ (\[~-]|_conflict|\.sync-conflict-).*"
     r"\.(?:jsonl|json|sha256|txt|csv|parquet))"
 )
-"""Files of Windows, macOS, Office and programs that share files, and copies of a session's own files, such as "journal
-(1).jsonl" or "receipt-HOST.json"; hidden files besides."""
+"""Files of Windows, macOS, Office and file-sharing programs, and copies of a session's own files, such as
+"journal (1).jsonl" or "receipt-HOST.json". Hidden files are matched separately."""
 _FINGERPRINT = re.compile(
     r"([a-z2-7]{4}-[a-z2-7]{4}-[a-z2-7]{4})(?:-([a-z2-7]{2}))?\s+((?:sites/[A-Za-z0-9]{1,32}/)?"
     r"(?:data/sub-[A-Za-z0-9]{1,32}/ses-[0-9]{2}|"
@@ -64,23 +64,23 @@ def write_checksums(session: SessionFolder) -> dict[str, str]:
 def renew_checksums(session: SessionFolder, rewritten: Collection[Path]) -> bool:
     """Update the list for the ``rewritten`` files; return whether it changed.
 
-    Other entries stay, so that the list only covers files as they were when the session ended; a missing or invalid
-    list is recreated. Every change is noted in ``rebuilt.txt``, which is also listed.
+    Other entries stay, so that they still prove the files at the session's end. A missing or invalid list is recreated.
+    Every change is noted in ``rebuilt.txt``, which is listed as well.
     """
     try:
         listed = read_checksums(session)
     except StoreError:
-        gone = "was damaged" if session.checksums.exists() else "was missing"
-        note_rebuilt(session, f"the list of checksums {gone} and has been recreated from the existing files")
+        state = "was damaged" if session.checksums.exists() else "was missing"
+        note_rebuilt(session, f"the list of checksums {state} and has been recreated from the existing files")
         write_checksums(session)
         return True
-    ours = [path.relative_to(session.path).as_posix() for path in rewritten if path.is_relative_to(session.path)]
-    if not (changed := [name for name in ours if file_hash(session, name) != listed.get(name)]):
+    names = [path.relative_to(session.path).as_posix() for path in rewritten if path.is_relative_to(session.path)]
+    if not (changed := [name for name in names if file_hash(session, name) != listed.get(name)]):
         return False
     if others := [name for name in changed if name != REBUILT]:
         note_rebuilt(session, f"different checksums were listed for {', '.join(others)}")
     write_file(
-        session.checksums, checksum_bytes(listed | {name: file_hash(session, name) for name in (*ours, REBUILT)})
+        session.checksums, checksum_bytes(listed | {name: file_hash(session, name) for name in (*names, REBUILT)})
     )
     return True
 
@@ -97,10 +97,10 @@ def replace_checksums(session: SessionFolder, changes: Mapping[str, tuple[str, s
         write_file(session.checksums, checksum_bytes(listed | new))
 
 
-def note_rebuilt(session: SessionFolder, what: str) -> None:
+def note_rebuilt(session: SessionFolder, text: str) -> None:
     """Record permanently which proofs `rebuild` recreated, since these prove nothing about earlier changes."""
     at = datetime.now().astimezone().isoformat(timespec="seconds")
-    line = f"{at} liquid-study {study_app.__version__} rebuild: {what}\n"
+    line = f"{at} liquid-study {study_app.__version__} rebuild: {text}\n"
     append_line(session.rebuilt, line.encode("utf-8", "replace"))
 
 
@@ -129,9 +129,9 @@ def read_checksums(session: SessionFolder) -> dict[str, str]:
 
 
 def session_files(session: SessionFolder) -> tuple[str, ...]:
-    """Return the paths of the session's files in its folder, without the list itself, crash traces and system files."""
-    left_out = {session.checksums.name, session.crash.name}
-    return tuple(name.as_posix() for name in _paths(session) if name.name not in left_out and not is_system_file(name))
+    """Return the paths of the session's files in its folder; the list, crash traces and system files are omitted."""
+    excluded = {session.checksums.name, session.crash.name}
+    return tuple(name.as_posix() for name in _paths(session) if name.name not in excluded and not is_system_file(name))
 
 
 def system_files(session: SessionFolder) -> tuple[str, ...]:
@@ -150,9 +150,9 @@ def _is_hidden(name: Path) -> bool:
 
 def is_system_file(name: Path) -> bool:
     """Return whether a relative path belongs to the operating system or to a file-sharing program."""
-    if _OWN.fullmatch(name.name) and len(name.parts) <= 2:
+    if _SESSION_FILE.fullmatch(name.name) and len(name.parts) <= 2:
         return False
-    return _is_hidden(name) or any(re.fullmatch(_SYSTEM, part, re.IGNORECASE) for part in name.parts)
+    return _is_hidden(name) or any(re.fullmatch(_SYSTEM_FILE, part, re.IGNORECASE) for part in name.parts)
 
 
 def sha256(path: Path) -> str:
@@ -173,8 +173,8 @@ def sha256(path: Path) -> str:
 def fingerprint(sums: Mapping[str, str], lines: Iterable[Event]) -> str:
     """Return the fingerprint of a session from its ``lines`` and the SHA-256 of its files by path.
 
-    It is 60 bits of the SHA-256 of their list in base32, without tables and the note of `rebuild`. Sealed recordings
-    are left out, since the journal has their SHA-256 before and after opening.
+    It is 60 bits, in base32, of the SHA-256 of the list of checksums. The list omits tables, the note of `rebuild`, and
+    sealed recordings, since the journal has their SHA-256 before and after opening.
     """
     sealed = {
         name
@@ -219,18 +219,18 @@ def place_of(study: StudyFolder, session: SessionFolder) -> str:
 
 def read_list(path: Path) -> Proofs:
     """Return fingerprint and session of each valid line of a list; empty if there is no list."""
-    return tuple((match[1], match[3]) for _, match in _matches(_list_text(path)) if match is not None)
+    return tuple((match[1], match[3]) for _, match in _match_lines(_list_text(path)) if match is not None)
 
 
 def unreadable_lines(path: Path) -> tuple[int, ...]:
     """Return the numbers of the lines of a list that are not fingerprints."""
-    return tuple(number for number, match in _matches(_list_text(path)) if match is None)
+    return tuple(number for number, match in _match_lines(_list_text(path)) if match is None)
 
 
 def parse_copy(path: Path, text: str) -> Proofs:
     """Return the fingerprint and the session or record in each line of a copy; raise StoreError for other lines."""
     proofs: list[tuple[str, str]] = []
-    for number, match in _matches(text):
+    for number, match in _match_lines(text):
         if match is None:
             raise StoreError(
                 f"{path}, line {number} is not a fingerprint: a line must look like 'k3vq-7m2p-xw4d  "
@@ -250,7 +250,8 @@ def _list_text(path: Path) -> str:
     return (read_if_there(path) or b"").decode("utf-8-sig", "replace")
 
 
-def _matches(text: str) -> Iterator[tuple[int, re.Match[str] | None]]:
+def _match_lines(text: str) -> Iterator[tuple[int, re.Match[str] | None]]:
+    """Yield number and fingerprint match of every line that is not blank; None for a line that does not match."""
     for number, line in enumerate(text.splitlines(), start=1):
         if line.strip():
             yield number, _FINGERPRINT.fullmatch(line.lower() if line.isupper() else line)

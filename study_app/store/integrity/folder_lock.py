@@ -1,8 +1,8 @@
 """Folder locks: a marker in a folder while a program writes there, so that no other program does.
 
-Every opening has a marker with a unique name, which contains machine, process and start of the process; so the marker
-of a killed program differs from that of a running one, and can be removed without affecting a newer one. A program
-writes its marker first and then searches for others: of two simultaneous programs at most one continues.
+Every lock has a marker with a unique name, which contains the machine, the process and its start time. The marker of a
+killed program therefore differs from that of a running one, and can be removed without affecting a newer one. A program
+writes its marker first and then searches for others, so that of two simultaneous programs at most one continues.
 
 A session that was claimed and never begun, because its program ended before the journal's first line, contains no data:
 its number is free again. A program that takes it over locks it first. A program that ends while it claims or releases
@@ -39,14 +39,14 @@ from study_app.store.integrity.checksums import is_system_file
 from study_app.store.journals import journal
 
 _MARKER = re.compile(r"\.open-[0-9a-f]{8}\.json")
-_SAME_S = 0.05  # processes with the same ID that began within this time are the same process
-_BEFORE_THE_FIRST_LINE = ("receipt.json", "journal.jsonl")
-_NO_PROGRAM_TAKES_S = 3600.0  # time in which a program marks a folder that it created, or removes it
+_START_TOLERANCE_S = 0.05  # processes with the same ID that began within this time are the same process
+_INITIAL_FILES = ("receipt.json", "journal.jsonl")
+_MAX_CLAIM_S = 3600.0  # time in which a program marks a folder that it created, or removes it
 
 
 @dataclass(frozen=True, slots=True)
-class Opening:
-    """A folder locked by this program until ``release`` or the end of a ``with`` block; a fork does not release it."""
+class FolderLock:
+    """A lock on a folder until ``release`` or the end of a ``with`` block; a forked process does not release it."""
 
     marker: Path
     process: int = field(default_factory=os.getpid)
@@ -58,14 +58,14 @@ class Opening:
         self.release()
 
     def release(self) -> None:
-        """Remove the marker; one that cannot be removed is ignored once this program has ended."""
+        """Remove the marker; if that fails, other programs ignore it once this program has ended."""
         if self.process != os.getpid():
             return
         with contextlib.suppress(OSError):
             self.marker.unlink(missing_ok=True)
 
 
-def lock_folder(folder: Path) -> Opening:
+def lock_folder(folder: Path) -> FolderLock:
     """Mark ``folder`` as open in this program.
 
     Raises
@@ -73,36 +73,36 @@ def lock_folder(folder: Path) -> Opening:
     StoreError
         Another program has it open, or the marker cannot be written. Nothing is left behind.
     """
-    opening = Opening(folder / f".open-{secrets.token_hex(4)}.json")
+    lock = FolderLock(folder / f".open-{secrets.token_hex(4)}.json")
     try:
-        write_file(opening.marker, json.dumps(_this_program()).encode())
+        write_file(lock.marker, json.dumps(_this_program()).encode())
         for marker in markers(folder):
-            if marker != opening.marker:
+            if marker != lock.marker:
                 if _may_be_running(holder := _holder(marker)):
-                    raise _open_elsewhere(marker, holder)
+                    raise _locked_error(marker, holder)
                 marker.unlink(missing_ok=True)
         sync_folder(folder)
     except OSError as error:
-        opening.release()
+        lock.release()
         raise cannot_write(folder, error) from error
     except StoreError:
-        opening.release()
+        lock.release()
         raise
-    return opening
+    return lock
 
 
-def create_locked_folder(folder: Path) -> Opening | None:
+def create_locked_folder(folder: Path) -> FolderLock | None:
     """Create ``folder``, locked by this program from the start; return None if it exists and is not empty."""
-    opening = Opening(folder / f".open-{secrets.token_hex(4)}.json")
+    lock = FolderLock(folder / f".open-{secrets.token_hex(4)}.json")
     try:
-        created = create_folder(folder, {opening.marker.name: json.dumps(_this_program()).encode()})
+        created = create_folder(folder, {lock.marker.name: json.dumps(_this_program()).encode()})
     except StoreError:
-        if is_there(opening.marker):  # created, but not flushed to the disk
+        if is_there(lock.marker):  # created, but not flushed to the disk
             shutil.rmtree(folder, ignore_errors=True)
         elif is_there(folder):
             return None
         raise
-    return opening if created else None
+    return lock if created else None
 
 
 def markers(folder: Path) -> tuple[Path, ...]:
@@ -120,13 +120,13 @@ def refuse_if_open(folder: Path) -> None:
     for marker in markers(folder):
         holder = _holder(marker)
         if _may_be_running(holder):
-            raise _open_elsewhere(marker, holder)
+            raise _locked_error(marker, holder)
 
 
 def is_never_begun(path: Path) -> bool:
-    """Return whether the session folder ``path`` exists without a line in its journal or any file written later.
+    """Return whether the session folder ``path`` exists, but contains no journal line and no file written after it.
 
-    A receipt with the session's end or a resumption is a later file.
+    A receipt that records the session's end or a resumption counts as written later.
 
     Raises
     ------
@@ -136,20 +136,20 @@ def is_never_begun(path: Path) -> bool:
     if not is_there(path):
         return False
     try:
-        early = {path / name for name in _BEFORE_THE_FIRST_LINE}
+        initial_files = {path / name for name in _INITIAL_FILES}
         files = {entry for entry in path.iterdir() if not is_system_file(Path(entry.name))}
-        if files - early - {*markers(path), *temporary_files(path)}:
+        if files - initial_files - {*markers(path), *temporary_files(path)}:
             return False
     except OSError as error:
         raise cannot_read(path, error) from error
     with contextlib.suppress(StoreError):
-        held = receipt.read(path / "receipt.json")
-        if held.get("status") != receipt.UNFINISHED or held.get("resumed"):
+        session_receipt = receipt.read(path / "receipt.json")
+        if session_receipt.get("status") != receipt.UNFINISHED or session_receipt.get("resumed"):
             return False
-    first = path / "journal.jsonl"
-    if not is_there(first):
+    journal_path = path / "journal.jsonl"
+    if not is_there(journal_path):
         return True
-    contents = journal.scan(first)
+    contents = journal.scan(journal_path)
     return not contents.lines and contents.damage is None
 
 
@@ -158,40 +158,41 @@ def is_abandoned(path: Path) -> bool:
     return is_never_begun(path) and not is_open(path)
 
 
-def take_over_folder(path: Path) -> Opening | None:
+def take_over_folder(path: Path) -> FolderLock | None:
     """Lock and empty the session folder ``path``; return None if it was begun or another program has it open."""
     if not is_abandoned(path):
         return None
-    opening = lock_folder(path)
+    lock = lock_folder(path)
     try:
         if not is_never_begun(path):
-            opening.release()
+            lock.release()
             return None
         remove_temporary_files(path)
-        for name in _BEFORE_THE_FIRST_LINE:
+        for name in _INITIAL_FILES:
             (path / name).unlink(missing_ok=True)
     except OSError as error:
-        opening.release()
+        lock.release()
         raise cannot_write(path, error) from error
     except StoreError:
-        opening.release()
+        lock.release()
         raise
-    return opening
+    return lock
 
 
 def remove_abandoned_claims(participant: Path) -> None:
-    """Remove what ended programs left in a participant's folder while they claimed or released a session.
+    """Remove the temporary folders of programs that ended while they claimed or released a participant's session.
 
     Without a marker the owner is unknown; then only folders older than any such operation are removed.
     """
-    for half in temporary_files(participant):
+    for folder in temporary_files(participant):
         with contextlib.suppress(OSError):  # it was begun or removed in the meantime
-            old = time.time() - half.stat().st_mtime > _NO_PROGRAM_TAKES_S
-            if half.is_dir() and (old or markers(half)) and not is_open(half):  # in this order: markers come
-                shutil.rmtree(half, ignore_errors=True)
+            is_old = time.time() - folder.stat().st_mtime > _MAX_CLAIM_S
+            # is_open comes last, because a marker may appear between the checks.
+            if folder.is_dir() and (is_old or markers(folder)) and not is_open(folder):
+                shutil.rmtree(folder, ignore_errors=True)
 
 
-def _open_elsewhere(marker: Path, holder: dict[str, Any]) -> StoreError:
+def _locked_error(marker: Path, holder: dict[str, Any]) -> StoreError:
     return StoreError(
         f"{marker.parent} is open in another program (process {holder.get('pid')} on {holder.get('host')}, since "
         f"{holder.get('at')}): wait for it, or close it there; if that program is no longer running, delete {marker}"
@@ -226,7 +227,7 @@ def _may_be_running(holder: dict[str, Any]) -> bool:
         return True
     try:
         began = process_start_s(holder["pid"])
-        return began is not None and abs(began - float(holder["began"])) < _SAME_S
+        return began is not None and abs(began - float(holder["began"])) < _START_TOLERANCE_S
     except (PermissionError, KeyError, TypeError, ValueError):  # a process with this ID runs, but may be another one
         return True
 

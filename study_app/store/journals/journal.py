@@ -1,12 +1,13 @@
-"""The journal, the primary record of a session: one event per line, each answer on the disk before its effects.
+"""The journal, the primary record of a session: one event per line, each answer flushed before it has effects.
 
 Every line is a self-describing JSON object: ``n`` counts from 1 without a gap, ``event`` is its name, ``t_s`` the
 seconds since the session's clock origin, ``at`` the same moment as wall time, ``previous`` the SHA-256 of all bytes of
 the file before the line. All tables are derived from these lines alone. Journals of format 1 have no ``previous``;
-if a later version resumed one, its lines have it from ``session_resumed`` on. A line is complete when its newline is on
-the disk; a program killed while writing leaves at most one incomplete line at the end, which readers skip and count;
-any other invalid line is damage. Lines not waited for are flushed in the background, in order: a power cut may lose the
-last of them, but none that was waited for and none before it.
+if a later version resumed one, its lines have it from ``session_resumed`` on.
+
+A line is complete when its newline is on the disk. A program killed while writing leaves at most one incomplete line at
+the end, which readers skip and count. Any other invalid line is damage. Lines appended without waiting are flushed in
+the background, in order: a power cut may lose the last of them, but no line that was waited for and none before it.
 """
 
 from __future__ import annotations
@@ -42,23 +43,23 @@ from study_app.store.files.atomic import (
 from study_app.store.journals.journal_events import EVENTS, Event, line_problem, read_event, shorten_value
 
 FORMAT = 2
+"""Format of the journal and the receipt; lines have ``previous`` since format 2."""
 _OTHER_LINE_ENDINGS = (
     "its line endings have been changed to CR LF, as git does with core.autocrlf: restore it from a backup, with the "
     "line “* -text” in the repository's .gitattributes"
 )
-"""Of the journal and the receipt; since 2 the lines have ``previous``."""
 _BYTE_ORDER_MARK = "begins with a byte order mark, which an editor added: restore it from a backup"
 RETRY_S = 1.0
 """Time after which the background thread repeats a failed flush [s]."""
 
 
-def as_written(content: bytes) -> bytes:
-    """Return the content of a text file in this program's notation, with LF and without a byte order mark."""
+def normalized_text(content: bytes) -> bytes:
+    """Return the content of a text file with LF line endings and without a byte order mark."""
     return without_byte_order_mark(content).replace(b"\r\n", b"\n")
 
 
-def notation_change(content: bytes) -> str:
-    """Return a phrase on how the notation of a file differs from `as_written`."""
+def notation_problem(content: bytes) -> str:
+    """Return a phrase that says how a file differs from its `normalized_text`."""
     return _OTHER_LINE_ENDINGS if b"\r\n" in content else _BYTE_ORDER_MARK
 
 
@@ -102,9 +103,9 @@ class Contents:
     """The contents of a journal: its complete lines, where they end, and any damage after them.
 
     ``torn_bytes`` counts the bytes after the last newline: an incomplete line of a program that was killed while
-    writing. ``damage`` is a sentence about anything worse (a broken line, a missing or duplicate number, a field of the
-    wrong type, a line whose predecessors were changed), else None. Every line of ``lines`` has valid fields for its
-    event and is unchanged. ``hash`` is the SHA-256 of the complete lines, with which the next line continues.
+    writing. ``damage`` is a sentence on any other damage (a broken line, a missing or duplicate number, a field of the
+    wrong type, a line whose predecessors were changed), or None. Every line in ``lines`` has valid fields for its
+    event and is unchanged. ``hash`` is the SHA-256 of the complete lines, which the next line stores.
     """
 
     lines: list[Event]
@@ -145,63 +146,63 @@ def read_complete(path: Path) -> Contents:
 def scan(path: Path) -> Contents:
     """Read the journal's complete lines, check each against its event and the lines before, and report any damage."""
     content = read_own(path, study_root(path))
-    *pieces, tail = content.split(b"\n")
+    *raw_lines, tail = content.split(b"\n")
     lines: list[Event] = []
     whole_bytes = 0
-    hashed = hashlib.sha256()
+    running_hash = hashlib.sha256()
     chained = False
-    version: Any = None  # that wrote the lines
-    for number, piece in enumerate(pieces, start=1):
+    version: Any = None  # of the program that wrote the current line
+    for number, raw_line in enumerate(raw_lines, start=1):
         try:
-            line = parse_json(piece)
+            line = parse_json(raw_line)
         except ValueError:
             line = None
         if not isinstance(line, dict):
             return Contents(lines, whole_bytes, damage=f"{path}, line {number} is damaged: restore it from a backup")
         if line.get("n") != number:
-            shown = shorten_value(line.get("n"))
-            damage = f"{path}, line {number} has n {shown}; lines are missing or duplicated: restore it from a backup"
+            found = shorten_value(line.get("n"))
+            damage = f"{path}, line {number} has n {found}; lines are missing or duplicated: restore it from a backup"
             return Contents(lines, whole_bytes, damage=damage)
         version = line.get("version", version)
-        wrong = line_problem(line)
-        if wrong is None and version == study_app.__version__ and line["event"] not in EVENTS:
-            wrong = f"contains the event {shorten_value(line['event'])}, which version {version} does not write"
-        if wrong is not None:
-            damage = f"{path}, line {number} {wrong}: it has been changed; restore the journal from a backup"
+        problem = line_problem(line)
+        if problem is None and version == study_app.__version__ and line["event"] not in EVENTS:
+            problem = f"contains the event {shorten_value(line['event'])}, which version {version} does not write"
+        if problem is not None:
+            damage = f"{path}, line {number} {problem}: it has been changed; restore the journal from a backup"
             return Contents(lines, whole_bytes, damage=damage)
-        if (wrong := _chain_error(line, hashed.hexdigest(), chained=chained)) is not None:
-            first = pieces[0] + b"\n"
-            if first != as_written(first):
-                return Contents(lines[:-1], whole_bytes, damage=f"{path}, line 1: {notation_change(first)}")
-            return Contents(lines[:-1], whole_bytes, damage=f"{path}, line {number} {wrong}")
+        if (problem := _chain_error(line, running_hash.hexdigest(), chained=chained)) is not None:
+            first = raw_lines[0] + b"\n"
+            if first != normalized_text(first):
+                return Contents(lines[:-1], whole_bytes, damage=f"{path}, line 1: {notation_problem(first)}")
+            return Contents(lines[:-1], whole_bytes, damage=f"{path}, line {number} {problem}")
         lines.append(read_event(line))
-        whole_bytes += len(piece) + 1
-        hashed.update(piece + b"\n")
+        whole_bytes += len(raw_line) + 1
+        running_hash.update(raw_line + b"\n")
         chained = "previous" in line
-    return Contents(lines, whole_bytes, torn_bytes=len(tail), hash=hashed)
+    return Contents(lines, whole_bytes, torn_bytes=len(tail), hash=running_hash)
 
 
-def _chain_error(line: Mapping[str, Any], before: str, *, chained: bool) -> str | None:
-    """Return how a line contradicts the previous lines, whose SHA-256 is ``before``; None if it does not.
+def _chain_error(line: Mapping[str, Any], expected_hash: str, *, chained: bool) -> str | None:
+    """Return how a line contradicts the previous lines, whose SHA-256 is ``expected_hash``; None if it does not.
 
     ``chained`` tells whether the previous line has ``previous``: then this one must have it. The first line of a
     journal has it since format 2; a journal of format 1 gets it where it was resumed by a later version.
     """
-    first, hash_before = line["n"] == 1, line.get("previous")
-    if first and line.get("format", 1) > FORMAT:
+    is_first, hash_before = line["n"] == 1, line.get("previous")
+    if is_first and line.get("format", 1) > FORMAT:
         return f"has format {line['format']}, but this version reads formats up to {FORMAT}: install a newer version"
-    if first and "format" not in line and "measures_sealed" in line:  # not of a version with format 1
+    if is_first and "format" not in line and "measures_sealed" in line:  # not of a version with format 1
         return "does not contain the key “format”: it has been changed; restore the journal from a backup"
     if hash_before is None:
-        needed = chained or (first and line.get("format", 1) > 1)
+        is_required = chained or (is_first and line.get("format", 1) > 1)
         return (
             "does not contain the key “previous”: it has been changed; restore the journal from a backup"
-            if needed
+            if is_required
             else None
         )
-    if hash_before != before:
+    if hash_before != expected_hash:
         return "does not match the previous line, which has been changed: restore the journal from a backup"
-    if not (chained or first or line["event"] == "session_resumed"):
+    if not (chained or is_first or line["event"] == "session_resumed"):
         return "has the key “previous” but earlier lines do not: they were changed; restore the journal from a backup"
     return None
 
@@ -222,11 +223,11 @@ def line_bytes(line: Mapping[str, Any]) -> bytes:
 
 
 class Journal:
-    """An open journal: one thread appends, and another flushes the lines that are not waited for.
+    """An open journal: one thread appends, and another flushes the lines that were appended without waiting.
 
-    After a failed write or flush the lines that may not be on the disk are written again before the next line, which
-    waits for the disk: the system may have dropped data that it could not flush. The background thread repeats a failed
-    flush every `RETRY_S`; until it succeeds, `check_flushed` raises.
+    After a failed write or flush the system may have dropped data. The lines that may not be on the disk are therefore
+    written again before the next line, which waits for the disk. The background thread repeats a failed flush every
+    `RETRY_S`; until it succeeds, `check_flushed` raises.
     """
 
     def __init__(self, path: Path, file: BinaryIO, clock: SessionClock) -> None:
@@ -282,8 +283,8 @@ class Journal:
         try:
             if contents.torn_bytes:
                 content = path.read_bytes()
-                beside = (path.with_name(f"{path.stem}-torn-{number}.txt") for number in count(1))
-                write_file(next(name for name in beside if not name.exists()), content[contents.whole_bytes :])
+                backups = (path.with_name(f"{path.stem}-torn-{number}.txt") for number in count(1))
+                write_file(next(name for name in backups if not name.exists()), content[contents.whole_bytes :])
                 write_file(path, content[: contents.whole_bytes])
             file = path.open("r+b", buffering=0)
             if file.seek(0, os.SEEK_END) != contents.whole_bytes:
@@ -299,20 +300,20 @@ class Journal:
         return journal
 
     def append(self, event: Event, *, t_s: float | None = None, waits: bool = True) -> Event:
-        """Write one line and wait for the disk; return the event as it will be read.
+        """Write one line and wait for the disk; return the event as `read` will return it.
 
-        Without ``waits`` it returns when the system has the line, and the line is flushed in the background. ``t_s`` is
-        the time of the event, by default now. Infinite and undefined numbers become null, and numpy numbers plain
-        numbers.
+        Without ``waits`` it returns as soon as the operating system has the line, which is flushed in the background.
+        ``t_s`` is the time of the event, by default now. Infinite and undefined numbers become null, and numpy numbers
+        plain numbers.
 
         Raises
         ------
         StoreError
-            The line was not written (the disk failed, or a reader would call it damaged), or is not on the disk though
-            it was waited for, or a line before it could not be flushed; the journal ends with the line before it and
-            can be appended to again.
+            The line was not written (the disk failed, or a reader would call it damaged), it did not reach the disk
+            with ``waits``, or a line before it could not be flushed. The journal ends with the line before it and can
+            be appended to again.
         """
-        if self.is_of_another_process:
+        if self.is_forked:
             raise StoreError(
                 f"{self.path} is being written by process {self._process}: a fork of that process cannot write to it"
             )
@@ -321,26 +322,26 @@ class Journal:
                 f"{self.path} is closed: {event.event!r} occurred after the end of the session and was not recorded"
             )
         line = line_of(event, self._lines + 1, self.clock, t_s, previous=self._hash.hexdigest())
-        if (wrong := line_problem(line)) is not None:
+        if (problem := line_problem(line)) is not None:
             raise StoreError(
-                f"{self.path}, line {line['n']} {wrong}: the line was not written; report this to the developers"
+                f"{self.path}, line {line['n']} {problem}: the line was not written; report this to the developers"
             )
         content = line_bytes(line)
-        self._refuse_if_replaced()
+        self._check_not_replaced()
         try:
             waits = self._write(content) or waits
             if waits:
-                self._flush_or_take_back(content)
+                self._flush_or_remove(content)
         except OSError as error:
             raise cannot_write(self.path, error) from error
         self._lines += 1
         self._hash.update(content)
         if not waits:
-            self._flush_later()
+            self._schedule_flush()
         return read_event(line)
 
     def check_flushed(self) -> None:
-        """Raise if lines that were not waited for could not be flushed, and are still not on the disk.
+        """Raise an error if lines appended without waiting could not be flushed and are still not on the disk.
 
         Raises
         ------
@@ -356,7 +357,7 @@ class Journal:
         return self.file.closed
 
     @property
-    def is_of_another_process(self) -> bool:
+    def is_forked(self) -> bool:
         """Whether this is a fork of the process that opened it."""
         return os.getpid() != self._process
 
@@ -368,7 +369,7 @@ class Journal:
         StoreError
             The last lines could not be flushed; the file is closed nevertheless.
         """
-        if self.is_of_another_process:  # a fork has no such thread, and a lock may never be released
+        if self.is_forked:  # a fork has no such thread, and a lock may never be released
             return
         with self._changed:
             self._closing = True
@@ -392,7 +393,7 @@ class Journal:
     ) -> None:
         self.close()
 
-    def _refuse_if_replaced(self) -> None:
+    def _check_not_replaced(self) -> None:
         """Raise an error if the journal's path now names another file, or another program has written to the file."""
         torn = self._torn  # after a torn write the file may be longer
         try:
@@ -412,7 +413,7 @@ class Journal:
     def _write(self, content: bytes) -> bool:
         """Write a line after the last complete one; return whether an earlier failure requires waiting for the disk."""
         with self._changed:
-            failed = self._torn
+            had_failed = self._torn
             try:
                 if self._torn:
                     self._remove_torn_line()
@@ -425,9 +426,9 @@ class Journal:
             self._torn = False
             self._unflushed += content
             self._size += len(content)
-        return failed
+        return had_failed
 
-    def _flush_or_take_back(self, content: bytes) -> None:
+    def _flush_or_remove(self, content: bytes) -> None:
         """Wait until the line just written is on the disk; remove it if that fails."""
         with self.flushing:
             try:
@@ -447,8 +448,8 @@ class Journal:
             with self._changed:
                 if self._torn:
                     self._remove_torn_line()
-                waiting = len(self._unflushed)
-            if waiting:
+                unflushed = len(self._unflushed)
+            if unflushed:
                 try:
                     flush_file(self.file.fileno())
                 except OSError:
@@ -456,19 +457,19 @@ class Journal:
                         self._torn = True
                     raise
             with self._changed:
-                del self._unflushed[:waiting]
+                del self._unflushed[:unflushed]
                 self._failed = None
 
-    def _flush_later(self) -> None:
+    def _schedule_flush(self) -> None:
         with self._changed:
             self._due = True
             if self._thread is None:
-                self._thread = threading.Thread(target=self._flush_behind, name="journal", daemon=True)
+                self._thread = threading.Thread(target=self._flush_in_background, name="journal", daemon=True)
                 self._thread.start()
             self._changed.notify_all()
 
-    def _flush_behind(self) -> None:
-        """Flush lines that are not waited for, and again after a failure; runs in the journal's thread."""
+    def _flush_in_background(self) -> None:
+        """Flush lines that were appended without waiting, and retry after a failure; runs in the journal's thread."""
         while True:
             with self._changed:
                 self._changed.wait_for(lambda: self._due or self._closing, RETRY_S if self._failed else None)

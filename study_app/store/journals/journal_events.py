@@ -19,7 +19,7 @@ from study_app.protocol.questions import STATEMENT
 from study_app.store.files.columns import DELIVERED, TRIALS
 from study_app.store.files.folders import PARTICIPANT_ID, RECORDING_NAME, STUDY_NAME
 
-_SHOWN = 200  # greatest number of characters of a bad value shown in messages
+_MAX_SHOWN = 200  # greatest number of characters of a bad value shown in messages
 
 CAUSE_WITHHELD = "the session was stopped"
 """Text of `Broke` for a failed device or video in a study with videos: the cause would reveal the condition."""
@@ -36,8 +36,8 @@ _MAY_BE_NULL = (
     "level", "standard", "part", "value", "answer", "onset_s", "first_s", "last_s", "gap_s", "device",
     "t_task_s", "scene",
 )  # fmt: skip
-_OF_ALL = ("n", "t_s", "at", "previous")
-_RESPONSE = ("item", "number", "kind", "value", "onset_s", "first_s", "last_s", "changes")
+_COMMON_FIELDS = ("n", "t_s", "at", "previous")
+_RESPONSE_FIELDS = ("item", "number", "kind", "value", "onset_s", "first_s", "last_s", "changes")
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,24 +77,24 @@ def _are_answers(value: object) -> bool:
         isinstance(answer, dict)
         and all(
             name in answer and is_valid_value(_kind_name(answer, name), answer[name])
-            for name in _RESPONSE
+            for name in _RESPONSE_FIELDS
             if name != "kind"
         )
         for answer in value
     )
 
 
-def _text_like(what: str, pattern: re.Pattern[str]) -> Kind:
+def _text_matching(description: str, pattern: re.Pattern[str]) -> Kind:
     def matches(value: object) -> bool:
         return isinstance(value, str) and pattern.fullmatch(value) is not None
 
-    return Kind(what, matches, "string", {"pattern": f"^({pattern.pattern})$"})
+    return Kind(description, matches, "string", {"pattern": f"^({pattern.pattern})$"})
 
 
 Text: TypeAlias = Annotated[str, Kind("text", lambda value: isinstance(value, str), "string")]
-_StudyName: TypeAlias = Annotated[str, _text_like("study's name", STUDY_NAME)]
-_ParticipantId: TypeAlias = Annotated[str, _text_like("participant's id", PARTICIPANT_ID)]
-_RecordingName: TypeAlias = Annotated[str, _text_like("recording's name", RECORDING_NAME)]
+_StudyName: TypeAlias = Annotated[str, _text_matching("study's name", STUDY_NAME)]
+_ParticipantId: TypeAlias = Annotated[str, _text_matching("participant's id", PARTICIPANT_ID)]
+_RecordingName: TypeAlias = Annotated[str, _text_matching("recording's name", RECORDING_NAME)]
 _Flag: TypeAlias = Annotated[bool, Kind("flag", lambda value: isinstance(value, bool), "boolean")]
 _Integer: TypeAlias = Annotated[int, Kind("integer", _is_integer, "integer")]
 Number: TypeAlias = Annotated[float, Kind("number", _is_number, "number")]
@@ -152,7 +152,7 @@ Which: TypeAlias = tuple[int, int, int | None]
 class Answer:
     """The answer to a question so far; times are seconds on the session's clock, None before the event.
 
-    ``value`` None after the first choice means "cannot judge"; ``last_s`` is the time of the last change, ``changes``
+    After the first choice, ``value`` is None for "cannot judge". ``last_s`` is the time of the last change, ``changes``
     the number of changes after the first choice.
     """
 
@@ -194,7 +194,7 @@ class Response(Answer):
 
     def fields(self) -> dict[str, Any]:
         """Return the response as written in a line."""
-        return {name: getattr(self, name) for name in _RESPONSE}
+        return {name: getattr(self, name) for name in _RESPONSE_FIELDS}
 
 
 def _journal_name(kind: type) -> str:
@@ -207,7 +207,7 @@ class Event:
     """A line of a journal; ``n``, ``at`` and ``previous`` are set when it is written (see `journal`)."""
 
     one_of: ClassVar[tuple[str, ...]] = ()
-    """Fields of which every line has one."""
+    """Fields of which every line has exactly one."""
     declared: ClassVar[tuple[str, ...]] = ()
     required: ClassVar[tuple[str, ...]] = ()
     n: _Integer = 0
@@ -220,14 +220,14 @@ class Event:
         declared = [
             declaration
             for declaration in dataclasses.fields(dataclass(frozen=True, kw_only=True, repr=False, eq=False)(cls))
-            if declaration.name not in (*_OF_ALL, "others")
+            if declaration.name not in (*_COMMON_FIELDS, "others")
         ]
         cls.declared = tuple(declaration.name for declaration in declared)
         cls.required = tuple(declaration.name for declaration in declared if declaration.default is dataclasses.MISSING)
         if not group:
             EVENTS[_journal_name(cls)] = cls
 
-    def __eq__(self, other: object) -> bool:  # common to all, since generated methods delay the start of the program
+    def __eq__(self, other: object) -> bool:  # one for all: generating it per class delays the program's start
         return type(other) is type(self) and vars(other) == vars(self)
 
     __hash__: ClassVar[None]  # type: ignore[assignment] # its mapping has none
@@ -242,12 +242,12 @@ class Event:
 
     def fields(self) -> dict[str, Any]:
         """Return the event's own fields in the order in which they are written."""
-        given = {name: getattr(self, name) for name in self.declared}
-        held = {name: value for name, value in given.items() if value is not None or name in self.required}
-        if "items" in held:
-            held["items"] = [response.fields() for response in held["items"]]
-        last: dict[str, Any] = {name: held.pop(name) for name in ("invalid", "sealed") if name in held}
-        return {**held, **self.others, **last}
+        own_fields = {name: getattr(self, name) for name in self.declared}
+        values = {name: value for name, value in own_fields.items() if value is not None or name in self.required}
+        if "items" in values:
+            values["items"] = [response.fields() for response in values["items"]]
+        last_fields: dict[str, Any] = {name: values.pop(name) for name in ("invalid", "sealed") if name in values}
+        return {**values, **self.others, **last_fields}
 
     def line(self) -> dict[str, Any]:
         """Return the whole line as it is written."""
@@ -518,7 +518,7 @@ class FormShown(Event):
     after: Text | None = None
 
 
-class _OfItem(Event, group=True):
+class _ItemEvent(Event, group=True):
     """An event of a question, of a trial or a form."""
 
     one_of = ("trial", "form")
@@ -527,18 +527,18 @@ class _OfItem(Event, group=True):
     item: Text
 
 
-class ItemShown(_OfItem):
+class ItemShown(_ItemEvent):
     """A question was shown, of a trial or a form."""
 
 
-class Choice(_OfItem):
+class Choice(_ItemEvent):
     """An answer was chosen; the last one counts."""
 
     kind: Text | None = None
     value: _OldAnswer | None
 
 
-class AnswerRemoved(_OfItem):
+class AnswerRemoved(_ItemEvent):
     """An answer was taken back, or an earlier one hid its question."""
 
 
@@ -556,25 +556,25 @@ class FormAnswered(Event):
     items: Answers
 
 
-class _OfPerson(Event, group=True):
+class _PersonEvent(Event, group=True):
     """An action of a person or of the program."""
 
     by: Text
 
 
-class Paused(_OfPerson):
+class Paused(_PersonEvent):
     """The session was paused."""
 
 
-class Resumed(_OfPerson):
+class Resumed(_PersonEvent):
     """The pause ended."""
 
 
-class ForceStopped(_OfPerson):
+class ForceStopped(_PersonEvent):
     """The force was stopped."""
 
 
-class ForceRestored(_OfPerson):
+class ForceRestored(_PersonEvent):
     """The force was turned on again."""
 
 
@@ -620,18 +620,18 @@ class SessionEnded(Event):
     within_limits: _Flag | None = None
 
 
-def _known_kinds() -> Iterator[tuple[str, tuple[Kind, bool]]]:
+def _field_kinds() -> Iterator[tuple[str, tuple[Kind, bool]]]:
     aliases: tuple[Any, ...] = (Text, Time, Number, _Integer, _Flag)
-    of_columns = {alias.__metadata__[0].description: alias.__metadata__[0] for alias in aliases}
-    yield from ((column.name, (of_columns[column.kind], True)) for column in (*TRIALS, *DELIVERED))
-    for owner in (Response, Event, *EVENTS.values()):
-        for name, hint in get_type_hints(owner, include_extras=True).items():
-            for part in (hint, *get_args(hint)):
-                yield from ((name, (kind, name in _MAY_BE_NULL)) for kind in getattr(part, "__metadata__", ()))
+    column_kinds = {alias.__metadata__[0].description: alias.__metadata__[0] for alias in aliases}
+    yield from ((column.name, (column_kinds[column.kind], True)) for column in (*TRIALS, *DELIVERED))
+    for event_class in (Response, Event, *EVENTS.values()):
+        for name, hint in get_type_hints(event_class, include_extras=True).items():
+            for annotation in (hint, *get_args(hint)):
+                yield from ((name, (kind, name in _MAY_BE_NULL)) for kind in getattr(annotation, "__metadata__", ()))
     yield "answer", (_AnyAnswer.__metadata__[0], True)
 
 
-_KINDS = dict(_known_kinds())
+_KINDS = dict(_field_kinds())
 """The kind of each field of the events that this version knows, and whether it may be null."""
 
 
@@ -645,41 +645,41 @@ def line_problem(line: Mapping[str, Any]) -> str | None:
     if not isinstance(event, str):
         return "the event is missing"
     kind = EVENTS.get(event, _UnknownEvent)
-    if lacking := [name for name in ("n", "event", "t_s", "at", *kind.required) if name not in line]:
-        return f"({event}) does not contain {', '.join(lacking)}"
+    if missing := [name for name in ("n", "event", "t_s", "at", *kind.required) if name not in line]:
+        return f"({event}) does not contain {', '.join(missing)}"
     if kind.one_of and sum(name in line for name in kind.one_of) != 1:
         return f"({event}) does not have exactly one of {', '.join(kind.one_of)}"
     for name in line:
-        if not is_valid_value(known := _kind_name(line, name), line[name]):
-            return f"({event}) has {name} {shorten_value(line[name])}; expected: {_KINDS[known][0].description}"
+        if not is_valid_value(kind_name := _kind_name(line, name), line[name]):
+            return f"({event}) has {name} {shorten_value(line[name])}; expected: {_KINDS[kind_name][0].description}"
     return None if 0 <= line["t_s"] <= _MOST_SECONDS else f"({event}) has an invalid t_s, {line['t_s']:g}"
 
 
 def journal_schema() -> dict[str, Any]:
     """Return the JSON Schema of a journal line in which `line_problem` finds no error."""
-    of_fields = {name: _schema_of(name) for name in _KINDS if name not in {"answer", "value"}}
+    field_schemas = {name: _schema_of(name) for name in _KINDS if name not in {"answer", "value"}}
     answer = {
         "type": "object",
-        "properties": of_fields,
-        "required": [name for name in _RESPONSE if name != "kind"],
+        "properties": field_schemas,
+        "required": [name for name in _RESPONSE_FIELDS if name != "kind"],
         "if": {"required": ["kind"]},
         "then": {"properties": {"value": _schema_of("answer")}},
         "else": {"properties": {"value": _schema_of("value")}},
     }
-    of_events = []
+    conditions = []
     for name, kind in EVENTS.items():
-        wanted: dict[str, Any] = {"description": inspect.getdoc(kind), "required": list(kind.required)}
+        requirements: dict[str, Any] = {"description": inspect.getdoc(kind), "required": list(kind.required)}
         if kind.one_of:
-            wanted["oneOf"] = [{"required": [key]} for key in kind.one_of]
-        of_events.append({"if": {"properties": {"event": {"const": name}}}, "then": wanted})
+            requirements["oneOf"] = [{"required": [key]} for key in kind.one_of]
+        conditions.append({"if": {"properties": {"event": {"const": name}}}, "then": requirements})
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "A line of journal.jsonl",
         "$defs": {"answer": answer},
         **answer,
-        "properties": {**of_fields, "t_s": {"type": "number", "minimum": 0, "maximum": _MOST_SECONDS}},
+        "properties": {**field_schemas, "t_s": {"type": "number", "minimum": 0, "maximum": _MOST_SECONDS}},
         "required": ["n", "event", "t_s", "at"],
-        "allOf": of_events,
+        "allOf": conditions,
     }
 
 
@@ -697,14 +697,16 @@ def read_event(line: Mapping[str, Any]) -> Event:
     kind, others = EVENTS.get(line["event"], _UnknownEvent), dict(line)
     if kind is not _UnknownEvent:
         del others["event"]
-    own = {name: others.pop(name) for name in (*_OF_ALL, *kind.declared) if name in others}
+    own = {name: others.pop(name) for name in (*_COMMON_FIELDS, *kind.declared) if name in others}
     if "items" in own:
-        own["items"] = tuple(Response(**{name: row[name] for name in _RESPONSE if name in row}) for row in own["items"])
+        own["items"] = tuple(
+            Response(**{name: row[name] for name in _RESPONSE_FIELDS if name in row}) for row in own["items"]
+        )
     return kind(**own, others=others)
 
 
 def plain_json(value: Any) -> Any:
-    """Return ``value`` for JSON: numpy numbers as plain ones, tuples as lists, non-finite numbers as None."""
+    """Return ``value`` for JSON: numpy values as numbers and lists, tuples as lists, non-finite numbers as None."""
     if isinstance(value, dict):
         return {str(name): plain_json(item) for name, item in value.items()}
     if isinstance(value, list | tuple):
@@ -716,15 +718,15 @@ def plain_json(value: Any) -> Any:
     return value
 
 
-def _kind_name(held: Mapping[str, Any], name: str) -> str:
-    """Return the name of the entry that describes a field: without a kind of question an answer is an integer."""
-    return "answer" if name == "value" and "kind" in held else name
+def _kind_name(fields: Mapping[str, Any], name: str) -> str:
+    """Return the key of a field in `_KINDS`; an answer with a question kind has a key of its own."""
+    return "answer" if name == "value" and "kind" in fields else name
 
 
 def shorten_value(value: object) -> str:
     """Return ``value`` as text for messages, shortened."""
     shown = repr(value)
-    return shown if len(shown) <= _SHOWN else f"{shown[:_SHOWN]}…"
+    return shown if len(shown) <= _MAX_SHOWN else f"{shown[:_MAX_SHOWN]}…"
 
 
 def unknown_events(lines: Sequence[Event]) -> Iterator[str]:

@@ -31,7 +31,7 @@ from study_app.store.files.atomic import (
 )
 from study_app.store.files.folders import ID_PATTERN, SessionFolder, StudyFolder
 from study_app.store.integrity.folder_lock import (
-    Opening,
+    FolderLock,
     create_locked_folder,
     is_abandoned,
     remove_abandoned_claims,
@@ -79,15 +79,15 @@ class SessionStart:
     recordings : bool
         Whether the trials' samples and frames are recorded, by the ``recorder`` of the store.
     motors_masked : mapping, optional
-        The masking of motor noise, for the receipt; None if it was not asked.
+        The masking of motor noise, for the receipt; None if the operator was not asked.
     outlets : mapping, optional
         The outlets to other programs, for the receipt; None without any.
     video : mapping, optional
         Description of camera and footage for the receipt; None in a study without a video.
     row_of : str, optional
-        The id of the replaced participant; None: no one, or as in the participant's first session.
+        The id of the replaced participant; None if nobody is replaced, or to keep that of the first session.
     group : str, optional
-        The participant's pre-existing group; None: no group, or as in the participant's first session.
+        The participant's pre-existing group; None in a study without these, or to keep that of the first session.
     """
 
     participant: str
@@ -113,8 +113,8 @@ def begin_session(
 ) -> SessionStore:
     """Claim a session in the study folder ``results`` and write all files needed before the first trial.
 
-    The folder is created exclusively: if two programs request one id, only one gets it. A folder claimed by a program
-    that ended before writing a line is taken over. On any failure the claimed folder is removed.
+    The folder is created exclusively: if two programs request the same id, only one gets it. A folder that another
+    program claimed but left before writing a line is taken over. On any failure the claimed folder is removed.
 
     Parameters
     ----------
@@ -146,7 +146,7 @@ def begin_session(
     key = open_or_draw_key(study_folder.path, protocol, draw, StudySource.split(source).liquids)
     place = Place(study_folder, study_folder.session(start.participant, start.session), protocol.study.name)
     sealed = not reveals(study_folder.path)
-    opening = _claim(place)
+    lock = _claim(place)
     try:
         _check_path_length(place)
         allocation = allocate(study_folder, key, start.participant, group=start.group, row_of=start.row_of)
@@ -156,9 +156,9 @@ def begin_session(
             protocol, source, start, key_hash=key.hash, measures_sealed=sealed, clock=clock, allocation=allocation
         )
         first_receipt["resolved"] = sealed_model(protocol, start.participant, start.session, key)
-        return _open(place, opening, clock, key, first_receipt, started, protocol)
+        return _write_session(place, lock, clock, key, first_receipt, started, protocol)
     except BaseException:
-        _unclaim(place, opening)
+        _release_claim(place, lock)
         raise
 
 
@@ -224,13 +224,13 @@ def first_records(
 
 
 def note_allocation(store: SessionStore) -> None:
-    """Write the sealed group of the participant to the journal, unless an earlier session of the participant did."""
+    """Write the participant's sealed group to the journal, unless that of an earlier session contains it."""
     study, folder, start = store.place.study_folder, store.place.folder, start_of(store.lines)
     if start.entry is None or start.group is not None:
         return
     sessions = [session for session in study.sessions() if session.participant == folder.participant]
-    known = [line for session in sessions if is_there(session.journal) for line in journal.scan(session.journal).lines]
-    if any(isinstance(line, Allocated) for line in known):
+    lines = [line for session in sessions if is_there(session.journal) for line in journal.scan(session.journal).lines]
+    if any(isinstance(line, Allocated) for line in lines):
         return
     allocation = allocation_of(study, store.key, folder.participant)
     if allocation is not None:
@@ -259,7 +259,7 @@ def session_environment(
 ) -> dict[str, Any]:
     """Return the receipt's section on device, screens and versions of a session that begins or is resumed."""
     optional = {"motors_masked": motors_masked, "outlets": outlets, "video": video}
-    used = receipt.plug_ins_of(protocol, str(device.get("name")), outlets or ())
+    plug_ins = receipt.plug_ins_of(protocol, str(device.get("name")), outlets or ())
     return {
         "versions": receipt.versions(),
         "level_rules": LEVEL_RULES,
@@ -267,7 +267,7 @@ def session_environment(
         "screens": dict(screens),
         "clock": {"origin_ns": clock.origin_ns, "origin_at": clock.at(0)},
         **{name: dict(value) for name, value in optional.items() if value is not None},
-        **({"plug_ins": used} if used else {}),
+        **({"plug_ins": plug_ins} if plug_ins else {}),
     }
 
 
@@ -275,8 +275,8 @@ def session_environment(
 class UsedIds:
     """A snapshot of the sessions in a study's folder, for checking ids and numbers without reading the disk.
 
-    ``held`` are participant and number of the sessions that were begun, or are claimed by a running program; ``ids``
-    the ids of all folders; ``withdrawn`` those of participants whose data were erased.
+    ``held`` are participant and number of the sessions that were begun or that a running program has claimed, ``ids``
+    the ids of all folders, and ``withdrawn`` the ids of participants whose data were erased.
     """
 
     path: Path
@@ -295,9 +295,9 @@ class UsedIds:
         return f"P{max((int(match[1]) for match in matches if match), default=0) + 1:03d}"
 
     def check_unused(self, participant: str, number: int) -> None:
-        """Reject an existing session, or a new id that other programs would change or that differs only in case.
+        """Reject an existing session, and a new id that differs from another only in case or that spreadsheets alter.
 
-        A session that was claimed by an ended program, but never begun, is accepted.
+        A session that an ended program claimed but never began is accepted.
 
         Raises
         ------
@@ -317,10 +317,10 @@ class UsedIds:
                     f"participant ID {participant!r} differs from the existing {used!r} only in capitalisation: "
                     f"use {used!r} with a new session number, or another ID"
                 )
-        if participant not in self.ids and (what := read_as(participant)):
+        if participant not in self.ids and (meaning := read_as(participant)):
             raise StoreError(
                 f"participant ID {participant!r} cannot be used: spreadsheets and statistics programs read it "
-                f"as {what}; use another ID, such as {self.suggested()}"
+                f"as {meaning}; use another ID, such as {self.suggested()}"
             )
         if (participant, number) in self.held:
             raise self.refusal(participant, number)
@@ -379,31 +379,31 @@ def refuse_never_begun(session: SessionFolder) -> None:
         )
 
 
-def _claim(place: Place) -> Opening:
+def _claim(place: Place) -> FolderLock:
     """Create the session's folder, locked by this program from the start; the session must not have been begun."""
     path = place.folder.path
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         remove_abandoned_claims(path.parent)
-        opening = create_locked_folder(path) or take_over_folder(path)
+        lock = create_locked_folder(path) or take_over_folder(path)
     except OSError as error:
         raise cannot_write(path, error) from error
     except StoreError:
         _remove_if_empty(path.parent)
         raise
-    if opening is None:
+    if lock is None:
         raise used_ids(place.study_folder).refusal(place.folder.participant, place.folder.number)
-    return opening
+    return lock
 
 
-def _unclaim(place: Place, opening: Opening) -> None:
+def _release_claim(place: Place, lock: FolderLock) -> None:
     """Remove the claimed folder in one step, and then the participant's folder if it is empty."""
     path = place.folder.path
-    away = temporary_path(path)
+    temporary = temporary_path(path)
     with contextlib.suppress(OSError):
-        move(path, away)
-    shutil.rmtree(away if is_there(away) else path, ignore_errors=True)
-    opening.release()
+        move(path, temporary)
+    shutil.rmtree(temporary if is_there(temporary) else path, ignore_errors=True)
+    lock.release()
     _remove_if_empty(path.parent)
 
 
@@ -429,28 +429,28 @@ def _remove_if_empty(folder: Path) -> None:
         folder.rmdir()
 
 
-def _open(
+def _write_session(
     place: Place,
-    opening: Opening,
+    lock: FolderLock,
     clock: SessionClock,
     key: Key,
     session_receipt: dict[str, Any],
     started: SessionStarted,
     protocol: Protocol,
 ) -> SessionStore:
-    """Write receipt, first line, tables and description into the claimed folder."""
+    """Write receipt, first line, tables and description into the claimed folder; return the open session."""
     path = place.folder.path
     try:
-        for above in path.parents[:3]:
-            sync_folder(above)
+        for parent in path.parents[:3]:
+            sync_folder(parent)
     except OSError as error:
         raise cannot_write(path, error) from error
     recorder = make_recorder(place, started, clock, key)
     receipt.write(place.folder.receipt, session_receipt)
     journal = Journal.create(place.folder.journal, clock)
-    store = SessionStore(place, journal, key, session_receipt, opening, recorder=recorder)
-    with contextlib.ExitStack() as failing:
-        failing.callback(journal.close)
+    store = SessionStore(place, journal, key, session_receipt, lock, recorder=recorder)
+    with contextlib.ExitStack() as cleanup:
+        cleanup.callback(journal.close)
         store.append(replace(started, receipt_hash=receipt.digest(session_receipt)), t_s=0.0)
         note_allocation(store)
         store.write_tables()
@@ -460,5 +460,5 @@ def _open(
         write_description(place.study_folder, protocol.study, intervals=bool(protocol.design_questions))
         for folder in (place.study_folder.path, place.study_folder.data):
             remove_old_temporary_files(folder)
-        failing.pop_all()
+        cleanup.pop_all()
     return store

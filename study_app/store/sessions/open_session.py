@@ -1,7 +1,7 @@
-"""A session that is open: appended to while it runs, closed with a status.
+"""An open session: its journal grows while the session runs, and its status is set at the end.
 
-While it runs only one program has it open. The journal is the primary record; tables, receipt and checksums derive from
-it.
+While the session runs only one program has it open. The journal is the primary record; tables, receipt and checksums
+are derived from it.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from study_app.store.files import csv_files
 from study_app.store.files.atomic import write_file
 from study_app.store.files.folders import SessionFolder, StudyFolder
 from study_app.store.integrity.checksums import fingerprint, note_fingerprint, write_checksums
-from study_app.store.integrity.folder_lock import Opening
+from study_app.store.integrity.folder_lock import FolderLock
 from study_app.store.journals import journal_events as events
 from study_app.store.journals.journal import Journal
 from study_app.store.recorder import LEAVING_S, Kept, Recorder
@@ -47,7 +47,7 @@ class Place:
 class SessionStore:
     """The open session: ``append`` adds to its journal, tables follow the journal, ``finish`` sets its status.
 
-    ``journal`` receives events, ``opening`` locks the folder until it is released; ``key`` translates codes while the
+    ``journal`` receives events, ``lock`` locks the folder until it is released; ``key`` translates codes while the
     session runs; ``clock`` gives the journal's times; ``recorder`` records the trials' samples and frames, or is None
     in a session without recordings; ``behind`` is why the tables on disk are older than the journal, or None;
     ``fingerprint`` is empty until the session has ended. Made by `begin_session`, or by ``recovery.reopen_store`` from
@@ -60,7 +60,7 @@ class SessionStore:
         journal: Journal,
         key: Key,
         session_receipt: dict[str, Any],
-        opening: Opening,
+        lock: FolderLock,
         *,
         lines: Sequence[events.Event] = (),
         recorder: Recorder | None = None,
@@ -73,14 +73,14 @@ class SessionStore:
         self.fingerprint = ""
         self.journal = journal
         self._receipt = session_receipt
-        self.opening = opening
+        self.lock = lock
         self._lines: list[events.Event] = list(lines)
         self._written: dict[Path, bytes] = {}
-        self._kept: list[Kept] = []
-        self._over = False
+        self._results: list[Kept] = []
+        self._is_over = False
         self._ended_s: float | None = None
         self.outlets: Outlets | None = None
-        self._marked: Marker | None = None  # time of the line that could not be written
+        self._sent_marker: Marker | None = None  # of the line that could not be written
         self._outlets_lost: set[str] = set()  # that are journalled
         self._reached_s: list[float] = []  # in the running task of a sealed session
 
@@ -107,7 +107,7 @@ class SessionStore:
     def attach(self, outlets: Outlets) -> None:
         """Start sending markers of the session's events, beginning with its start or resumption."""
         self.outlets = outlets
-        self._mark(
+        self._send_marker(
             next(
                 line
                 for line in reversed(self._lines)
@@ -118,9 +118,8 @@ class SessionStore:
     def append(self, event: events.Event, *, t_s: float | None = None, waits: bool = True) -> None:
         """Add an event to the journal; with ``waits`` it is on the disk when this returns, else soon after.
 
-        ``t_s`` is its time [s since the clock's origin], by default now. Fields that reveal a condition are sealed;
-        while measures are sealed, a reached target only sends its marker at once, and is written at the end of its
-        task.
+        ``t_s`` is its time [s since the clock's origin], by default now. Fields that reveal a condition are sealed.
+        While measures are sealed, a reached target only sends its marker at once; it is written at the end of its task.
 
         Raises
         ------
@@ -133,19 +132,19 @@ class SessionStore:
             if start.measures_sealed and isinstance(event, events.TargetReached):
                 self._hold_target(event)
                 return
-            event = seal_event(start, self._with_targets(event), self.key)
-        self._mark(event)
+            event = seal_event(start, self._add_targets(event), self.key)
+        self._send_marker(event)
         self._lines.append(self.journal.append(event, t_s=event.t_s, waits=waits))
-        self._marked = None
+        self._sent_marker = None
 
     def _hold_target(self, event: events.TargetReached) -> None:
         """Send the marker of a reached target and hold its time, which is written sealed at the end of the task."""
-        self._mark(event)
-        self._marked = None
+        self._send_marker(event)
+        self._sent_marker = None
         if event.t_task_s is not None:
             self._reached_s.append(round(event.t_task_s, 6))
 
-    def _with_targets(self, event: events.Event) -> events.Event:
+    def _add_targets(self, event: events.Event) -> events.Event:
         """Return the end of a task with the held times of the reached targets."""
         if isinstance(event, events.TrialStarted | events.IntervalStarted):
             self._reached_s = []
@@ -153,14 +152,14 @@ class SessionStore:
             return replace(event, reached_s=self._reached_s)
         return event
 
-    def _mark(self, event: events.Event) -> None:
-        """Send the marker of an event before waiting for the disk, once even if its line is written again."""
+    def _send_marker(self, event: events.Event) -> None:
+        """Send the marker of an event, before the disk is waited for, and only once if its line is written again."""
         if self.outlets is None:
             return
         marker = marker_of(event.event, event.t_s, self.clock.origin_ns, event.fields())
-        if marker is not None and marker != self._marked:
+        if marker is not None and marker != self._sent_marker:
             self.outlets.mark(marker)
-            self._marked = marker
+            self._sent_marker = marker
 
     def check_flushed(self) -> None:
         """Raise if lines that were not waited for could not be flushed, and are still not on the disk.
@@ -203,7 +202,7 @@ class SessionStore:
         StoreError
             A file could not be written; earlier journal lines are safe. A repeated call continues from there.
         """
-        if self._over or not self.journal.is_closed:
+        if self._is_over or not self.journal.is_closed:
             if self.recorder is not None:
                 self.recorder.close()
             self._keep_recordings()
@@ -220,18 +219,18 @@ class SessionStore:
         self.write_tables()
         failures = [] if self.behind is None else [self.behind]
         table = partial(update_participants, self.place.study_folder, self.place.study)
-        for write in (self._write_proofs, table, self._exclude_if_incomplete):
+        for write in (self._write_proofs, table, self._exclude_incomplete):
             try:
                 write()
             except StoreError as error:
                 failures.append(error)
-        self.opening.release()
+        self.lock.release()
         if failures:
             raise StoreError(
                 f"{failures[0]}; the journal is complete: run liquid-study rebuild {self.folder.path} to write what is "
                 "missing"
             ) from failures[0]
-        self._over = True
+        self._is_over = True
 
     def _sealed_verdict(self) -> bool | None:
         """Return whether all main trials are within all limits; None if not sealed, or if nothing was measured."""
@@ -247,10 +246,10 @@ class SessionStore:
         """The undelivered main trials so far."""
         return progress_of(self._lines).missing_trials
 
-    def _exclude_if_incomplete(self) -> None:
+    def _exclude_incomplete(self) -> None:
         if self._receipt["status"] == events.INCOMPLETE:
-            of_study, session = self.place.study_folder.path, self.place.folder
-            exclude_incomplete(of_study, session.participant, session.number, str(self._receipt["reason"]))
+            study, session = self.place.study_folder.path, self.place.folder
+            exclude_incomplete(study, session.participant, session.number, str(self._receipt["reason"]))
 
     def close(self) -> None:
         """Close the session without an end; it stays unfinished.
@@ -260,8 +259,8 @@ class SessionStore:
         StoreError
             The last lines could not be flushed.
         """
-        self._over = True
-        if self.journal.is_of_another_process:
+        self._is_over = True
+        if self.journal.is_forked:
             return
         if self.recorder is not None:
             self.recorder.close(LEAVING_S)
@@ -273,22 +272,22 @@ class SessionStore:
         try:
             self.journal.close()
         finally:
-            self.opening.release()
+            self.lock.release()
 
-    def note_resumed(self, what: Mapping[str, Any]) -> None:
+    def note_resumed(self, entry: Mapping[str, Any]) -> None:
         """Add the data of the resumption to the receipt."""
-        self._receipt["resumed"] = [*self._receipt.get("resumed", ()), dict(what)]
+        self._receipt["resumed"] = [*self._receipt.get("resumed", ()), dict(entry)]
         self._write_receipt()
 
     def _write_receipt(self) -> None:
         """Write the receipt with the failures of outlets and their final counts of lost samples."""
         if self.outlets is not None and (lost := self.outlets.lost):
-            since = (self._receipt, *self._receipt.get("resumed", ()))[-1]
-            since["outlets_lost"] = dict(lost)
+            entry = (self._receipt, *self._receipt.get("resumed", ()))[-1]
+            entry["outlets_lost"] = dict(lost)
         receipt.write(self.folder.receipt, self._receipt)
 
     def _write_proofs(self) -> None:
-        """Write the receipt and then the proofs, which would otherwise be those of the previous receipt."""
+        """Write the receipt first and then the proofs, which include its checksum."""
         self._write_receipt()
         value = fingerprint(write_checksums(self.folder), self._lines)
         if not self.fingerprint:
@@ -298,10 +297,10 @@ class SessionStore:
     def _keep_recordings(self) -> None:
         """Write the results of recordings (files, or the reason for a loss) and failures of outlets to the journal."""
         if self.recorder is not None:
-            self._kept += self.recorder.collect_results()
-        while self._kept:
-            self.append(self._kept[0], waits=False)
-            del self._kept[0]
+            self._results += self.recorder.collect_results()
+        while self._results:
+            self.append(self._results[0], waits=False)
+            del self._results[0]
         for outlet, reason in ({} if self.outlets is None else self.outlets.lost).items():
             if outlet not in self._outlets_lost:
                 self.append(events.OutletLost(outlet=outlet, reason=reason), waits=False)
@@ -330,6 +329,6 @@ def table_files(place: Place, lines: Sequence[events.Event], key: Key | None) ->
     rows = session_tables.SessionRows(lines)
     columns = session_tables.table_columns(lines, opened=key is not None)
     return tuple(
-        (place.folder.table(place.study, name), csv_files.csv_bytes(held, rows.table(name)))
-        for name, held in columns.items()
+        (place.folder.table(place.study, name), csv_files.csv_bytes(table_columns, rows.table(name)))
+        for name, table_columns in columns.items()
     )

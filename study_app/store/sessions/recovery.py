@@ -61,7 +61,7 @@ from study_app.store.tables.study_files import (
 
 RESTORE = "restore the journal from a backup"
 _SHOWN_DIFFERENCES = 6
-_MOST_GAP_S = 366 * 86400.0
+_MAX_GAP_S = 366 * 86400.0
 """Longest plausible gap [s]: beyond it the wall clock was or is wrong."""
 
 
@@ -95,8 +95,8 @@ def reopen_store(
     """Open an unfinished session to resume it; ``progress.progress_of(store.lines)`` gives its progress.
 
     An incomplete line at the journal's end is moved to a separate file, temporary files are removed, and
-    ``session_resumed`` is journalled with the gap since the last line (null if the wall clock was set back or is wrong
-    by years). The session's clock continues from there, so that its times never decrease.
+    ``session_resumed`` is journalled with the gap since the last line (null if the wall clock was set back or is years
+    off). The session's clock continues from there, so that its times never decrease.
 
     Parameters
     ----------
@@ -128,43 +128,47 @@ def reopen_store(
     StoreError
         It is not a session folder, or the session is open in another program, finished, damaged, has a journal with
         less information than the other files, or another protocol (the message names differences that are not
-        blinded); the key is invalid; or the folder cannot be written. Except for an incomplete last line nothing
-        has changed then.
+        blinded); the key is invalid; or the folder cannot be written. Nothing has changed then, except that an
+        incomplete last line may have been moved.
     """
     study_folder, folder = locate_session(session_folder)
     refuse_never_begun(folder)
     refuse_merged(study_folder.path)
-    opening = lock_folder(folder.path)
+    lock = lock_folder(folder.path)
     try:
-        left = _read_interrupted(study_folder, folder, protocol, source)
-        contents = left.contents
+        interrupted = _read_interrupted(study_folder, folder, protocol, source)
+        contents = interrupted.contents
         gap_s, clock = _continued_clock(contents.lines, now_ns, now)
-        recorder = make_recorder(left.place, left.start, clock, left.key)
-        opened = Journal.reopen(folder.journal, contents, clock)
+        recorder = make_recorder(interrupted.place, interrupted.start, clock, interrupted.key)
+        reopened = Journal.reopen(folder.journal, contents, clock)
     except BaseException:
-        opening.release()
+        lock.release()
         raise
-    store = SessionStore(left.place, opened, left.key, left.receipt, opening, lines=contents.lines, recorder=recorder)
+    store = SessionStore(
+        interrupted.place, reopened, interrupted.key, interrupted.receipt, lock, lines=contents.lines, recorder=recorder
+    )
     gap: dict[str, Any] = {"gap_s": gap_s, "operator": operator}
-    with contextlib.ExitStack() as failing:
-        failing.callback(store.close)
+    with contextlib.ExitStack() as cleanup:
+        cleanup.callback(store.close)
         at_s = round(clock.seconds(), 6)
         version, name = study_app.__version__, device.get("name")
-        around = session_environment(protocol, device, screens, clock, motors_masked, outlets, video)
-        entry = {"at": clock.at(at_s), **gap, **around}
-        told: dict[str, Any] = {"torn_bytes": contents.torn_bytes, "device": name, "version": version}
-        store.append(events.SessionResumed(**gap, **told, receipt_hash=receipt.digest(entry)), t_s=at_s)
+        environment = session_environment(protocol, device, screens, clock, motors_masked, outlets, video)
+        entry = {"at": clock.at(at_s), **gap, **environment}
+        details: dict[str, Any] = {"torn_bytes": contents.torn_bytes, "device": name, "version": version}
+        store.append(events.SessionResumed(**gap, **details, receipt_hash=receipt.digest(entry)), t_s=at_s)
         note_allocation(store)
         remove_temporary_files(folder.path)
         if is_there(folder.recordings):
             remove_temporary_files(folder.recordings)
-        for event in _recordings_found(folder, contents.lines, left.key) if left.start.recordings else ():
+        for event in (
+            _unrecorded_results(folder, contents.lines, interrupted.key) if interrupted.start.recordings else ()
+        ):
             store.append(event)
         store.note_resumed(entry)
         store.write_tables()
         write_description(study_folder, protocol.study, intervals=bool(protocol.design_questions))
-        update_participants(study_folder, left.place.study)
-        failing.pop_all()
+        update_participants(study_folder, interrupted.place.study)
+        cleanup.pop_all()
     return store
 
 
@@ -220,18 +224,18 @@ def rebuild_session(session_folder: Path) -> Rebuilt:
             remove_temporary_files(folder.recordings) if is_there(folder.recordings) else ()
         )
         table = study_folder.participants(place.study)
-        before = _content(table)
+        before = _read_if_file(table)
         tables = table_files(place, contents.lines, opened_key(study_folder))
-        rewritten = [path for path, content in tables if _content(path) != content]
+        rewritten = [path for path, content in tables if _read_if_file(path) != content]
         for path, content in tables:
             if path in rewritten:
                 write_file(path, content)
-        rewritten += _renew_receipt(folder, contents.lines)
+        rewritten += _update_receipt(folder, contents.lines)
         write_participants(study_folder, place.study)
-        rewritten += [table] if _content(table) != before else []
+        rewritten += [table] if _read_if_file(table) != before else []
         ended = isinstance(contents.lines[-1], events.SessionEnded)
         if ended:
-            rewritten += _renew_proof(place, contents.lines, rewritten)
+            rewritten += _update_proofs(place, contents.lines, rewritten)
         return Rebuilt(tuple(rewritten), swept, contents.torn_bytes)
 
 
@@ -242,8 +246,8 @@ def _refuse_truncated_journal(place: Place, lines: Sequence[events.Event]) -> No
             f"{place.folder.journal} contains {name!r} events, which this version does not recognise: use the "
             "version that wrote them"
         )
-    for path, what in (*files_beyond_journal(place, lines), *_ended_or_recorded(place, lines)):
-        raise StoreError(f"{path} {what}: {RESTORE}")
+    for path, problem in (*files_beyond_journal(place, lines), *_ended_or_recorded(place, lines)):
+        raise StoreError(f"{path} {problem}: {RESTORE}")
 
 
 def files_beyond_journal(place: Place, lines: Sequence[events.Event]) -> Iterator[tuple[Path, str]]:
@@ -254,20 +258,20 @@ def files_beyond_journal(place: Place, lines: Sequence[events.Event]) -> Iterato
     """
     folder = place.folder
     ended = isinstance(lines[-1], events.SessionEnded)
-    held = receipt.read(folder.receipt) if is_there(folder.receipt) else {}
-    if not ended and (status := held.get("status", receipt.UNFINISHED)) != receipt.UNFINISHED:
+    session_receipt = receipt.read(folder.receipt) if is_there(folder.receipt) else {}
+    if not ended and (status := session_receipt.get("status", receipt.UNFINISHED)) != receipt.UNFINISHED:
         yield folder.receipt, f"its status is {status!r}, but the journal's is {receipt.UNFINISHED!r}"
-    if len(held.get("resumed", ())) > sum(isinstance(line, events.SessionResumed) for line in lines):
+    if len(session_receipt.get("resumed", ())) > sum(isinstance(line, events.SessionResumed) for line in lines):
         yield folder.receipt, "records more resumptions of the session than the journal does"
     if ended:
         return
     if is_there(folder.checksums):
         yield folder.checksums, "was written after the session ended, but the journal does not record the end"
     rows = session_tables.SessionRows(lines)
-    for name, spare in (("responses", 0), ("trials", 1), ("intervals", 1)):
-        path, given = folder.table(place.study, name), len(rows.table(name))
-        if (row_count := _count_rows(path, place.study_folder.path)) > given + spare:
-            yield path, f"has {row_count} rows, but the journal contains {given}"
+    for name, tolerance in (("responses", 0), ("trials", 1), ("intervals", 1)):
+        path, expected = folder.table(place.study, name), len(rows.table(name))
+        if (row_count := _count_rows(path, place.study_folder.path)) > expected + tolerance:
+            yield path, f"has {row_count} rows, but the journal contains {expected}"
 
 
 def _ended_or_recorded(place: Place, lines: Sequence[events.Event]) -> Iterator[tuple[Path, str]]:
@@ -277,9 +281,9 @@ def _ended_or_recorded(place: Place, lines: Sequence[events.Event]) -> Iterator[
         return
     if place_of(study, folder) in {session for _, session in read_list(study.fingerprints)}:
         yield study.fingerprints, f"lists {place_of(study, folder)} as ended, but its journal does not record the end"
-    of_trials = {path for which in recordable(lines) for path in recording_files(folder.recordings, *which)}
+    expected = {path for which in recordable(lines) for path in recording_files(folder.recordings, *which)}
     for path in paths_in(folder.recordings):
-        if path not in of_trials and RECORDING_NAME.fullmatch(path.relative_to(folder.path).as_posix()):
+        if path not in expected and RECORDING_NAME.fullmatch(path.relative_to(folder.path).as_posix()):
             yield path, "belongs to a trial that never started, according to the journal"
 
 
@@ -294,7 +298,7 @@ def _count_rows(path: Path, root: Path) -> int:
 
 
 @dataclass(frozen=True, slots=True)
-class _Left:
+class _Interrupted:
     """The data of an interrupted session that can be resumed."""
 
     place: Place
@@ -304,23 +308,25 @@ class _Left:
     key: Key
 
 
-def _read_interrupted(study_folder: StudyFolder, folder: SessionFolder, protocol: Protocol, source: bytes) -> _Left:
+def _read_interrupted(
+    study_folder: StudyFolder, folder: SessionFolder, protocol: Protocol, source: bytes
+) -> _Interrupted:
     """Read the data of an interrupted session; raise an error if it cannot be resumed with this protocol."""
     contents = journal.read_complete(folder.journal)
-    start = _unfinished(folder, contents.lines)
+    start = _check_unfinished(folder, contents.lines)
     place = Place(study_folder, folder, start.study)
     first = receipt.read(folder.receipt)
     if receipt.has_other_format(first, start):
         raise StoreError(f"{folder.journal} and its receipt have different formats: restore them from a backup")
     _refuse_truncated_journal(place, contents.lines)
     refuse_earlier_columns(study_folder)
-    _same_protocol(place, first, start, protocol, source)
+    _check_same_protocol(place, first, start, protocol, source)
     draw = stream(start.seed, "blinding").random if start.simulated else None
-    return _Left(place, contents, start, first, open_or_draw_key(study_folder.path, protocol, draw))
+    return _Interrupted(place, contents, start, first, open_or_draw_key(study_folder.path, protocol, draw))
 
 
-def _unfinished(folder: SessionFolder, lines: list[events.Event]) -> events.SessionStarted:
-    """Return the first line of a session that can be resumed."""
+def _check_unfinished(folder: SessionFolder, lines: list[events.Event]) -> events.SessionStarted:
+    """Return the first line of a session; raise an error if it is empty or finished, and so cannot be resumed."""
     if not lines:
         raise StoreError(
             f"{folder.journal} is empty: the program ended before the session began; use a new session number"
@@ -343,7 +349,7 @@ def refuse_finished(folder: SessionFolder, done: Progress) -> None:
         )
 
 
-def _same_protocol(
+def _check_same_protocol(
     place: Place, first: Mapping[str, Any], start: events.SessionStarted, protocol: Protocol, source: bytes
 ) -> None:
     """Raise an error that lists the differences if the protocol differs from that of the session's start."""
@@ -354,19 +360,21 @@ def _same_protocol(
         with protocol_errors(place.folder.receipt):
             key = read_key(place.study_folder.path)
             recorded = receipt.without_conditions(complete_protocol(recorded, key))
-    sides = (json.loads(json.dumps(it)) for it in (recorded, receipt.without_conditions(protocol)))
-    changes = list(differences(*sides))
+    protocols = (
+        json.loads(json.dumps(protocol_fields)) for protocol_fields in (recorded, receipt.without_conditions(protocol))
+    )
+    changes = list(differences(*protocols))
     if not has_same_conditions(place.study_folder.path, protocol):
         changes.append(CONDITIONS_DIFFER)
     if is_upgraded and not changes:
         return
     if not changes:
         changes.append("only in comments, order or notation")
-    listed = "; ".join(changes[:_SHOWN_DIFFERENCES])
+    shown = "; ".join(changes[:_SHOWN_DIFFERENCES])
     more = f"; and {len(changes) - _SHOWN_DIFFERENCES} more" if len(changes) > _SHOWN_DIFFERENCES else ""
     raise StoreError(
         f"{place.folder.path} began with a different protocol file and can be resumed only with that file: restore it, "
-        f"or use a new session number. Differences: {listed}{more}"
+        f"or use a new session number. Differences: {shown}{more}"
     )
 
 
@@ -376,13 +384,13 @@ def _continued_clock(
     """Return the gap since the last line [s], None if unknown, and the clock that continues after it."""
     now = now if now is not None else datetime.now().astimezone()
     gap_s = (now - datetime.fromisoformat(lines[-1].at)).total_seconds()
-    known = 0 <= gap_s <= _MOST_GAP_S
+    known = 0 <= gap_s <= _MAX_GAP_S
     shown_s = progress_of(lines).t_s + (gap_s if known else 0.0)
     clock = SessionClock(now_ns, now - timedelta(seconds=shown_s), shown_s=shown_s)
     return (round(gap_s, 3) if known else None), clock
 
 
-def _recordings_found(folder: SessionFolder, lines: list[events.Event], key: Key) -> Iterator[events.Event]:
+def _unrecorded_results(folder: SessionFolder, lines: list[events.Event], key: Key) -> Iterator[events.Event]:
     """Yield events for recordings, complete or lost, that the ended program did not write to the journal."""
     from study_app.store import recordings  # noqa: PLC0415 - loads the Parquet library, where there are recordings
 
@@ -393,8 +401,8 @@ def _recordings_found(folder: SessionFolder, lines: list[events.Event], key: Key
         samples, frames = recording_files(folder.recordings, *which)
         try:
             dropped = recordings.read_facts(samples, key.nonce)["dropped"]
-            kept, shown = (recordings.read_written(path, key.nonce) for path in (samples, frames))
-            yield recorded_event(which, kept, shown, dropped)
+            samples_file, frames_file = (recordings.describe_recording(path, key.nonce) for path in (samples, frames))
+            yield recorded_event(which, samples_file, frames_file, dropped)
         except StoreError:
             if not is_there(samples):  # frames are written first and are not a recording by themselves
                 with contextlib.suppress(OSError):
@@ -402,34 +410,34 @@ def _recordings_found(folder: SessionFolder, lines: list[events.Event], key: Key
             yield lost_event(which, "the program ended before the recording was complete")
 
 
-def _renew_receipt(folder: SessionFolder, lines: list[events.Event]) -> list[Path]:
+def _update_receipt(folder: SessionFolder, lines: list[events.Event]) -> list[Path]:
     """Copy the session's end from the journal to the receipt; a missing receipt cannot be recreated."""
     last = lines[-1]
     if not isinstance(last, events.SessionEnded) or not is_there(folder.receipt):
         return []
-    held = receipt.read(folder.receipt)
+    session_receipt = receipt.read(folder.receipt)
     ended = {"status": last.status, "reason": last.reason, "ended_at": last.at}
-    if all(held.get(name) == value for name, value in ended.items()):
+    if all(session_receipt.get(name) == value for name, value in ended.items()):
         return []
-    receipt.write(folder.receipt, held | ended)
+    receipt.write(folder.receipt, session_receipt | ended)
     return [folder.receipt]
 
 
-def _renew_proof(place: Place, lines: list[events.Event], rewritten: list[Path]) -> list[Path]:
+def _update_proofs(place: Place, lines: list[events.Event], rewritten: list[Path]) -> list[Path]:
     """Renew the checksums and list a missing fingerprint; return the written paths. Format 1 has neither."""
     study, folder = place.study_folder, place.folder
     listed_places = {session for _, session in read_list(study.fingerprints)}
-    has_none = lines[-1].previous is not None and place_of(study, folder) not in listed_places
-    noted = [folder.rebuilt] if has_none else []
-    if has_none:
+    is_missing = lines[-1].previous is not None and place_of(study, folder) not in listed_places
+    noted = [folder.rebuilt] if is_missing else []
+    if is_missing:
         note_rebuilt(folder, f"{study.fingerprints.name} did not contain the session's fingerprint")
     if not renew_checksums(folder, [*rewritten, *noted]):
         return []
-    if has_none:
+    if is_missing:
         note_fingerprint(study, folder, fingerprint(read_checksums(folder), lines))
         return [folder.checksums, folder.rebuilt, study.fingerprints]
     return [folder.checksums, folder.rebuilt]
 
 
-def _content(path: Path) -> bytes | None:
+def _read_if_file(path: Path) -> bytes | None:
     return path.read_bytes() if path.is_file() else None

@@ -1,8 +1,8 @@
 """Sessions of simulated answers, each written completely at its end.
 
 Answers of people are flushed to the disk before they have effects. Simulated answers can be repeated from their seed,
-so nothing here waits for the disk: a session is stored with all its files, or not at all, and a power cut may lose the
-last ones. The files are those of a real session.
+so this module does not wait for the disk. A session is stored with all its files or not at all, and a power cut may
+lose the last sessions. The files are those of a real session.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from study_app.store.blinded.blinding import open_or_draw_key, opened_key, revea
 from study_app.store.files.atomic import create_folder, make_folder
 from study_app.store.files.folders import StudyFolder
 from study_app.store.integrity.checksums import checksum_bytes, fingerprint, note_fingerprint
-from study_app.store.integrity.folder_lock import Opening, lock_folder
+from study_app.store.integrity.folder_lock import FolderLock, lock_folder
 from study_app.store.journals.journal import SessionClock, line_bytes, line_of
 from study_app.store.journals.journal_events import Allocated, Event, SessionEnded, plain_json, read_event, start_of
 from study_app.store.sessions.begin import SessionStart, check_participant, first_records, used_ids
@@ -46,7 +46,7 @@ class SimulatedStudy:
     source : bytes
         The content of the protocol's file, hashed into the receipts.
     participants : tuple of str
-        Ids of all coming participants; none may be used.
+        Ids of all participants to be simulated; none may be in use.
     seed : int
         Seed of the sessions and of the key.
     device : mapping
@@ -75,16 +75,16 @@ class SimulatedStudy:
         self.folder = StudyFolder(Path(results))
         check_study(self.folder, protocol.study.name)
         used = used_ids(self.folder)
-        for person in participants:
-            check_participant(person)
-            used.check_unused(person, 1)
+        for participant in participants:
+            check_participant(participant)
+            used.check_unused(participant, 1)
         make_folder(self.folder.path)
         self.key = open_or_draw_key(
             self.folder.path, protocol, stream(seed, "blinding").random, StudySource.split(source).liquids
         )
         self.protocol = protocol
         self.entries = Entries(self.folder)
-        self._opening: Opening | None = None
+        self._lock: FolderLock | None = None
         start = SessionStart(
             "",
             seed=seed,
@@ -131,7 +131,7 @@ class SimulatedStudy:
 
     def __enter__(self) -> Self:
         """Write the study's description, which identifies its folder."""
-        self._opening = lock_folder(self.folder.path)
+        self._lock = lock_folder(self.folder.path)
         write_description(self.folder, self.protocol.study, intervals=bool(self.protocol.design_questions))
         return self
 
@@ -142,8 +142,8 @@ class SimulatedStudy:
         try:
             update_participants(self.folder, self.protocol.study.name)
         finally:
-            if self._opening is not None:
-                self._opening.release()
+            if self._lock is not None:
+                self._lock.release()
 
 
 class SimulatedSession:
@@ -168,14 +168,14 @@ class SimulatedSession:
         self.planned = study.protocol.session_count(own_group) or 1
         self.protocol = study.protocol.for_session(own_group, session)
         started_at = clock.at(0)
-        at = {"started_at": started_at, "clock": {"origin_ns": clock.origin_ns, "origin_at": started_at}}
-        of_group = {} if group is None else {"group": group}
-        who = {"participant": participant, "session": session, **of_group}
-        self.receipt = {**study.receipt, **who, **at}
-        own: dict[str, Any] = {**who, "receipt_hash": receipt.digest(self.receipt)}
+        times = {"started_at": started_at, "clock": {"origin_ns": clock.origin_ns, "origin_at": started_at}}
+        group_field = {} if group is None else {"group": group}
+        identity = {"participant": participant, "session": session, **group_field}
+        self.receipt = {**study.receipt, **identity, **times}
+        own_fields: dict[str, Any] = {**identity, "receipt_hash": receipt.digest(self.receipt)}
         if allocation is not None:
-            own |= {"entry": allocation.entry, "place_in_group": allocation.place_in_group or None}
-        self.append(replace(study.started, **own), t_s=0.0)
+            own_fields |= {"entry": allocation.entry, "place_in_group": allocation.place_in_group or None}
+        self.append(replace(study.started, **own_fields), t_s=0.0)
         if allocation is not None and not allocation.is_preexisting and session == 1:
             self.append(Allocated(entry=allocation.entry, sealed=allocation.sealed))
 

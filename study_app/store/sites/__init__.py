@@ -1,4 +1,4 @@
-"""Merged studies: the results folders of several sites of one protocol, kept as they are next to each other."""
+"""Merged studies: unchanged copies of the results folders of several sites that ran the same protocol."""
 
 from study_app.store.sites.merge import damaged_sessions, merge_sites
 

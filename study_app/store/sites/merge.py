@@ -1,8 +1,8 @@
 """Merging: the results folders of sites are copied, unchanged, into a folder of one study.
 
-A new merged study is made under a temporary name and renamed. Further sites are copied into its folder first, where
-they do not count; then its list of sites is replaced in one step. A program that is killed leaves the old state or the
-new one, and perhaps folders that the next merge removes. Each site keeps its key: as sealed, or as opened, as it was.
+A new merged study is created under a temporary name and then renamed. Further sites are first copied into its folder,
+where they are ignored until its list of sites is replaced in one step. A program that is killed leaves either the old
+or the new state, and perhaps folders that the next merge removes. Each site keeps its key, sealed or opened.
 """
 
 import shutil
@@ -47,7 +47,7 @@ from study_app.store.tables.study_files import described_study, row_of
 from study_app.store.withdrawals import describe_session, tombstones
 
 _MAX_SITE_LENGTH: Final = 16
-_LEFT_BEHIND: Final = shutil.ignore_patterns(".open-*.json", ".*.tmp")
+_IGNORED: Final = shutil.ignore_patterns(".open-*.json", ".*.tmp")
 """Files that programs leave in a folder while they have it open, or when they are killed."""
 
 
@@ -70,12 +70,12 @@ class _Source:
     begun: Mapping[str, Path]
 
 
-def merge_sites(given: Mapping[str, Path], to: Path, progress: ReportProgress | None = None) -> Merged:
+def merge_sites(folders: Mapping[str, Path], to: Path, progress: ReportProgress | None = None) -> Merged:
     """Copy the results folders of sites into the merged study ``to``, which is created or extended.
 
     Parameters
     ----------
-    given : mapping of str to Path
+    folders : mapping of str to Path
         The sites' folders by the sites' names, which precede the participants' IDs.
     to : Path
         The merged study's folder.
@@ -85,20 +85,20 @@ def merge_sites(given: Mapping[str, Path], to: Path, progress: ReportProgress | 
     Raises
     ------
     StoreError
-        A name cannot be used or is used already, a folder is not the results of a study, is open in a program, or of
-        another protocol than the others (both hashes are named), a session is in two of them, or a file cannot be read
-        or written. The sites that are listed have not changed then.
+        A name cannot be used or is used already; a folder is not the results folder of a study, is open in a program,
+        or used another protocol than the others (the message names both hashes); a session is in two folders; or a file
+        cannot be read or written. The listed sites have not changed then.
     """
     merged = read_merged(to)
-    _check_names(given, merged)
-    _check_places(given, to, merged)
-    present = () if merged is None else tuple(_read_source(name, merged.folder(name)) for name in merged.names)
-    new = tuple(_read_source(name, path) for name, path in given.items())
-    if empty := next((name for name, source in zip(given, new, strict=True) if not source.begun), None):
-        raise StoreError(f"site {empty}: {given[empty]} does not contain any sessions yet: merge it later")
-    ran = new[0].protocol_hash if merged is None else merged.protocol_hash
-    _check_alike((*present, *new), ran)
-    _check_sessions((*present, *new))
+    _check_names(folders, merged)
+    _check_folders(folders, to, merged)
+    present_sources = () if merged is None else tuple(_read_source(name, merged.folder(name)) for name in merged.names)
+    new_sources = tuple(_read_source(name, path) for name, path in folders.items())
+    if empty := next((name for name, source in zip(folders, new_sources, strict=True) if not source.begun), None):
+        raise StoreError(f"site {empty}: {folders[empty]} does not contain any sessions yet: merge it later")
+    protocol_hash = new_sources[0].protocol_hash if merged is None else merged.protocol_hash
+    _check_same_protocol((*present_sources, *new_sources), protocol_hash)
+    _check_sessions((*present_sources, *new_sources))
     at = datetime.now().astimezone().isoformat(timespec="seconds")
     sites = tuple(
         Site(
@@ -108,18 +108,18 @@ def merge_sites(given: Mapping[str, Path], to: Path, progress: ReportProgress | 
             sessions=len(source.begun),
             withdrawals=source.withdrawals,
         )
-        for source in new
+        for source in new_sources
     )
     if merged is None:
-        made = Merged(to, new[0].study, ran, sites)
-        _create_merged(made, new, progress)
+        result = Merged(to, new_sources[0].study, protocol_hash, sites)
+        _create_merged(result, new_sources, progress)
     else:
-        made = Merged(to, merged.study, merged.protocol_hash, (*merged.sites, *sites))
+        result = Merged(to, merged.study, merged.protocol_hash, (*merged.sites, *sites))
         with lock_folder(to):
             if read_merged(to) != merged:
                 raise StoreError(f"{to} was changed by another program during the merge: merge again")
-            _add_sites(made, new, progress)
-    return made
+            _add_sites(result, new_sources, progress)
+    return result
 
 
 def damaged_sessions(folder: Path) -> list[Path]:
@@ -131,11 +131,11 @@ def damaged_sessions(folder: Path) -> list[Path]:
     ]
 
 
-def _check_names(given: Mapping[str, Path], merged: Merged | None) -> None:
-    if not given:
+def _check_names(folders: Mapping[str, Path], merged: Merged | None) -> None:
+    if not folders:
         raise StoreError("no sites were specified: specify each site as A=DIR")
     used = {} if merged is None else {name.lower(): name for name in merged.names}
-    for name in given:
+    for name in folders:
         if not ID_PATTERN.fullmatch(name) or len(name) > _MAX_SITE_LENGTH:
             raise StoreError(
                 f"{name!r} cannot be used as the name of a site: use at most {_MAX_SITE_LENGTH} letters (A-Z, a-z) and "
@@ -144,31 +144,31 @@ def _check_names(given: Mapping[str, Path], merged: Merged | None) -> None:
         if fault := file_name_fault(name):
             raise StoreError(f"site {name!r} {fault}, so it cannot be the name of a folder: use a different name")
         if (other := used.get(name.lower())) is not None:
-            held = "has already been merged" if merged is not None and other in merged.names else "is specified twice"
-            raise StoreError(f"site {name!r} {held} (case is ignored): use a different name")
+            reason = "has already been merged" if merged is not None and other in merged.names else "is specified twice"
+            raise StoreError(f"site {name!r} {reason} (case is ignored): use a different name")
         used[name.lower()] = name
 
 
-def _check_places(given: Mapping[str, Path], to: Path, merged: Merged | None) -> None:
+def _check_folders(folders: Mapping[str, Path], to: Path, merged: Merged | None) -> None:
     target = to.resolve()
     if merged is None and is_there(to) and (not to.is_dir() or _entries(to)):
         raise StoreError(f"{to} is not a merged study and is not empty: specify a new folder with --to")
-    for above in (target, *target.parents):
-        if described_study(StudyFolder(above)) is not None:
-            raise StoreError(f"{to} is, or lies within, the results folder {above}: specify a folder outside it")
-    for name, path in given.items():
+    for parent in (target, *target.parents):
+        if described_study(StudyFolder(parent)) is not None:
+            raise StoreError(f"{to} is, or lies within, the results folder {parent}: specify a folder outside it")
+    for name, path in folders.items():
         if read_merged(path) is not None or merged_above(path) is not None:
             raise StoreError(f"site {name}: {path} belongs to a merged study: specify the folder of the site itself")
-        place = path.resolve()
-        if place.is_relative_to(target):
+        resolved = path.resolve()
+        if resolved.is_relative_to(target):
             raise StoreError(f"site {name}: {path} lies within {to}: specify a folder outside it with --to")
 
 
 def _read_source(name: str, path: Path) -> _Source:
     """Read the properties of a results folder that must agree between sites."""
     study = StudyFolder(path)
-    described = described_study(study)
-    if described is None:
+    study_name = described_study(study)
+    if study_name is None:
         raise StoreError(
             f"site {name}: {path} is not the results folder of a study ({study.description.name} is missing): specify "
             "one such as results/rek2024"
@@ -183,7 +183,7 @@ def _read_source(name: str, path: Path) -> _Source:
     for session in sessions:
         refuse_if_open(session.path)
     receipts = [receipt.read(session.receipt) for session in sessions]
-    hashes = dict.fromkeys(str(held["protocol_hash"]) for held in receipts)
+    hashes = dict.fromkeys(str(session_receipt["protocol_hash"]) for session_receipt in receipts)
     if len(hashes) > 1:
         raise StoreError(
             f"site {name}: sessions in {path} used {len(hashes)} different protocols (SHA-256 {', '.join(hashes)}): "
@@ -193,16 +193,16 @@ def _read_source(name: str, path: Path) -> _Source:
         name=name,
         path=path,
         state=state,
-        study=described,
+        study=study_name,
         protocol_hash=next(iter(hashes), ""),
-        pilot=any(held["pilot"] for held in receipts) if receipts else None,
+        pilot=any(session_receipt["pilot"] for session_receipt in receipts) if receipts else None,
         key=verified_key(study),
         withdrawals=len(tombstones(study)),
         begun={describe_session(session).begun or str(session.path): session.path for session in sessions},
     )
 
 
-def _check_alike(sources: tuple[_Source, ...], protocol_hash: str) -> None:
+def _check_same_protocol(sources: tuple[_Source, ...], protocol_hash: str) -> None:
     """Raise an error for sites with different protocols, or rehearsals or pilots mixed with participants."""
     first = next((source for source in sources if source.protocol_hash), sources[0])
     for other in sources:
@@ -214,12 +214,12 @@ def _check_alike(sources: tuple[_Source, ...], protocol_hash: str) -> None:
             )
         if other.key.drawn != first.key.drawn or other.pilot not in (None, first.pilot):
             raise StoreError(
-                f"site {other.name} contains {_kind(other)}, but site {first.name} contains {_kind(first)}: only "
-                "sessions of the same kind can be merged"
+                f"site {other.name} contains {_session_kind(other)}, but site {first.name} contains "
+                f"{_session_kind(first)}: only sessions of the same kind can be merged"
             )
 
 
-def _kind(source: _Source) -> str:
+def _session_kind(source: _Source) -> str:
     return "pilot sessions" if source.pilot else "rehearsals" if source.key.drawn == "seed" else "real sessions"
 
 
@@ -238,47 +238,47 @@ def _check_sessions(sources: tuple[_Source, ...]) -> None:
 def _create_merged(merged: Merged, sources: tuple[_Source, ...], progress: ReportProgress | None) -> None:
     """Create the folder atomically."""
     target = merged.path.absolute()
-    half = temporary_path(target)
+    temporary = temporary_path(target)
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         for path in temporary_files(target.parent, target.name):  # left by interrupted merges
             if path.is_dir() and not is_open(path):
                 shutil.rmtree(path, ignore_errors=True)
-        opening = create_locked_folder(half)
-        (half / FOLDER).mkdir()
+        lock = create_locked_folder(temporary)
+        (temporary / FOLDER).mkdir()
         for source in sources:
-            _copy(source, half / FOLDER / source.name, progress)
-        write_file(half / merged.manifest.name, merged.content())
-        sync_folder(half / FOLDER)
-        if opening is not None:
-            opening.release()
-        sync_folder(half)
+            _copy_site(source, temporary / FOLDER / source.name, progress)
+        write_file(temporary / merged.manifest.name, merged.content())
+        sync_folder(temporary / FOLDER)
+        if lock is not None:
+            lock.release()
+        sync_folder(temporary)
         if target.is_dir():
             target.rmdir()
-        move(half, target)
+        move(temporary, target)
     except OSError as error:  # shutil.Error, too
         raise cannot_write(merged.path, error) from error
     finally:
-        shutil.rmtree(half, ignore_errors=True)
+        shutil.rmtree(temporary, ignore_errors=True)
     flush_entry(target)
 
 
 def _add_sites(merged: Merged, sources: tuple[_Source, ...], progress: ReportProgress | None) -> None:
     """Copy further sites into the folder; they take effect once they are listed."""
-    place = merged.path / FOLDER
-    remove_temporary_files(place)
+    sites_folder = merged.path / FOLDER
+    remove_temporary_files(sites_folder)
     copies: list[Path] = []
     try:
         for source in sources:
             copy = merged.folder(source.name)
             if is_there(copy):  # left by an interrupted merge: it is not listed
                 shutil.rmtree(copy)
-            half = temporary_path(copy)
-            copies.append(half)
-            _copy(source, half, progress)
-            move(half, copy)
+            temporary = temporary_path(copy)
+            copies.append(temporary)
+            _copy_site(source, temporary, progress)
+            move(temporary, copy)
             copies[-1] = copy
-        sync_folder(place)
+        sync_folder(sites_folder)
         write_file(merged.manifest, merged.content())
     except (OSError, StoreError) as error:
         if read_merged(merged.path) != merged:  # the list may be written although its folder could not be flushed
@@ -287,8 +287,8 @@ def _add_sites(merged: Merged, sources: tuple[_Source, ...], progress: ReportPro
         raise error if isinstance(error, StoreError) else cannot_write(merged.path, error) from error
 
 
-def _copy(source: _Source, to: Path, progress: ReportProgress | None) -> None:
-    """Copy a results folder and flush it to the disk; links stay links, for `verify` to judge."""
+def _copy_site(source: _Source, to: Path, progress: ReportProgress | None) -> None:
+    """Copy a results folder and flush it to the disk; links are copied as links, which `verify` reports."""
     numbers = count()
 
     def copy_next(*paths: str) -> str:
@@ -297,7 +297,7 @@ def _copy(source: _Source, to: Path, progress: ReportProgress | None) -> None:
             progress(f"copying site {source.name}", min(number / len(source.state), 1.0))
         return copy_file(*paths)
 
-    shutil.copytree(source.path, to, symlinks=True, ignore=_LEFT_BEHIND, copy_function=copy_next)
+    shutil.copytree(source.path, to, symlinks=True, ignore=_IGNORED, copy_function=copy_next)
     sync_folders(to)
     refuse_if_open(source.path)
     if _folder_state(source.path) != source.state:
@@ -309,13 +309,13 @@ def _copy(source: _Source, to: Path, progress: ReportProgress | None) -> None:
 def _folder_state(path: Path) -> list[tuple[Path, int, int]]:
     """Return path, size and modification time of every file in a folder, to detect changes."""
     states = [(entry, entry.lstat()) for entry in paths_in(path)]
-    return [(entry, held.st_size, held.st_mtime_ns) for entry, held in states if not entry.is_dir()]
+    return [(entry, status.st_size, status.st_mtime_ns) for entry, status in states if not entry.is_dir()]
 
 
 def stray_entries(merged: Merged) -> tuple[Path, ...]:
     """Return the entries next to the sites that are not listed, left by an interrupted merge or added by hand."""
-    place = merged.path / FOLDER
-    return tuple(path for path in _entries(place) if path.name not in merged.names)
+    sites_folder = merged.path / FOLDER
+    return tuple(path for path in _entries(sites_folder) if path.name not in merged.names)
 
 
 def _entries(folder: Path) -> list[Path]:

@@ -180,7 +180,7 @@ def test_recordings_without_a_line_are_taken_up_if_whole_and_lost_if_not(
     store.recorder.close()
     store.append(store.recorder.collect_results()[0])
     store.journal.close()
-    store.opening.release()
+    store.lock.release()
     torn = store.folder.recordings / ".trial-003.parquet.0123abcd.tmp"
     torn.write_bytes(b"PAR1")
     frames = recording_files(store.folder.recordings, 3, 1)[1]
