@@ -1,9 +1,9 @@
-"""Recordings are written in the background: samples at 1 kHz are queued, and a separate thread writes them.
+"""Recording in the background: samples at 1 kHz are queued, and a separate thread writes them.
 
 Queueing never waits for the disk. If the disk is too slow for two minutes, or rejects all writes, samples are dropped
-and counted and the session continues: answers matter more than recordings. Any other failure loses only that trial's
-recording, even if it ends the thread: the next trial starts another. `Recorder.lost` reports it at once. In a
-rehearsal, in simulated time, queueing waits instead, and nothing is lost.
+and counted and the session continues, because answers matter more than recordings. Any other failure loses only that
+trial's recording, even if it ends the thread, because the next trial starts a new one. `Recorder.lost` reports it at
+once. In a rehearsal, which runs in simulated time, queueing waits instead, and nothing is lost.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ from study_app.store.files.atomic import sync_folder, system_message
 from study_app.store.journals.journal_events import Recorded, RecordingLost, Which
 
 if TYPE_CHECKING:
-    from study_app.store.recordings import Written
+    from study_app.store.recordings import WrittenFile
     from study_app.video.frames import VideoFrame
 
 ROOM = 120_000  # capacity of the queue [samples]: two minutes at 1 kHz, 37 MB
-_ENOUGH = 5_000  # smallest number of queued samples that wakes the thread
+_WAKE_SAMPLES = 5_000  # smallest number of queued samples that wakes the thread
 PATIENCE_S = 30.0  # time that the end of a session waits for the disk [s]
 LEAVING_S = 2.0  # the same when the program ends during a session, which must not take long [s]
 
@@ -63,7 +63,7 @@ class Recorder:
     secret : bytes, optional
         The key that seals the files until the study is unblinded; None: they are not sealed.
     waits : bool
-        Whether `append` waits for room instead of dropping: for rehearsals.
+        Whether `append` waits for room in the queue instead of dropping samples; for rehearsals.
     room : int
         Capacity of the queue in samples.
 
@@ -101,7 +101,7 @@ class Recorder:
         self._patient_until_s = 0.0
         self._kept: list[Kept] = []
         self._lost: list[RecordingLost] = []
-        self._underway: Which | None = None
+        self._current: Which | None = None
         self._expected: dict[Which, None] = {}
         self._frames = array("q")
         self._dropped = 0
@@ -109,15 +109,15 @@ class Recorder:
     def start(self, trial: int, attempt: int, rate_hz: float, interval: int | None = None) -> None:
         """Begin the recording of a trial, or of one of its intervals; stop a running one first.
 
-        Its first sample should be the one before the trial's first, of another scene: a replay starts from the last
-        force on the hand.
+        The first appended sample should be the last one before the trial, from the previous scene: a replay starts
+        from the force that was then on the hand.
         """
         self.stop()
-        self._underway = trial, attempt, interval
+        self._current = trial, attempt, interval
         self._frames, self._dropped = array("q"), 0
         with self.changed:
             if self._closing:
-                self._underway = None
+                self._current = None
                 return
             self._expected[trial, attempt, interval] = None
             self._queue.append(_Begin((trial, attempt, interval), rate_hz))
@@ -132,7 +132,7 @@ class Recorder:
     def append(self, samples: Any) -> None:
         """Queue the next samples, in order (array of ``layout.SAMPLE``), which must not be changed afterwards."""
         count = len(samples)
-        if self._underway is None or count == 0:
+        if self._current is None or count == 0:
             return
         with self.changed:
             while self._waits and self._waiting and self._waiting + count > self._room and self._is_running():
@@ -142,20 +142,20 @@ class Recorder:
                 return
             self._queue.append(samples)
             self._waiting += count
-            if self._waiting >= min(_ENOUGH, self._room):
+            if self._waiting >= min(_WAKE_SAMPLES, self._room):
                 self.changed.notify_all()
 
     def frame(self, painted_ns: int, sample_ns: int, video: VideoFrame | None = None) -> None:
-        """Record when a frame was painted and the time it shows [ns, servo clock], and the frame of a ``video``."""
-        if self._underway is not None:
-            seen = (-1, 0, None) if video is None else (video.number, video.due_ns, video.age_ns)
-            self._frames.extend((painted_ns, sample_ns, *seen[:2], -1 if seen[2] is None else seen[2]))
+        """Record when a frame was painted, the time of the sample it shows [ns, servo clock] and its video frame."""
+        if self._current is not None:
+            number, due_ns, age_ns = (-1, 0, None) if video is None else (video.number, video.due_ns, video.age_ns)
+            self._frames.extend((painted_ns, sample_ns, number, due_ns, -1 if age_ns is None else age_ns))
 
     def stop(self) -> None:
         """End the running recording, if any; `collect_results` reports when it is on the disk."""
-        if self._underway is None:
+        if self._current is None:
             return
-        self._underway = None
+        self._current = None
         with self.changed:
             self._queue.append(_End(self._frames, self._dropped))
             self.changed.notify_all()
@@ -180,7 +180,7 @@ class Recorder:
     def end_without_waiting(self) -> bool:
         """End the running recording; return, without waiting, whether it is written or the time limit has passed.
 
-        Then `close` returns at once.
+        Once it returns True, `close` returns at once.
         """
         self._end()
         return not self._is_running() or time.perf_counter() >= self._patient_until_s
@@ -217,12 +217,12 @@ class Recorder:
 
     def _lose_all(self, reason: str) -> None:
         """Count all running and queued recordings as lost; the caller holds the lock."""
-        failed = [lost_event(which, reason) for which in self._expected]
-        self._kept += failed
-        self._lost += failed
+        lost = [lost_event(which, reason) for which in self._expected]
+        self._kept += lost
+        self._lost += lost
         self._expected.clear()
         self._queue.clear()
-        self._waiting, self._underway, self.thread = 0, None, None
+        self._waiting, self._current, self.thread = 0, None, None
         self.changed.notify_all()
 
     def _process_queue(self) -> None:
@@ -243,40 +243,40 @@ class Recorder:
                         path.unlink(missing_ok=True)
 
     def _record(self, begin: _Begin) -> Kept:
-        """Write one trial's files; on return the queue is past the trial's end, even after a failure."""
+        """Write one trial's files and consume its queue items up to the trial's end, even after a failure."""
         samples_path, frames_path = recording_files(self._folder, *begin.which)
         trial, attempt, interval = begin.which
         facts = {**self._facts, "trial": trial, "attempt": attempt}
         if interval is not None:
             facts["interval"] = interval
-        shown: Written | None = None
+        frames_file: WrittenFile | None = None
         end: _End | None = None
         try:
             if not self._folder.is_dir():
                 self._folder.mkdir()
                 sync_folder(self._folder.parent)  # so that it survives a power cut
             file = self._files.SamplesFile(samples_path, facts, begin.rate_hz, self._secret)
-            end = self._give_samples(file.write)
+            end = self._consume_samples(file.write)
             frames = np.frombuffer(end.frames, np.int64).reshape(-1, 5)
-            seconds = (file.taken + end.dropped) / begin.rate_hz
-            shown = self._files.write_frames(frames_path, frames, facts, seconds, self._secret)
-            return recorded_event(begin.which, file.finish(end.dropped), shown, end.dropped)
+            seconds = (file.received_rows + end.dropped) / begin.rate_hz
+            frames_file = self._files.write_frames(frames_path, frames, facts, seconds, self._secret)
+            return recorded_event(begin.which, file.finish(end.dropped), frames_file, end.dropped)
         except Exception as error:  # noqa: BLE001 - after any error the next trial's recording is still written
             with contextlib.suppress(Exception):  # `verify` reports files that cannot be removed
-                if shown is not None:
-                    shown.path.unlink(missing_ok=True)
+                if frames_file is not None:
+                    frames_file.path.unlink(missing_ok=True)
             if end is None:
-                self._give_samples(lambda _: None)
-            failed = error.__cause__ if isinstance(error, StoreError) else error
-            reason = system_message(failed) if isinstance(failed, OSError) else f"{type(error).__name__}: {error}"
+                self._consume_samples(lambda _: None)
+            cause = error.__cause__ if isinstance(error, StoreError) else error
+            reason = system_message(cause) if isinstance(cause, OSError) else f"{type(error).__name__}: {error}"
             return lost_event(begin.which, reason)
 
-    def _give_samples(self, take: Callable[[Any], object]) -> _End:
-        """Pass the queued samples of a trial to ``take``; return the trial's end, or an empty one if it is missing."""
-        while (thing := self._next_item()) is not None:
-            if isinstance(thing, _End):
-                return thing
-            take(thing)
+    def _consume_samples(self, consume: Callable[[Any], object]) -> _End:
+        """Pass the queued samples of a trial to ``consume``; return the trial's end, or an empty one if it has none."""
+        while (item := self._next_item()) is not None:
+            if isinstance(item, _End):
+                return item
+            consume(item)
         return _End(array("q"), 0)
 
     def _next_item(self) -> Any:
@@ -286,14 +286,14 @@ class Recorder:
                 self.changed.wait()
             if not self._queue:
                 return None
-            thing = self._queue.popleft()
-            if not isinstance(thing, _Begin | _End):
-                self._waiting -= len(thing)
+            item = self._queue.popleft()
+            if not isinstance(item, _Begin | _End):
+                self._waiting -= len(item)
                 self.changed.notify_all()
-            return thing
+            return item
 
 
-def recorded_event(which: Which, samples: Written, frames: Written, dropped: int) -> Recorded:
+def recorded_event(which: Which, samples: WrittenFile, frames: WrittenFile, dropped: int) -> Recorded:
     """Return the journal's event for a complete recording, with paths relative to the session's folder."""
     trial, attempt, interval = which
     return Recorded(
@@ -320,7 +320,7 @@ def lost_event(which: Which, reason: str) -> RecordingLost:
 
 def recording_files(folder: Path, trial: int, attempt: int, interval: int | None = None) -> tuple[Path, Path]:
     """Return the files of samples and of frames, such as trial-003.parquet and trial-003_interval-2_frames.parquet."""
-    again = f"_attempt-{attempt}" if attempt > 1 else ""
-    part = "" if interval is None else f"_interval-{interval}"
-    name = f"trial-{trial:03d}{again}{part}"
+    attempt_part = f"_attempt-{attempt}" if attempt > 1 else ""
+    interval_part = "" if interval is None else f"_interval-{interval}"
+    name = f"trial-{trial:03d}{attempt_part}{interval_part}"
     return folder / f"{name}.parquet", folder / f"{name}_frames.parquet"

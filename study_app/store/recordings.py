@@ -2,12 +2,12 @@
 
 Times, positions and velocities measured by the device are stored exactly, so that the trial can be recomputed; computed
 velocities and forces are rounded to steps far below the resolution of device and hand, so that half an hour at 1 kHz
-takes 30 to 56 MB; a measured velocity adds 43 MB at most. A CRC-32 of the exact computed numbers of every second proves
-them.
+takes 30 to 56 MB; a measured velocity adds 43 MB at most. A CRC-32 per second of the exact computed forces allows a
+replay to check them.
 
 Positions, velocities and forces are in the frames of ``haptics.model.layout.SAMPLE``. Any Parquet reader can read the
 columns, with unit and meaning in each column's metadata. Until the study is unblinded the files are sealed as a whole
-(see `blinded.sealing`), and whoever reads them needs the secret of the study's key.
+(see `blinded.sealing`), and reading them requires the secret of the study's key.
 """
 
 import contextlib
@@ -34,8 +34,8 @@ from study_app.store.files.csv_files import Column
 from study_app.store.journals.journal_events import plain_json
 
 _FORMAT = 4
-_RECORDED = tuple(field for field in SAMPLE_FIELDS if field.meaning)
-ROUNDED_TO = {field.name: field.step for field in _RECORDED if field.step}
+_RECORDED_FIELDS = tuple(field for field in SAMPLE_FIELDS if field.meaning)
+ROUNDED_TO = {field.name: field.step for field in _RECORDED_FIELDS if field.step}
 """Fields of ``layout.SAMPLE`` that are recorded rounded, and the step."""
 _FRAME = np.dtype([(column.name, np.int64) for column in FRAMES])
 _NO_VIDEO = {"video_frame": -1, "video_ns": 0, "video_age_ns": -1}
@@ -46,13 +46,13 @@ _VIDEO_SINCE = 4
 _GROUP_SECONDS = 30  # seconds of rows that are compressed together
 _COMPRESSION = ("zstd", 9)
 _STORED = {
-    **{name: pa.from_numpy_dtype(field.stored) for field in _RECORDED for name in field.named()},
+    **{name: pa.from_numpy_dtype(field.stored) for field in _RECORDED_FIELDS for name in field.named()},
     **{column.name: pa.int64() for column in FRAMES},
 }
 
 
 @dataclass(frozen=True, slots=True)
-class Written:
+class WrittenFile:
     """A complete recording on the disk; for a sealed one, also the SHA-256 of the opened file."""
 
     path: Path
@@ -79,7 +79,7 @@ def read_samples(path: Path, secret: bytes | None = None) -> Any:
 
     A sealed recording is read with the ``secret`` of the study's key.
 
-    The first sample's force on the hand, from which the next one moves, is exact. Recordings of format 1 assume that
+    The first sample's force on the hand, from which a replay starts, is exact. Recordings of format 1 assume that
     every device sends the commanded force one tick late; until format 2 no device measured its velocity.
 
     Raises
@@ -89,15 +89,15 @@ def read_samples(path: Path, secret: bytes | None = None) -> Any:
     """
     columns, facts = _read_columns(path, "samples", secret)
     samples = records(SAMPLE, len(columns["tick"]))
-    for field in _RECORDED:
+    for field in _RECORDED_FIELDS:
         values: Any = field.before
         if field.since <= facts["format"]:
             values = np.column_stack([columns[name] for name in field.named()])
             if field.measured:
                 values = np.where(columns["measured"][:, np.newaxis] & field.measured, values, 0.0)
         if field.beside:
-            values = _rows(samples, field.beside) + field.sign * values
-        _rows(samples, field.name)[:] = values
+            values = _component_rows(samples, field.beside) + field.sign * values
+        _component_rows(samples, field.name)[:] = values
     if len(samples) and None not in facts["first_device_force_n"]:
         samples["device_force_n"][0] = facts["first_device_force_n"]
         samples["command_n"][0] = facts.get("first_command_n", facts["first_device_force_n"])
@@ -105,7 +105,7 @@ def read_samples(path: Path, secret: bytes | None = None) -> Any:
 
 
 def read_frames(path: Path, secret: bytes | None = None) -> Any:
-    """Return the frames (n,) as a recarray of `_FRAME`: times of painting, of the shown sample and of a video [ns].
+    """Return the frames (n,) as a recarray of `_FRAME`: the times of painting, shown sample and video frame [ns].
 
     Raises
     ------
@@ -121,16 +121,16 @@ def read_frames(path: Path, secret: bytes | None = None) -> Any:
 
 def read_facts(path: Path, secret: bytes | None = None) -> dict[str, Any]:
     """Return the file's metadata without reading its rows: facts, ``kind`` and ``rows``."""
-    with _opened(path, secret) as file:
-        return _facts(path, file.metadata)
+    with _open_parquet(path, secret) as file:
+        return _parse_facts(path, file.metadata)
 
 
-def read_written(path: Path, secret: bytes | None = None) -> Written:
+def describe_recording(path: Path, secret: bytes | None = None) -> WrittenFile:
     """Return path, row count and checksums of a recording on the disk."""
     rows = read_facts(path, secret)["rows"]
     content = read_regular(path)
-    file_hash, opened = (hashlib.sha256(it).hexdigest() for it in (content, opened_content(path, content, secret)))
-    return Written(path, rows, file_hash, None if opened == file_hash else opened)
+    file_hash, opened = (hashlib.sha256(data).hexdigest() for data in (content, opened_content(path, content, secret)))
+    return WrittenFile(path, rows, file_hash, None if opened == file_hash else opened)
 
 
 def read_checks(path: Path, secret: bytes | None = None) -> Checks:
@@ -150,8 +150,8 @@ def read_checks(path: Path, secret: bytes | None = None) -> Checks:
 
 def crcs(forces: NDArray[np.float64], rows: int) -> list[int]:
     """Return the CRC-32 of every ``rows`` forces (n, 3) [N], and of the remainder."""
-    exact = np.ascontiguousarray(forces, "<f8")
-    return [zlib.crc32(exact[first : first + rows].tobytes()) for first in range(0, len(exact), rows)]
+    little_endian = np.ascontiguousarray(forces, "<f8")
+    return [zlib.crc32(little_endian[first : first + rows].tobytes()) for first in range(0, len(little_endian), rows)]
 
 
 def opened_content(path: Path, content: bytes, secret: bytes | None) -> bytes:
@@ -170,7 +170,7 @@ def opened_content(path: Path, content: bytes, secret: bytes | None) -> bytes:
 
 
 @contextlib.contextmanager
-def _opened(path: Path, secret: bytes | None) -> Iterator[Any]:
+def _open_parquet(path: Path, secret: bytes | None) -> Iterator[Any]:
     """Open a recording as Parquet, converting read errors to StoreError."""
     try:
         with parquet.ParquetFile(pa.BufferReader(opened_content(path, read_regular(path), secret))) as file:
@@ -183,34 +183,34 @@ def _opened(path: Path, secret: bytes | None) -> Iterator[Any]:
 
 
 def _read_columns(path: Path, kind: str, secret: bytes | None) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
-    with _opened(path, secret) as file:
-        facts = _facts(path, file.metadata)
+    with _open_parquet(path, secret) as file:
+        facts = _parse_facts(path, file.metadata)
         if facts["kind"] != kind:
             raise StoreError(f"{path} contains {facts['kind']}, not {kind}: specify the trial's other file")
         table = file.read().combine_chunks()
-    held = facts["format"]
+    file_format = facts["format"]
     if kind == "frames":
-        columns = [column.name for column in FRAMES if held >= _VIDEO_SINCE or column.name not in _NO_VIDEO]
+        columns = [column.name for column in FRAMES if file_format >= _VIDEO_SINCE or column.name not in _NO_VIDEO]
     else:
-        columns = [name for field in _RECORDED if field.since <= held for name in field.named()]
+        columns = [name for field in _RECORDED_FIELDS if field.since <= file_format for name in field.named()]
     if not _has_columns(table, columns, facts["rows"]):
         raise StoreError(f"{path} is damaged (it does not have the columns of {kind}): restore it from a backup")
-    return {name: _numbers(table.column(name), facts["rows"]) for name in table.column_names}, facts
+    return {name: _column_values(table.column(name), facts["rows"]) for name in table.column_names}, facts
 
 
 def _has_columns(table: pa.Table, columns: Sequence[str], rows: int) -> bool:
     """Return whether a table has exactly these columns, each once and with all rows."""
     expected = {name: _STORED[name] for name in columns}
-    held = {field.name: field.type for field in table.schema}
+    actual = {field.name: field.type for field in table.schema}
     return (
         table.num_rows == rows
-        and len(table.column_names) == len(held)
-        and held == expected
+        and len(table.column_names) == len(actual)
+        and actual == expected
         and not any(column.null_count for column in table.columns)
     )
 
 
-def _numbers(column: pa.ChunkedArray, rows: int) -> NDArray[Any]:
+def _column_values(column: pa.ChunkedArray, rows: int) -> NDArray[Any]:
     if rows == 0:
         return np.empty(0, column.type.to_pandas_dtype())
     array = column.chunk(0)
@@ -220,7 +220,7 @@ def _numbers(column: pa.ChunkedArray, rows: int) -> NDArray[Any]:
     return np.frombuffer(raw, array.type.to_pandas_dtype(), count=end)[array.offset :]
 
 
-def _facts(path: Path, metadata: Any) -> dict[str, Any]:
+def _parse_facts(path: Path, metadata: Any) -> dict[str, Any]:
     try:
         facts = parse_json(metadata.metadata[_FACTS_KEY])
         if facts["format"] not in range(1, _FORMAT + 1):
@@ -230,23 +230,25 @@ def _facts(path: Path, metadata: Any) -> dict[str, Any]:
                 "version"
             )
         if facts["kind"] == "samples":
-            _check_facts_of_samples(facts, metadata.num_rows)
+            _check_sample_facts(facts, metadata.num_rows)
         return {**facts, "kind": facts["kind"], "rows": metadata.num_rows}
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise StoreError(f"{path} is not a recording made by this program: restore it from a backup") from error
 
 
-def _check_facts_of_samples(facts: Mapping[str, Any], rows: int) -> None:
-    """Raise KeyError, TypeError or ValueError if a fact that must be a number is not."""
+def _check_sample_facts(facts: Mapping[str, Any], rows: int) -> None:
+    """Raise KeyError, TypeError or ValueError if a number is missing or has another type."""
     if rows and "first_device_force_n" not in facts:
         raise KeyError("first_device_force_n")
     checks = facts["crc32"]
-    whole = (checks["rows"], *checks["device_force"], *checks["effect_force"])
-    if not all(isinstance(number, int) for number in whole):
+    integers = (checks["rows"], *checks["device_force"], *checks["effect_force"])
+    if not all(isinstance(number, int) for number in integers):
         raise ValueError("its checks are invalid")
     for name in {"first_device_force_n", "first_command_n"} & facts.keys():
-        first = facts[name]
-        if len(first) not in (0, 3) or not all(number is None or isinstance(number, int | float) for number in first):
+        force_n = facts[name]
+        if len(force_n) not in (0, 3) or not all(
+            number is None or isinstance(number, int | float) for number in force_n
+        ):
             raise ValueError(f"{name} does not contain three force components")
 
 
@@ -255,27 +257,27 @@ class SamplesFile:
 
     def __init__(self, path: Path, facts: Mapping[str, Any], rate_hz: float, secret: bytes | None = None) -> None:
         self.path = path
-        self.taken = 0
+        self.received_rows = 0
         self._secret = secret
         self.check_rows = max(1, round(rate_hz))
         self.group_rows = self.check_rows * _GROUP_SECONDS
         self.rows = 0
-        self._held: list[Any] = []  # samples of the next group
-        self._count = 0  # of them
+        self._buffer: list[Any] = []  # samples of the next group
+        self._buffered_rows = 0  # in _buffer
         self._facts = {**facts, "rate_hz": rate_hz}
-        self._half = _Half(path, SAMPLES)
+        self._pending = _PendingFile(path, SAMPLES)
         self._device: list[int] = []
         self._effect: list[int] = []
 
     def write(self, samples: Any) -> None:
         """Add the next samples (array of ``SAMPLE``); complete row groups are written."""
-        self._held.append(samples)
-        self.taken += len(samples)
-        self._count += len(samples)
-        while self._count >= self.group_rows:
-            together = np.concatenate(self._held)
+        self._buffer.append(samples)
+        self.received_rows += len(samples)
+        self._buffered_rows += len(samples)
+        while self._buffered_rows >= self.group_rows:
+            together = np.concatenate(self._buffer)
             self._write_group(together[: self.group_rows])
-            self._held, self._count = [together[self.group_rows :]], self._count - self.group_rows
+            self._buffer, self._buffered_rows = [together[self.group_rows :]], self._buffered_rows - self.group_rows
 
     def _write_group(self, samples: Any) -> None:
         if self.rows == 0:
@@ -283,43 +285,43 @@ class SamplesFile:
             self._facts["first_command_n"] = plain_json(samples["command_n"][:1].ravel())
         self._device += crcs(samples["device_force_n"], self.check_rows)
         self._effect += crcs(samples["force_n"], self.check_rows)
-        self._half.write(_sample_columns(samples))
+        self._pending.write(_sample_columns(samples))
         self.rows += len(samples)
 
-    def finish(self, dropped: int = 0) -> Written:
+    def finish(self, dropped: int = 0) -> WrittenFile:
         """Complete the file and write it to its path; ``dropped`` is the number of missing samples."""
-        if self._count:
-            self._write_group(np.concatenate(self._held))
+        if self._buffered_rows:
+            self._write_group(np.concatenate(self._buffer))
         checks = {"rows": self.check_rows, "device_force": self._device, "effect_force": self._effect}
         facts = {"format": _FORMAT, "kind": "samples", **self._facts, "dropped": dropped, "crc32": checks}
         rate_hz = self._facts["rate_hz"]
         size = samples_bytes((self.rows + dropped) / rate_hz, rate_hz)
-        return self._half.finish(facts, self.rows, size, self._secret)
+        return self._pending.finish(facts, self.rows, size, self._secret)
 
 
 def write_frames(
     path: Path, frames: NDArray[np.int64], facts: Mapping[str, Any], seconds: float = 0.0, secret: bytes | None = None
-) -> Written:
+) -> WrittenFile:
     """Write the shown frames (n, 5): time painted, time shown, and number, time and age of the video frame [ns].
 
-    With a ``secret`` they are sealed, into a size that follows from the ``seconds`` of the recording.
+    With a ``secret`` they are sealed; the file's size then depends only on the recording's length in ``seconds``.
     """
-    half = _Half(path, FRAMES)
+    file = _PendingFile(path, FRAMES)
     painted, shown, *video = frames.T
     columns = {"painted_ns": painted, "sample_ns": shown, "age_ns": painted - shown}
-    half.write({**columns, **dict(zip(_NO_VIDEO, video, strict=True))})
+    file.write({**columns, **dict(zip(_NO_VIDEO, video, strict=True))})
     size = frames_bytes(seconds)
-    return half.finish({"format": _FORMAT, "kind": "frames", **facts}, len(frames), size, secret)
+    return file.finish({"format": _FORMAT, "kind": "frames", **facts}, len(frames), size, secret)
 
 
 def _sample_columns(samples: Any) -> dict[str, NDArray[Any]]:
     """Return the columns of ``samples`` as recorded: times and positions exact, other fields rounded."""
     columns: dict[str, NDArray[Any]] = {}
     with np.errstate(invalid="ignore", over="ignore"):  # non-finite values of a fault are stored unchanged
-        for field in _RECORDED:
-            values = _round_values(_rows(samples, field.name), field.step)
+        for field in _RECORDED_FIELDS:
+            values = _round_values(_component_rows(samples, field.name), field.step)
             if field.beside:
-                values = field.sign * (values - _round_values(_rows(samples, field.beside), field.step))
+                values = field.sign * (values - _round_values(_component_rows(samples, field.beside), field.step))
             if field.measured:
                 values = np.where(samples["measured"][:, np.newaxis] & field.measured, values, np.nan)
             for name, column in zip(field.named(), values.T, strict=True):
@@ -327,7 +329,7 @@ def _sample_columns(samples: Any) -> dict[str, NDArray[Any]]:
     return columns
 
 
-def _rows(samples: Any, name: str) -> NDArray[Any]:
+def _component_rows(samples: Any, name: str) -> NDArray[Any]:
     """Return a field of samples as an array of shape (samples, components), which is a view."""
     return np.reshape(samples[name], (len(samples), SAMPLE[name].shape[0] if SAMPLE[name].shape else 1))
 
@@ -336,8 +338,8 @@ def _round_values(values: NDArray[Any], step: float) -> NDArray[Any]:
     return np.asarray(np.rint(values / step) * step) if step else values
 
 
-class _Half:
-    """A Parquet file that is kept in memory until it is complete; half an hour takes 60 MB."""
+class _PendingFile:
+    """A Parquet file in memory until it is complete; half an hour takes 60 MB."""
 
     def __init__(self, path: Path, columns: Sequence[Column]) -> None:
         self._path = path
@@ -355,25 +357,25 @@ class _Half:
 
     def write(self, columns: Mapping[str, NDArray[Any]]) -> None:
         arrays = []
-        for field in self._schema:  # without a copy, and without the library that Arrow would load to inspect them
+        for field in self._schema:  # from_buffers neither copies nor loads the library with which Arrow inspects arrays
             values = columns[field.name]
-            packs = pa.types.is_boolean(field.type)
-            kept = np.packbits(values, bitorder="little") if packs else np.ascontiguousarray(values)
-            arrays.append(pa.Array.from_buffers(field.type, len(values), [None, pa.py_buffer(kept)]))
+            is_boolean = pa.types.is_boolean(field.type)
+            buffer = np.packbits(values, bitorder="little") if is_boolean else np.ascontiguousarray(values)
+            arrays.append(pa.Array.from_buffers(field.type, len(values), [None, pa.py_buffer(buffer)]))
         self._writer.write_batch(pa.RecordBatch.from_arrays(arrays, schema=self._schema))
 
-    def finish(self, facts: Mapping[str, Any], rows: int, size: int, secret: bytes | None) -> Written:
-        """Write the file in one step, sealed if there is a ``secret``, so that an opened file is never on the disk."""
+    def finish(self, facts: Mapping[str, Any], rows: int, size: int, secret: bytes | None) -> WrittenFile:
+        """Write the file in one step; with a ``secret`` only the sealed content ever reaches the disk."""
         self._writer.add_key_value_metadata({_FACTS_KEY: json.dumps(facts, ensure_ascii=False)})
         self._writer.close()
         content = self._file.getvalue()
         opened_hash = hashlib.sha256(content).hexdigest()
         if secret is None:
             write_file(self._path, content)
-            return Written(self._path, rows, opened_hash)
+            return WrittenFile(self._path, rows, opened_hash)
         sealed = seal_file(content, size, secret)
         write_file(self._path, sealed)
-        return Written(self._path, rows, hashlib.sha256(sealed).hexdigest(), opened_hash)
+        return WrittenFile(self._path, rows, hashlib.sha256(sealed).hexdigest(), opened_hash)
 
 
 def _schema(columns: Sequence[Column]) -> pa.Schema:
@@ -384,7 +386,7 @@ def _schema(columns: Sequence[Column]) -> pa.Schema:
     return pa.schema(fields)
 
 
-def _encoding(of: pa.DataType) -> str:
-    if pa.types.is_boolean(of):
+def _encoding(type_: pa.DataType) -> str:
+    if pa.types.is_boolean(type_):
         return "RLE"
-    return "BYTE_STREAM_SPLIT" if pa.types.is_floating(of) else "DELTA_BINARY_PACKED"
+    return "BYTE_STREAM_SPLIT" if pa.types.is_floating(type_) else "DELTA_BINARY_PACKED"

@@ -13,7 +13,7 @@ from study_app.errors import StoreError
 from study_app.haptics.model.layout import SAMPLE
 from study_app.store.recordings import (
     SamplesFile,
-    Written,
+    WrittenFile,
     crcs,
     read_checks,
     read_facts,
@@ -28,11 +28,11 @@ EXACT = ("tick", "time_ns", "lateness_ns", "fresh", "buttons", "limiters", "scen
 FACTS = {"participant": "P007", "trial": 3}
 
 
-def write(path: Path, samples: Any, rate_hz: float = 1000.0) -> Written:
+def write(path: Path, samples: Any, rate_hz: float = 1000.0) -> WrittenFile:
     file = SamplesFile(path, FACTS, rate_hz)
     for first in range(0, len(samples), file.group_rows):
         file.write(samples[first : first + file.group_rows])
-    assert file.taken == len(samples)
+    assert file.received_rows == len(samples)
     return file.finish(dropped=0)
 
 

@@ -1,6 +1,6 @@
-"""Missing trials: planned trials without an answer, because every presentation broke a limit.
+"""Missing trials: planned trials without an answer, because every presentation violated a limit.
 
-`progress.Progress` finds them in a journal. Windows, commands, tables, the report and exports take them from there.
+`progress.Progress` finds them in a journal, for windows, commands, tables, the report and exports.
 """
 
 from collections import Counter
@@ -22,7 +22,7 @@ REASONS: Final[Mapping[str, str]] = {
     "pace_error_percent": "the hand did not move at the required speed",
     "force_limit_n": "the force limit was reached",
 }
-"""The reason why a presentation is invalid, by the key of the limit that it broke."""
+"""The reason why a presentation is invalid, by the key of the violated limit."""
 _UNITS: Final = {"percent": "%", "ms": "ms", "n": "N"}
 
 
@@ -38,10 +38,10 @@ class MissingTrial:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MissingTrials:
-    """The missing trials of a session, out of ``asked`` main trials of intervals that are over.
+    """The missing trials of a session, out of the ``asked`` main trials of intervals that are over.
 
-    ``limits`` are the study's, as recorded by the session. A session of an earlier program version does not state the
-    permitted number of missing trials, and is never incomplete.
+    ``limits`` are the study's, as recorded by the session. A session of an earlier program version did not record how
+    many trials may be missing, and is never incomplete.
     """
 
     missing: tuple[MissingTrial, ...] = ()

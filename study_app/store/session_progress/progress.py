@@ -25,24 +25,24 @@ class TrialAnswer:
 
 @dataclass(slots=True, kw_only=True)
 class Progress:
-    """The progress of a session and its events, from the lines of its journal given to `process_line`.
+    """The progress of a session and its events, computed from the journal lines given to `process_line`.
 
-    ``start`` is its first line: participant, session, seed, language and the rest. ``step`` is the index in the
-    schedule of the step to continue at: the first unfinished one. ``page`` (or form) or ``trial`` names it if it was
-    begun: for a trial, ``attempt`` counts its presentations, ``task_done`` tells that its last task ran to the end (so
-    that only answers, if any, are missing), and ``answers`` holds the choices since then; ``invalid`` counts its
-    attempts that were not delivered as requested. ``presented`` maps trial numbers to their presentations, ``steps`` to
-    their steps. ``ended`` is the status of a finished session. ``t_s`` is the latest time on its clock, ``language``
-    the participant's.
+    ``start`` is the journal's first line. ``step`` is the index in the schedule of the first unfinished step, at which
+    a session is resumed. If that step was begun, ``page`` (also for a form) or ``trial`` identifies it. For a trial,
+    ``attempt`` counts the presentations; ``task_done`` tells whether the last task ran to the end, so that at most
+    answers are missing; ``answers`` holds the choices since then; ``invalid`` counts the attempts that were not
+    delivered as requested. ``presented`` maps trial numbers to the number of presentations, ``steps`` to step indices.
+    ``ended`` is the status of a finished session. ``t_s`` is the latest time on the session's clock, ``language`` the
+    participant's language.
 
     ``here`` is the index of the last step shown (−1 before the first), ``durations_s`` are the durations of finished
-    steps, ``away_s`` is the time without a program, which no duration includes. ``targets`` counts those reached in the
-    latest trial; it began at ``trial_since_s``, None while a page is shown or after a gap, and its task took
-    ``trial_lasted_s``, None until it ended. ``answered`` counts the answers to each main trial and form, for a trial's
-    last attempt; ``broken`` has the violated limits of each finished trial: column, value and limit. ``late`` says in
-    which trials the device answered later than assumed. ``lost`` gives the reason if a trial's recording could not be
-    kept, ``lacking`` its number of missing samples; ``outlets_lost`` why an outlet to other programs failed since the
-    session began or was resumed.
+    steps, ``away_s`` is the time in which no program ran, which no duration includes. ``targets`` counts the targets
+    reached in the latest trial. That trial began at ``trial_since_s``, None while a page is shown or after a gap; its
+    task took ``trial_lasted_s``, None until it ended. ``answered`` counts the answers to each main trial (its last
+    attempt) and form. ``broken`` has the violated limits of each finished trial. ``late`` has a text for each trial in
+    which the device answered later than assumed. ``lost`` gives the reason for each trial whose recording was lost,
+    ``lacking`` the number of samples missing from a recording. ``outlets_lost`` gives the reason for each outlet to
+    other programs that failed since the session began or was resumed.
 
     ``of_intervals`` is the latest trial if it is one of intervals; ``trial_answers`` are the answers to all of them,
     ``repeated`` gives the reason for each repeated presentation, ``undelivered`` names the limits that intervals
@@ -102,9 +102,11 @@ class Progress:
 
     @property
     def missing_trials(self) -> MissingTrials:
-        """The main trials of intervals that were not delivered, with the number of those that are over."""
+        """The main trials of intervals that were not delivered, out of those that are over."""
         limits = {} if self.start is None else self.start.limits
-        here = self.trial if self.invalid < limits.get("attempts", 1) else None  # the current trial is presented again
+        current = (
+            self.trial if self.invalid < limits.get("attempts", 1) else None
+        )  # the current trial is presented again
         missing = tuple(
             MissingTrial(
                 trial=number,
@@ -112,7 +114,7 @@ class Progress:
                 code=self._main[number].code,
                 broken=tuple(dict.fromkeys(self.undelivered.get(number, ()))),
             )
-            for number in sorted(self._failed & self._main.keys() - {here})
+            for number in sorted(self._failed & self._main.keys() - {current})
         )
         answered = sum(number in self.trial_answers for number in self._main)
         return MissingTrials(missing=missing, asked=answered + len(missing), limits=limits)
@@ -185,9 +187,9 @@ class Progress:
 
     def _confirm(self, line: events.Responses | events.FormAnswered) -> None:
         """Record the answers of a trial or form as confirmed."""
-        of = (line.form, line.after) if isinstance(line, events.FormAnswered) else line.trial
+        key = (line.form, line.after) if isinstance(line, events.FormAnswered) else line.trial
         if isinstance(line, events.FormAnswered) or self._phase == "main":
-            self.answered[of] = sum(item.first_s is not None for item in line.items)
+            self.answered[key] = sum(item.first_s is not None for item in line.items)
         if isinstance(line, events.Responses) and line.items and line.trial == self.of_intervals:
             answer = line.items[0]
             seconds = None if answer.onset_s is None or answer.first_s is None else answer.first_s - answer.onset_s
@@ -196,7 +198,7 @@ class Progress:
         self._leave()
 
     def _go_to(self, page: str | None, trial: int | None) -> None:
-        """Go to a step; the current step is shown again instead."""
+        """Make a step the current one, leaving the previous step unless it is the same."""
         if (self.page, self.trial) != (page, trial):
             if (self.page, self.trial) != (None, None):
                 self._leave()
@@ -217,7 +219,7 @@ class Progress:
         self.trial_since_s = self.trial_lasted_s = None
 
     def _start_trial(self, line: events.TrialStarted) -> None:
-        """Apply the start of a trial, first or repeated; an earlier trial means that its whole block is repeated."""
+        """Apply the first or a repeated start of a trial; a return to an earlier trial repeats its whole block."""
         trial = line.trial
         self._go_to(None, trial)
         self._drop_answers()
@@ -258,7 +260,7 @@ class Progress:
         self.resumed += 1
         self._reason = "program ended"
         self.paused, self.broke, self.trial_since_s, self.trial_lasted_s = False, "", None, None
-        self.outlets_lost = {}  # the questions were opened again
+        self.outlets_lost = {}  # outlets were opened again
         self.here_since_s += gap_s
         self.away_s += gap_s
 
@@ -281,14 +283,14 @@ def progress_of(lines: Sequence[events.Event]) -> Progress:
         The first line is not that of a session.
     """
     events.start_of(lines)
-    now = Progress()
+    progress = Progress()
     for line in lines:
-        now.process_line(line)
-    return now
+        progress.process_line(line)
+    return progress
 
 
 def trial_results(protocol: Protocol, lines: Iterable[events.Event]) -> tuple[TrialResult, ...]:
-    """Return the answered trials at their presented levels, by number; the last answer counts.
+    """Return the answered interval trials with their presented levels, by number; the last answer counts.
 
     Lines that do not fit the study, or whose sealed fields are not opened, raise KeyError or ValueError.
     """
@@ -306,13 +308,13 @@ def trial_results(protocol: Protocol, lines: Iterable[events.Event]) -> tuple[Tr
                 raise KeyError("arrangement and answer")
             arrangement = protocol.design_of(block).arrangement_of(start.arrangement)
             answer: Any = line.items[0].value
-            of_trial = line.trial, start.code, start.level, arrangement
-            results[line.trial] = trial_result(protocol, block, *of_trial, answer, catch=bool(start.catch))
+            trial_fields = line.trial, start.code, start.level, arrangement
+            results[line.trial] = trial_result(protocol, block, *trial_fields, answer, catch=bool(start.catch))
     return tuple(results[number] for number in sorted(results))
 
 
 def recordable(lines: Iterable[events.Event]) -> list[events.Which]:
-    """Return trial, attempt and interval of every expected or existing recording; the interval is None for a trial."""
+    """Return trial, attempt and interval of each task that a recording covers; the interval is None for a trial."""
     return [
         line.which
         for line in lines

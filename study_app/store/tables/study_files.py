@@ -1,8 +1,7 @@
-"""The files of a study's folder that are made from its sessions: the table of participants, and the description.
+"""The files of a study's folder that are derived from its sessions: the table of participants and the description.
 
-``dataset_description.json`` is the Psych-DS description, generated from the column dictionary. Psych-DS 1.5 wants every
-header of every table listed in ``variableMeasured``, and nothing else: the tables of a study folder are written whole,
-headers included, before this file.
+``dataset_description.json`` is the Psych-DS description, generated from the column dictionary. Psych-DS 1.5 requires
+that ``variableMeasured`` lists exactly the headers of all tables, so all tables are written before this file.
 """
 
 import contextlib
@@ -27,8 +26,8 @@ from study_app.store.journals import journal
 from study_app.store.merged import MANIFEST, folders_of, refuse_merged
 from study_app.store.tables import session_tables
 
-_READ: Final[dict[Path, tuple[object, list[csv_files.Row]]]] = {}
-"""Cached rows by session folder, with time and size of the journal. Reading a journal takes 5 ms, 200 take a second."""
+_ROW_CACHE: Final[dict[Path, tuple[object, list[csv_files.Row]]]] = {}
+"""Cached rows by session folder, with time and size of the journal, since reading a journal takes 5 ms."""
 # Files of a study folder other than tables; patterns as in .gitignore.
 _IGNORED = b"""\
 .psychds-ignore
@@ -50,26 +49,26 @@ rebuilt.txt
 def participant_rows(folder: StudyFolder) -> list[csv_files.Row]:
     """Return one row per session with a journal, by participant and number."""
     key = opened_or_none(folder)
-    return [row for session in folder.sessions() for row in _row_of(session, key)]
+    return [row for session in folder.sessions() for row in _cached_row(session, key)]
 
 
-def _row_of(session: SessionFolder, key: Key | None) -> list[csv_files.Row]:
+def _cached_row(session: SessionFolder, key: Key | None) -> list[csv_files.Row]:
     """Return the row of one session as `row_of`, from the cache if the journal has not changed."""
     try:
         status = session.journal.lstat()
     except OSError:
         return row_of(session, key)
     stamp = status.st_mtime_ns, status.st_size, None if key is None else key.hash
-    if (held := _READ.get(session.path)) is not None and held[0] == stamp:
-        return held[1]
+    if (cached := _ROW_CACHE.get(session.path)) is not None and cached[0] == stamp:
+        return cached[1]
     rows = row_of(session, key)
     if all(row["status"] != "damaged" for row in rows):
-        _READ[session.path] = stamp, rows
+        _ROW_CACHE[session.path] = stamp, rows
     return rows
 
 
 def opened_or_none(folder: StudyFolder) -> Key | None:
-    """Return the study's key if it was opened and can be read, else None, so that a lost key does not hide sessions."""
+    """Return the study's opened key, or None if it is sealed or unreadable, so that a lost key hides no sessions."""
     with contextlib.suppress(StoreError):
         return opened_key(folder)
     return None
@@ -99,13 +98,13 @@ def _damaged_row(session: SessionFolder, start: Mapping[str, Any]) -> csv_files.
     """Return the row of a session with a damaged journal, from its folder, first line and receipt."""
     if not start:
         with contextlib.suppress(StoreError):
-            held = receipt.read(session.receipt)
-            device = held.get("device")
+            session_receipt = receipt.read(session.receipt)
+            device = session_receipt.get("device")
             name = device.get("name") if isinstance(device, dict) else None
-            start = held | {"at": held.get("started_at"), "device": name}
-    known = {name: start.get(name) for name in ("study", "simulated", "pilot", "device", "language")}
-    which = {"participant": session.participant, "session": session.number, "session_started_at": start.get("at")}
-    return {**dict.fromkeys(header(PARTICIPANTS)), **known, **which, "status": "damaged"}
+            start = session_receipt | {"at": session_receipt.get("started_at"), "device": name}
+    details = {name: start.get(name) for name in ("study", "simulated", "pilot", "device", "language")}
+    identity = {"participant": session.participant, "session": session.number, "session_started_at": start.get("at")}
+    return {**dict.fromkeys(header(PARTICIPANTS)), **details, **identity, "status": "damaged"}
 
 
 def write_participants(folder: StudyFolder, study: str) -> None:
@@ -120,16 +119,16 @@ def write_participants(folder: StudyFolder, study: str) -> None:
         return
     while True:
         write_file(path, content)
-        again = table_bytes(folder, participant_rows(folder))
-        if again == content:
+        newer = table_bytes(folder, participant_rows(folder))
+        if newer == content:
             return
-        content = again
+        content = newer
 
 
 def update_participants(folder: StudyFolder, study: str) -> None:
-    """Update the table as `write_participants`, except while another program has it open (Excel on Windows).
+    """Update the table as `write_participants`, but only log a warning if another program, such as Excel, has it open.
 
-    It is made from the journals alone, so a session does not wait for it: the next session or rebuild writes it.
+    The table is derived from the journals alone, so the next session or rebuild can write it.
     """
     try:
         write_participants(folder, study)
@@ -162,8 +161,8 @@ def columns_of(folder: StudyFolder, rows: Iterable[csv_files.Row]) -> tuple[Colu
 def description_bytes(study: StudyHead, *, sealed: bool, intervals: bool = False) -> bytes:
     """Return the description of ``study``, with the same bytes on every machine.
 
-    With ``sealed`` no table has the sealed columns, except a pre-existing group; ``intervals`` tells whether the study
-    has blocks with a design.
+    With ``sealed`` it omits the sealed columns, except a pre-existing group; ``intervals`` tells whether the study has
+    blocks with a design.
     """
     title = text_in(study.title, study.languages[0])
     hidden = {column.name for column in every_column(intervals=intervals) if sealed and column.sealed}
@@ -186,29 +185,29 @@ def description_bytes(study: StudyHead, *, sealed: bool, intervals: bool = False
 def is_same_description(content: bytes, expected: bytes) -> bool:
     """Return whether two descriptions agree on the study and on names, units and ranges of all columns."""
     try:
-        description, wanted = parse_json(content), parse_json(expected)
-        columns, wanted_columns = (
+        description, expected_description = parse_json(content), parse_json(expected)
+        columns, expected_columns = (
             [
                 (variable["name"], {key: variable[key] for key in variable.keys() - {"description"}})
                 for variable in content.pop("variableMeasured")
             ]
-            for content in (description, wanted)
+            for content in (description, expected_description)
         )
     except (AttributeError, KeyError, TypeError, ValueError):
         return False
-    return bool(description == wanted and columns == wanted_columns)
+    return bool(description == expected_description and columns == expected_columns)
 
 
 def write_description(folder: StudyFolder, study: StudyHead, *, intervals: bool = False) -> None:
     """Write the description if it is missing or describes an older version of the study.
 
-    Until the key is opened it lacks the sealed columns, unless an earlier version of the program described them: then
-    tables have them.
+    Until the key is opened it omits the sealed columns, unless an earlier version of the program, whose tables have
+    them, described them.
     """
-    held = read_own(folder.description, folder.path) if is_there(folder.description) else b""
-    sealed = not (reveals(folder.path) or has_sealed_columns(held))
+    current = read_own(folder.description, folder.path) if is_there(folder.description) else b""
+    sealed = not (reveals(folder.path) or has_sealed_columns(current))
     content = description_bytes(study, sealed=sealed, intervals=intervals)
-    if held != content:
+    if current != content:
         write_file(folder.description, content)
     if not is_there(folder.ignore):
         write_file(folder.ignore, _IGNORED)
@@ -254,7 +253,7 @@ def described_study(folder: StudyFolder) -> str | None:
 
 
 def has_earlier_columns(folder: StudyFolder) -> bool:
-    """Return whether a study's description lacks columns, because an earlier version wrote its tables."""
+    """Return whether a study's description lacks columns, as those written by earlier versions do."""
     content = read_own(folder.description, folder.path) if is_there(folder.description) else b""
     with contextlib.suppress(AttributeError, KeyError, TypeError, ValueError):
         names = {variable["name"] for variable in parse_json(content)["variableMeasured"]}
@@ -288,12 +287,12 @@ def check_study(folder: StudyFolder, study: str) -> None:
             )
         refuse_earlier_columns(folder)
         return
-    for above in folder.path.absolute().parents:
-        if is_there(StudyFolder(above).key):
-            raise StoreError(f"{folder.path} lies within {above}, which is a study's folder: use a folder outside it")
-    if within := sorted(path.name for path in folder.path.glob("*") if is_there(StudyFolder(path).key)):
+    for parent in folder.path.absolute().parents:
+        if is_there(StudyFolder(parent).key):
+            raise StoreError(f"{folder.path} lies within {parent}, which is a study's folder: use a folder outside it")
+    if studies := sorted(path.name for path in folder.path.glob("*") if is_there(StudyFolder(path).key)):
         raise StoreError(
-            f"{folder.path} contains study folders ({', '.join(within[:3])}{' ...' if within[3:] else ''}): use "
+            f"{folder.path} contains study folders ({', '.join(studies[:3])}{' ...' if studies[3:] else ''}): use "
             f"one of these or a new one next to them, such as {folder.path / study}"
         )
 
