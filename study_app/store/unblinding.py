@@ -1,8 +1,8 @@
 """Unblinding a study: record the reveal, and write the sealed columns into tables, checksums and description.
 
-Then the rule `catch` excludes sessions with too many incorrect answers to catch trials: before that, the count would
-reveal which answers were correct. If the program ends meanwhile, the journals contain everything, and opening the study
-again completes it. In a merged study the key of each site is opened, every one recorded in its own folder.
+Then the rule `catch` excludes sessions with too many incorrect answers to catch trials; before unblinding, that count
+would reveal which answers were correct. If the program ends during unblinding, the journals still contain everything,
+and unblinding again completes it. In a merged study the key of each site is opened, and recorded in the site's folder.
 """
 
 import contextlib
@@ -142,25 +142,25 @@ def unblind_folder(folder: Path, by: str, reason: str, progress: ReportProgress 
     """
     folders = folders_of(folder)
     if "" not in folders:
-        for place in folders.values():
-            verified_key(StudyFolder(place))
+        for site_folder in folders.values():
+            verified_key(StudyFolder(site_folder))
     by_site: dict[str, Unblinded] = {}
-    for prefix, place in folders.items():
-        of_site = unblind(place, by, reason, progress)
-        excluded = tuple(replace(row, participant=f"{prefix}{row.participant}") for row in of_site.excluded)
-        by_site[prefix] = replace(of_site, excluded=excluded)
+    for prefix, site_folder in folders.items():
+        result = unblind(site_folder, by, reason, progress)
+        excluded = tuple(replace(row, participant=f"{prefix}{row.participant}") for row in result.excluded)
+        by_site[prefix] = replace(result, excluded=excluded)
     return by_site
 
 
 def late_exclusions(folder: Path, rows: Sequence[Exclusion]) -> tuple[Exclusion, ...]:
     """Return the exclusions decided or reversed by a person after the key was opened; none for a merged study.
 
-    Each records whether the key was open; times decide only for those of earlier versions.
+    Each records whether the key was open; only those of earlier versions are compared by time.
     """
-    opened_at = min(filter(None, (_moment(reveal["at"]) for reveal in reveals(folder))), default=None)
+    opened_at = min(filter(None, (_parse_time(reveal["at"]) for reveal in reveals(folder))), default=None)
 
     def is_after_opening(text: str) -> bool:
-        at = _moment(text)  # reveals are recorded in whole seconds
+        at = _parse_time(text)  # reveals are recorded in whole seconds
         return bool(opened_at and at and at.replace(microsecond=0) > opened_at)
 
     by_person = (
@@ -175,7 +175,7 @@ def late_exclusions(folder: Path, rows: Sequence[Exclusion]) -> tuple[Exclusion,
     )
 
 
-def _moment(text: str) -> datetime | None:
+def _parse_time(text: str) -> datetime | None:
     with contextlib.suppress(ValueError):  # `verify` reports it
         return datetime.fromisoformat(text).astimezone()
     return None
@@ -189,11 +189,11 @@ def reveals_of(folder: Path) -> tuple[dict[str, str], ...]:
     StoreError
         They cannot be read.
     """
-    of_sites: list[dict[str, str]] = []
-    for prefix, place in folders_of(folder).items():
-        named: Mapping[str, str] = {"site": prefix[:-1]} if prefix else {}
-        of_sites += [{**named, **reveal} for reveal in reveals(place)]
-    return tuple(of_sites)
+    site_reveals: list[dict[str, str]] = []
+    for prefix, site_folder in folders_of(folder).items():
+        site: Mapping[str, str] = {"site": prefix[:-1]} if prefix else {}
+        site_reveals += [{**site, **reveal} for reveal in reveals(site_folder)]
+    return tuple(site_reveals)
 
 
 def has_opened_keys(folder: Path) -> bool:
@@ -236,13 +236,13 @@ def _missed_catch_trials(session: SessionFolder, key: Key) -> Iterator[str]:
     protocol, titles = complete_protocol(published, key), block_titles(published)
     lines = open_events(journal.read(session.journal), key)
     blocks = {line.trial: line.block for line in lines if isinstance(line, TrialStarted)}
-    heard = [result for result in trial_results(protocol, lines) if result.catch]
+    catch_results = [result for result in trial_results(protocol, lines) if result.catch]
     for block in protocol.blocks.values():
-        answered = [result for result in heard if blocks[result.trial] == block.id]
-        wrong = sum(not result.correct for result in answered)
-        if block.catch is not None and answered and wrong / len(answered) > block.catch.wrong_most:
+        answered = [result for result in catch_results if blocks[result.trial] == block.id]
+        incorrect = sum(not result.correct for result in answered)
+        if block.catch is not None and answered and incorrect / len(answered) > block.catch.wrong_most:
             yield (
-                f"{wrong} of {len(answered)} catch trials in {quoted_title(titles[block.id])} were answered "
+                f"{incorrect} of {len(answered)} catch trials in {quoted_title(titles[block.id])} were answered "
                 f"incorrectly (at most {100 * block.catch.wrong_most:g} % are permitted)"
             )
 
@@ -263,37 +263,37 @@ def _open_tables(study: StudyFolder, session: SessionFolder, key: Key) -> list[s
 def _open_files(place: Place, lines: list[Event], key: Key) -> list[str]:
     """Write the sealed columns and open the recordings.
 
-    A table of a session without an end may be behind its journal, and is then written whole.
+    A table of a session without an end may be behind its journal; then the whole table is rewritten.
     """
     left: list[str] = []
-    ours: dict[str, tuple[str, str]] = {}
+    changes: dict[str, tuple[str, str]] = {}
     before, after = (dict(table_files(place, lines, reader)) for reader in (None, key))
     for path, content in after.items():
-        held, sealed = read_if_there(path) or b"", before[path]
-        if held not in (sealed, content) and not _is_behind(held, path, place, lines, key):
+        current, sealed = read_if_there(path) or b"", before[path]
+        if current not in (sealed, content) and not _is_table_behind(current, path, place, lines, key):
             left.append(
                 f"{path} differs from the journal, so it was not changed: run liquid-study rebuild {place.folder.path}"
             )
             continue
-        if held != content:
+        if current != content:
             write_file(path, content)
-        ours[path.name] = hashlib.sha256(sealed).hexdigest(), hashlib.sha256(content).hexdigest()
+        changes[path.name] = hashlib.sha256(sealed).hexdigest(), hashlib.sha256(content).hexdigest()
     for path, hashes in _recordings(place, lines, key):
         try:
             _open_recording(path, hashes, key)
-            ours[path.relative_to(place.folder.path).as_posix()] = hashes
+            changes[path.relative_to(place.folder.path).as_posix()] = hashes
         except StoreError as error:
             left.append(f"{error}; then unblind again")
     if is_there(place.folder.checksums):
-        replace_checksums(place.folder, ours)
+        replace_checksums(place.folder, changes)
     return left
 
 
-def _is_behind(held: bytes, path: Path, place: Place, lines: list[Event], key: Key) -> bool:
-    """Return whether a table of a session without an end begins as after some line of its journal."""
+def _is_table_behind(current: bytes, path: Path, place: Place, lines: list[Event], key: Key) -> bool:
+    """Return whether a table of a session without an end is an earlier state of that table, or its beginning."""
     if isinstance(lines[-1], SessionEnded):
         return False
-    whole_lines = held[: held.rfind(b"\n") + 1]
+    whole_lines = current[: current.rfind(b"\n") + 1]
     return any(
         dict(table_files(place, lines[:count], reader))[path].startswith(whole_lines)
         for count in range(len(lines), 0, -1)

@@ -1,7 +1,7 @@
-"""Upgrade of study files and results of earlier versions in place; readers know only the current format.
+"""Upgrade of study files and results of earlier versions in place, since readers support only the current format.
 
-Journals and receipts are evidence and stay as they were written. Tables are functions of the journal: they are
-compared with it in the columns that they have, and are written again with the current columns.
+Journals and receipts are evidence and are not changed. Tables are derived from the journal: the columns that they have
+are compared with it, and then they are rewritten with the current columns.
 """
 
 import contextlib
@@ -29,10 +29,10 @@ _SECTIONS = frozenset({"study", "scene", "liquids"})
 
 
 def upgrade(path: Path) -> list[Path]:
-    """Write a study or scene file of format 1, or all of them and the results in a folder, in the current format.
+    """Rewrite a study or scene file of format 1, or all such files and the results in a folder, in the current format.
 
     The original of a study file is copied next to it, as ``NAME.toml.format-1``, and the copy is compared with it. All
-    files are read and checked before one is written.
+    files are read and checked before the first is written.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ def upgrade(path: Path) -> list[Path]:
     Raises
     ------
     ProtocolError
-        A file is not TOML, or cannot be extended (`protocol.upgrade.upgraded_file`).
+        A file is not TOML, or cannot be upgraded (`protocol.upgrade.upgraded_file`).
     StoreError
         A copy of another original exists, a table differs from its journal, a session is open in another program, its
         journal is damaged, or a file cannot be written.
@@ -60,7 +60,7 @@ def upgrade(path: Path) -> list[Path]:
         if needs_upgrade(document) and _SECTIONS & document.keys():
             upgraded[file] = upgraded_file(source, str(file))
     with contextlib.ExitStack() as locks:
-        tables = {study: list(_earlier_tables(study, locks)) for study in _earlier_studies(path)}
+        tables = {study: list(_outdated_tables(study, locks)) for study in _outdated_studies(path)}
         for file, content in upgraded.items():
             original, copy = file.read_bytes(), file.with_name(f"{file.name}.format-1")
             if not copy.exists():
@@ -71,24 +71,24 @@ def upgrade(path: Path) -> list[Path]:
                     "again"
                 )
             write_file(file, content)
-        for study, of_sessions in tables.items():
-            for session, table, held, content in of_sessions:
-                if is_there(session.checksums):  # first, so that an interrupted upgrade can be repeated
+        for study, session_tables in tables.items():
+            for session, table, held, content in session_tables:
+                if is_there(session.checksums):  # before the table, so that an interrupted upgrade can be repeated
                     hashes = hashlib.sha256(held).hexdigest(), hashlib.sha256(content).hexdigest()
                     replace_checksums(session, {table.name: hashes})
                 write_file(table, content)
             write_study_files(study)
-    rewritten = [table for of_sessions in tables.values() for _, table, _, _ in of_sessions]
+    rewritten = [table for session_tables in tables.values() for _, table, _, _ in session_tables]
     return sorted([*upgraded, *rewritten, *(study.description for study in tables)])
 
 
-def _earlier_studies(path: Path) -> Iterator[StudyFolder]:
-    """Yield the studies in a folder whose tables an earlier version wrote."""
+def _outdated_studies(path: Path) -> Iterator[StudyFolder]:
+    """Yield the studies in a folder whose tables were written by an earlier version."""
     studies = (StudyFolder(key.parent.parent) for key in sorted(path.rglob("blinding/key.sealed")))
     yield from filter(has_earlier_columns, studies)
 
 
-def _earlier_tables(
+def _outdated_tables(
     study: StudyFolder, locks: contextlib.ExitStack
 ) -> Iterator[tuple[SessionFolder, Path, bytes, bytes]]:
     """Lock each session and yield it with path, content and new content of each table that lacks columns."""
@@ -99,15 +99,15 @@ def _earlier_tables(
         locks.callback(lock_folder(session.path).release)
         lines = journal.read(session.journal)
         place = Place(study, session, start_of(lines).study)
-        for file, what in files_beyond_journal(place, lines):
-            raise StoreError(f"{file} {what}: {RESTORE}")
-        for table, content in table_files(place, lines, key):
-            held = read_if_there(table)
-            if held is None or held == content:
+        for file, problem in files_beyond_journal(place, lines):
+            raise StoreError(f"{file} {problem}: {RESTORE}")
+        for table, new_content in table_files(place, lines, key):
+            old_content = read_if_there(table)
+            if old_content is None or old_content == new_content:
                 continue
-            if isinstance(lines[-1], SessionEnded) and not has_same_cells(held, content):
+            if isinstance(lines[-1], SessionEnded) and not has_same_cells(old_content, new_content):
                 raise StoreError(
                     f"{table} differs from its journal, so nothing was upgraded: run liquid-study rebuild "
                     f"{session.path} to recreate it"
                 )
-            yield session, table, held, content
+            yield session, table, old_content, new_content

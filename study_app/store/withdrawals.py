@@ -1,8 +1,8 @@
-"""Withdrawal: erase all that a participant gave from a study's folder and from copies of it.
+"""Withdrawal: erase all data of a participant from a study's folder and from copies of it.
 
-Of each participant a tombstone remains, a line of ``withdrawals.jsonl`` with nothing that this person gave. It is
-written first. A program that ends before all is erased leaves a folder that `verify` reports; the same command then
-finishes it. Erased files are unlinked: disks and backups may still hold their blocks.
+A tombstone remains, a line of ``withdrawals.jsonl`` without any of the participant's data. It is written first. If the
+program ends before everything is erased, `verify` reports the folder, and repeating the command completes the
+withdrawal. Erased files are only unlinked: disks and backups may still contain their blocks.
 """
 
 import hashlib
@@ -59,7 +59,7 @@ class ErasedSession:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tombstone:
-    """One withdrawal; a line of ``withdrawals.jsonl``. ``at`` is the time at which that folder's data were erased."""
+    """One withdrawal; a line of ``withdrawals.jsonl``. ``at`` is when the data were erased from that folder."""
 
     participant: str
     at: str
@@ -98,9 +98,9 @@ def withdraw(
 ) -> Withdrawn:
     """Erase the sessions of a participant from the study in ``folder``, and from copies of it.
 
-    Erased are the participant's folder, the rows of tables and lists, and outputs in the workspace. A tombstone
-    remains, and the participant's ID is not used again. Withdrawing again completes an interrupted withdrawal, and
-    reaches further copies. Copies in the results folder of the workspace are found without ``also``. Where a folder is
+    This erases the participant's folder, the rows in tables and lists, and outputs in the workspace. A tombstone
+    remains, and the participant's ID cannot be used again. Withdrawing again completes an interrupted withdrawal, and
+    can include further copies. Copies in the results folder of the workspace are found without ``also``. If a folder is
     the copy of a site in a merged study, outputs of the merged study are erased, too.
 
     Parameters
@@ -121,8 +121,8 @@ def withdraw(
     Raises
     ------
     StoreError
-        There is no such participant, a session of theirs runs, ``by`` or ``reason`` is empty, or a file cannot be
-        written or deleted; what was erased by then stays erased.
+        There is no such participant, one of their sessions is running, ``by`` or ``reason`` is empty, or a file cannot
+        be written or deleted; data erased before the error stay erased.
     """
     by, reason = check_name_and_reason(by, reason, "a withdrawal requires initials and a reason")
     study = StudyFolder(folder)
@@ -131,17 +131,19 @@ def withdraw(
     at = (now if now is not None else datetime.now().astimezone()).isoformat(timespec="seconds")
     copies, shared = _find_copies(study, also)
     nearby, exports = _find_copies(study, filter(Path.is_dir, [workspace().results]))
-    of_person = _tombstone(study, participant, at, by, reason).sessions
-    copies += [copy for copy in nearby if copy not in copies and _has_copies(copy, participant, of_person)]
+    person_sessions = _find_or_make_tombstone(study, participant, at, by, reason).sessions
+    copies += [
+        copy for copy in nearby if copy not in copies and _has_session_copies(copy, participant, person_sessions)
+    ]
     shared += [export for export in exports if export not in shared]
-    for place in (study, *copies):
-        refuse_special_files(place.data / f"sub-{participant}")
+    for dataset in (study, *copies):
+        refuse_special_files(dataset.data / f"sub-{participant}")
     with lock_folder(folder):
-        tombstone = _tombstone(study, participant, at, by, reason)
-        erased = [study.path] if _erase(study, tombstone) else []
-        outputs, elsewhere = _outputs(study.path)
+        tombstone = _find_or_make_tombstone(study, participant, at, by, reason)
+        erased = [study.path] if _erase_participant(study, tombstone) else []
+        outputs, elsewhere = _erase_outputs(study.path)
     left = [*_remaining_mentions(study, participant)]
-    reached = [study.path]
+    reached_folders = [study.path]
     for copy in copies:
         with lock_folder(copy.path):
             if others := _other_sessions(copy, tombstone):
@@ -150,18 +152,18 @@ def withdraw(
                     "the session belongs to the same participant, withdraw the participant from this folder, too"
                     for other in others
                 ]
-            elif _erase(copy, replace(tombstone, at=at)):
+            elif _erase_participant(copy, replace(tombstone, at=at)):
                 erased.append(copy.path)
                 left += _remaining_mentions(copy, participant)
-            known, begun = (
+            known_tombstone, begun = (
                 tombstones(copy).get(participant),
                 {session.begun for session in tombstone.sessions if session.begun},
             )
-            if known is not None and any(session.begun in begun for session in known.sessions):
-                reached.append(copy.path)
-    for made_from in dict.fromkeys((*reached[1:], *filter(None, map(merged_above, reached)))):
-        of_place, elsewhere_of_place = _outputs(made_from)
-        outputs, elsewhere = (*outputs, *of_place), (*elsewhere, *elsewhere_of_place)
+            if known_tombstone is not None and any(session.begun in begun for session in known_tombstone.sessions):
+                reached_folders.append(copy.path)
+    for results_folder in dict.fromkeys((*reached_folders[1:], *filter(None, map(merged_above, reached_folders)))):
+        more_outputs, more_elsewhere = _erase_outputs(results_folder)
+        outputs, elsewhere = (*outputs, *more_outputs), (*elsewhere, *more_elsewhere)
     left += [
         f"{export.path} is an export that contains data from {participant}: delete it and create it again"
         for export in shared
@@ -189,12 +191,12 @@ def tombstones(study: StudyFolder) -> dict[str, Tombstone]:
 
 
 def unerased_files(study: StudyFolder, participant: str) -> Iterator[Path]:
-    """Yield the remains of an interrupted withdrawal: the participant's folder, and lists with rows."""
-    if is_there(person := study.data / f"sub-{participant}"):
-        yield person
+    """Yield the remains of an interrupted withdrawal: the participant's folder, and lists with their rows."""
+    if is_there(participant_folder := study.data / f"sub-{participant}"):
+        yield participant_folder
     if any(row.participant == participant for row in exclusions(study.path)):
         yield study.exclusions
-    for path, has_participant in _listing_files(study, participant):
+    for path, has_participant in _lists_with_lines(study, participant):
         if any(map(has_participant, (read_if_there(path) or b"").splitlines())):
             yield path
     if (name := described_study(study)) is not None:
@@ -203,11 +205,11 @@ def unerased_files(study: StudyFolder, participant: str) -> Iterator[Path]:
             yield study.participants(name)
 
 
-def _listing_files(study: StudyFolder, participant: str) -> tuple[tuple[Path, Callable[[bytes], bool]], ...]:
-    """Return the lists from which lines are erased, each with the test for a line of the participant."""
+def _lists_with_lines(study: StudyFolder, participant: str) -> tuple[tuple[Path, Callable[[bytes], bool]], ...]:
+    """Return the lists from which lines are erased, each with a predicate for lines of the participant."""
     return (
-        (study.fingerprints, lambda line: _is_row_of(line, study, participant)),
-        (study.reversed_exclusions, lambda line: _reverses(line, participant)),
+        (study.fingerprints, lambda line: _names_session_of(line, study, participant)),
+        (study.reversed_exclusions, lambda line: _reverses_exclusion_of(line, participant)),
     )
 
 
@@ -239,16 +241,16 @@ def proof_of_withdrawal(tombstone: Tombstone) -> tuple[str, str]:
 
 def _parse_tombstone(path: Path, number: int, line: bytes) -> Tombstone:
     try:
-        held: dict[str, Any] = parse_json(line)
-        sessions = tuple(ErasedSession(**fields) for fields in held.pop("sessions"))
-        made = Tombstone(**held, sessions=sessions)
+        record: dict[str, Any] = parse_json(line)
+        sessions = tuple(ErasedSession(**fields) for fields in record.pop("sessions"))
+        tombstone = Tombstone(**record, sessions=sessions)
         proofs = (text for session in sessions for text in (session.begun, session.checksums, session.fingerprint))
-        texts = (made.participant, made.by, made.reason, *proofs)
-        typed = all(isinstance(text, str) for text in texts) and all(
+        texts = (tombstone.participant, tombstone.by, tombstone.reason, *proofs)
+        has_types = all(isinstance(text, str) for text in texts) and all(
             isinstance(session.session, int) for session in sessions
         )
-        if typed and is_valid_value("at", made.at) and ID_PATTERN.fullmatch(made.participant):
-            return made
+        if has_types and is_valid_value("at", tombstone.at) and ID_PATTERN.fullmatch(tombstone.participant):
+            return tombstone
     except (ValueError, KeyError, TypeError, AttributeError):
         pass
     raise StoreError(
@@ -264,43 +266,46 @@ def _find_copies(study: StudyFolder, also: Iterable[Path]) -> tuple[list[StudyFo
         if not folder.is_dir():
             raise StoreError(f"{folder} is not a folder: --also requires a folder with copies of the study")
         for description in sorted(folder.rglob(_DATASET)):
-            place = description.parent.resolve()
-            if place != study.path.resolve() and StudyFolder(place).data.is_dir():
-                by_path[place] = StudyFolder(description.parent)
+            dataset = description.parent.resolve()
+            if dataset != study.path.resolve() and StudyFolder(dataset).data.is_dir():
+                by_path[dataset] = StudyFolder(description.parent)
     copies = [study for study in by_path.values() if is_there(study.key) or study.sessions()]
     name = _study_name(study)
     return copies, [study for study in by_path.values() if study not in copies and _study_name(study) == name]
 
 
-def _has_copies(copy: StudyFolder, participant: str, sessions: Iterable[ErasedSession]) -> bool:
+def _has_session_copies(copy: StudyFolder, participant: str, sessions: Iterable[ErasedSession]) -> bool:
     """Return whether a study folder has, or had, a copy of one of a participant's sessions."""
     begun = {session.begun for session in sessions if session.begun}
     erased = tombstones(copy).get(participant)
-    held = (*map(describe_session, _sessions(copy, participant)), *(() if erased is None else erased.sessions))
-    return any(session.begun in begun for session in held)
+    sessions_held = (
+        *map(describe_session, _sessions_of(copy, participant)),
+        *(() if erased is None else erased.sessions),
+    )
+    return any(session.begun in begun for session in sessions_held)
 
 
 def _study_name(study: StudyFolder) -> str | None:
-    """Return the name of a dataset's study, or None if its description is not of this program."""
+    """Return the name of a dataset's study, or None if this program did not write its description."""
     with suppress(StoreError):
         return described_study(study)
     return None
 
 
-def _tombstone(study: StudyFolder, participant: str, at: str, by: str, reason: str) -> Tombstone:
+def _find_or_make_tombstone(study: StudyFolder, participant: str, at: str, by: str, reason: str) -> Tombstone:
     """Return the participant's tombstone: the existing one, or a new one that is not yet written."""
     if (known := tombstones(study).get(participant)) is not None:
         return known
-    sessions = _sessions(study, participant)
+    sessions = _sessions_of(study, participant)
     if not sessions:
-        held = ", ".join(study.ids()) or "none"
-        raise StoreError(f"{study.path} does not contain participant {participant!r}; participants: {held}")
+        known_ids = ", ".join(study.ids()) or "none"
+        raise StoreError(f"{study.path} does not contain participant {participant!r}; participants: {known_ids}")
     return Tombstone(
         participant=participant, at=at, by=by, reason=reason, sessions=tuple(map(describe_session, sessions))
     )
 
 
-def _sessions(study: StudyFolder, participant: str) -> list[SessionFolder]:
+def _sessions_of(study: StudyFolder, participant: str) -> list[SessionFolder]:
     return [session for session in study.sessions() if session.participant == participant]
 
 
@@ -309,34 +314,34 @@ def _other_sessions(copy: StudyFolder, tombstone: Tombstone) -> list[Path]:
     begun = {session.begun for session in tombstone.sessions if session.begun}
     return [
         session.path
-        for session in _sessions(copy, tombstone.participant)
+        for session in _sessions_of(copy, tombstone.participant)
         if describe_session(session).begun not in begun
     ]
 
 
-def _erase(study: StudyFolder, tombstone: Tombstone) -> bool:
+def _erase_participant(study: StudyFolder, tombstone: Tombstone) -> bool:
     """Write the tombstone, then erase the participant's folder and rows; return whether there was anything to erase."""
     participant = tombstone.participant
-    sessions = _sessions(study, participant)
-    person = study.data / f"sub-{participant}"
+    sessions = _sessions_of(study, participant)
+    participant_folder = study.data / f"sub-{participant}"
     for session in sessions:
         refuse_if_open(session.path)
     rows, ignores = exclusions(study.path), read_if_there(study.ignore)  # before anything is written
     if sessions and participant not in tombstones(study):
         add_tombstone(study, replace(tombstone, sessions=tuple(map(describe_session, sessions))))
-    ignored = study.withdrawals.name.encode()  # written by a Psych-DS validator, also in folders of earlier versions
+    ignored = study.withdrawals.name.encode()  # earlier versions wrote the list without it
     if ignores is not None and ignored not in ignores.splitlines():
         append_line(study.ignore, ignored + b"\n")
     try:
-        if is_there(person):
-            shutil.rmtree(person)
+        if is_there(participant_folder):
+            shutil.rmtree(participant_folder)
             sync_folder(study.data)
     except OSError as error:
-        raise cannot_write(person, error) from error
+        raise cannot_write(participant_folder, error) from error
     kept = tuple(row for row in rows if row.participant != participant)
     if kept != rows:
         write_file(study.exclusions, exclusion_bytes(kept))
-    changed = [kept != rows, *(_erase_lines(path, erased) for path, erased in _listing_files(study, participant))]
+    changed = [kept != rows, *(_erase_lines(path, erased) for path, erased in _lists_with_lines(study, participant))]
     name = described_study(study)
     if name is not None:
         write_participants(study, name)
@@ -352,28 +357,28 @@ def _erase_lines(path: Path, erased: Callable[[bytes], bool]) -> bool:
     return kept != lines
 
 
-def _is_row_of(line: bytes, study: StudyFolder, participant: str) -> bool:
+def _names_session_of(line: bytes, study: StudyFolder, participant: str) -> bool:
     place = place_of(study, study.session(participant, 1)).rpartition("/")[0]
     return line.decode("utf-8", "replace").partition("  ")[2].strip().lower().startswith(f"{place}/".lower())
 
 
-def _reverses(line: bytes, participant: str) -> bool:
+def _reverses_exclusion_of(line: bytes, participant: str) -> bool:
     try:
         return bool(parse_json(line)["exclusion"]["participant"] == participant)
     except (ValueError, KeyError, TypeError):
         return False
 
 
-def _outputs(study: Path) -> tuple[tuple[Path, ...], tuple[Output, ...]]:
-    own, within = study.resolve(), workspace().folder.resolve()
-    return erase_outputs(study, within if own.is_relative_to(within) else own)
+def _erase_outputs(study: Path) -> tuple[tuple[Path, ...], tuple[Output, ...]]:
+    study_path, workspace_path = study.resolve(), workspace().folder.resolve()
+    return erase_outputs(study, workspace_path if study_path.is_relative_to(workspace_path) else study_path)
 
 
 def _mentions_beside_studies(study: StudyFolder, participant: str) -> Iterator[str]:
     """Yield archives in the results folder, and files outside of studies that name the study and the participant."""
     results, name = workspace().results, (_study_name(study) or "").encode()
-    described = (path.parent for file in (_DATASET, MANIFEST) for path in results.rglob(file))
-    studies = {study.path, *described}
+    dataset_folders = (path.parent for file in (_DATASET, MANIFEST) for path in results.rglob(file))
+    studies = {study.path, *dataset_folders}
     for path in paths_in(results):
         if path.is_dir() or not studies.isdisjoint(path.parents):
             continue
@@ -398,7 +403,7 @@ def _remaining_mentions(study: StudyFolder, participant: str, *folders: Path) ->
 
 
 def _naming_problem(path: Path, participant: str) -> Iterator[str]:
-    """Yield that a file names the participant, unless it is a recording."""
+    """Yield a sentence if a file names the participant, unless it is a recording."""
     if path.parent.name == "recordings" or not path.is_file():
         return
     word = re.compile(rb"(?<![A-Za-z0-9])" + re.escape(participant.encode()) + rb"(?![A-Za-z0-9])")

@@ -1,7 +1,7 @@
 """The settings of this computer, independent of studies: screens, display offset, device and folders.
 
-Kept as one JSON file in the user's folder, so that a protocol never says it and a study can move to another machine.
-Nothing here knows a window: sizes of screens come as numbers, in logical pixels and millimetres.
+They are stored in one JSON file in the user's folder, not in protocols, so that a study can move to another computer.
+This module does not use windows: screen sizes are passed as numbers, in logical pixels and millimetres.
 """
 
 from __future__ import annotations
@@ -30,15 +30,15 @@ STATEMENT_X_HEIGHT_PX: Final = 16 * 1118 / 2048
 
 DISTANCE_MM: Final = (200.0, 3000.0)
 WIDTH_MM: Final = (80.0, 5000.0)
-_MOST_RECENT: Final = 8
+_MAX_RECENT: Final = 8
 REMEMBERED_OPTIONS: Final = ("firmware",)
 """Names of device options stored as settings of this computer; others are asked for before each session."""
 OFFSET_MS: Final = (0.0, 500.0)
 SPREAD_MS: Final = (0.0, 200.0)
 CAMERA_LENGTH: Final = 400
 _TRIGGERS_PATTERN: Final = r"^([a-z]+:[^\x00-\x1f]+)?$"
-_Place = Annotated[str, Field(pattern=r"^[^\x00]+$")]
-_OfAxes = Annotated[tuple[float, float, float], Field(strict=False)]
+_PathText = Annotated[str, Field(pattern=r"^[^\x00]+$")]
+_PerAxis = Annotated[tuple[float, float, float], Field(strict=False)]
 How = Literal["photodiode", "high-speed camera", "data sheet"]
 
 
@@ -63,23 +63,24 @@ class DisplayOffset(_Strict):
 class DeviceBench(_Strict):
     """The bench measurements of a device on the day ``measured``, for x, y and z.
 
-    ``mass_kg``, ``damping_nspm`` and ``friction_n`` are the device's own, ``stable_nspm`` is the greatest stable
-    damping, ``delay_ms`` the delay of a force, ``gain`` the measured force per requested force (None without a scale),
-    ``count_m`` the encoder count [m] that explains the noise of positions in motion (None: it moved too little). A
-    device is identified by ``name`` and ``serial``, "" if it has none. ``report`` is the path of bench.md.
+    ``mass_kg``, ``damping_nspm`` and ``friction_n`` are properties of the device itself, ``stable_nspm`` is the
+    greatest stable damping, ``delay_ms`` the delay of a force, ``gain`` the measured force per requested force (None
+    without a scale), ``count_m`` the encoder count [m] that explains the noise of positions in motion (None if the
+    device moved too little). ``name`` and ``serial`` ("" if it has none) identify the device. ``report`` is the path of
+    bench.md.
     """
 
     name: Annotated[str, Field(pattern=rf"^{NAME_PATTERN}$")]
     serial: str = ""
     measured: str
-    mass_kg: _OfAxes
-    damping_nspm: _OfAxes
-    friction_n: _OfAxes
-    delay_ms: _OfAxes
-    stable_nspm: _OfAxes
+    mass_kg: _PerAxis
+    damping_nspm: _PerAxis
+    friction_n: _PerAxis
+    delay_ms: _PerAxis
+    stable_nspm: _PerAxis
     gain: float | None = None
     count_m: Annotated[float, Field(gt=0.0)] | None = None
-    report: _Place | None = None
+    report: _PathText | None = None
 
     @property
     def entry(self) -> dict[str, Any]:
@@ -92,13 +93,13 @@ class MachineSettings(_Strict):
 
     ``screen`` is the name of the participant's screen, ``screen_number`` distinguishes screens of the same name, from
     1; ``viewing_distance_mm`` and ``screen_width_mm`` are None until they are measured. ``firmware`` is the file of a
-    device's program, ``workspace`` the folder of protocols and results (None: not chosen: `study_app.workspace`);
+    device's program, ``workspace`` the folder of protocols and results (None if not chosen, see `study_app.workspace`);
     ``recent`` are recently opened protocol files outside it, newest first; ``operator`` are the last initials;
     ``photodiode`` tells whether the tank has a corner for a photodiode; ``camera`` is the camera of video conditions
     (see `video.sources`), "" for the system's default; ``benches`` are the latest measurements of devices.
-    ``lsl_markers``, ``lsl_samples`` and ``triggers`` (the address of a port, "": none) are the outlets of sessions.
-    ``proofs`` is the folder for a study's proof at the end of a session, ``stamps`` a time-stamp server (RFC 3161),
-    ``stamp_root`` its root certificate (PEM). Whether ``device`` is known is checked when it is opened.
+    ``lsl_markers``, ``lsl_samples`` and ``triggers`` (the address of a port, or "") are the outlets of sessions.
+    ``proofs`` is the folder into which a study's proof is written after each session, ``stamps`` a time-stamp server
+    (RFC 3161), ``stamp_root`` its root certificate (PEM). An unknown ``device`` is reported only when it is opened.
     """
 
     screen: str = ""
@@ -107,9 +108,9 @@ class MachineSettings(_Strict):
     screen_width_mm: Annotated[float, Field(ge=WIDTH_MM[0], le=WIDTH_MM[1])] | None = None
     display_offset: DisplayOffset | None = None
     device: Annotated[str, Field(pattern=rf"^{NAME_PATTERN}(:.+)?$")] = DEFAULT_DEVICE
-    firmware: _Place | None = None
-    workspace: _Place | None = None
-    recent: Annotated[tuple[_Place, ...], Field(max_length=_MOST_RECENT, strict=False)] = ()
+    firmware: _PathText | None = None
+    workspace: _PathText | None = None
+    recent: Annotated[tuple[_PathText, ...], Field(max_length=_MAX_RECENT, strict=False)] = ()
     theme: Annotated[Literal["light", "dark"], Field(title="Theme of the operator's windows")] = "light"
     sound: Annotated[bool, Field(title="Sound when a device needs attention")] = False
     photodiode: bool = False
@@ -118,9 +119,9 @@ class MachineSettings(_Strict):
     benches: Annotated[tuple[DeviceBench, ...], Field(strict=False)] = ()
     lsl_markers: bool = False
     lsl_samples: SampleChoice = "off"
-    proofs: _Place | None = None
+    proofs: _PathText | None = None
     stamps: Annotated[str, Field(pattern=r"^(https?://\S+)?$")] = ""
-    stamp_root: _Place | None = None
+    stamp_root: _PathText | None = None
     triggers: Annotated[str, Field(pattern=_TRIGGERS_PATTERN)] = ""
 
     @property
@@ -140,7 +141,7 @@ class MachineSettings(_Strict):
             return self
         name = str(protocol.absolute())
         others = (other for other in self.recent if other != name)
-        return self.model_copy(update={"recent": (name, *others)[:_MOST_RECENT]})
+        return self.model_copy(update={"recent": (name, *others)[:_MAX_RECENT]})
 
     def with_bench(self, bench: DeviceBench) -> MachineSettings:
         """Return the settings with this measurement, replacing an earlier one of the same device."""
@@ -149,8 +150,8 @@ class MachineSettings(_Strict):
 
     def bench_of(self, described: Mapping[str, Any]) -> DeviceBench | None:
         """Return the measurement of the device with this name and serial number, or None if it was not measured."""
-        own = described.get("name"), described.get("serial") or ""
-        return next((bench for bench in self.benches if (bench.name, bench.serial) == own), None)
+        identity = described.get("name"), described.get("serial") or ""
+        return next((bench for bench in self.benches if (bench.name, bench.serial) == identity), None)
 
     def screen_among(self, names: Sequence[str]) -> int:
         """Return the number (from 1) of the participant's screen among ``names``; the last if it is not connected."""
@@ -167,8 +168,8 @@ class MachineSettings(_Strict):
     def text_scale(self, width_px: float, system_mm: float) -> float:
         """Return the factor that enlarges text so that an x spans 0.4° at the viewing distance.
 
-        ``width_px`` is the screen's width in logical pixels, ``system_mm`` the width that the system reports, which is
-        used until it is corrected. 1 if distance or width is unknown; never smaller.
+        ``width_px`` is the screen's width in logical pixels, ``system_mm`` the width reported by the system, which is
+        used until a measured width is set. The factor is at least 1, and 1 if distance or width is unknown.
         """
         height_deg = self.x_height_deg(width_px, system_mm)
         return 1.0 if height_deg is None else max(1.0, LEAST_X_HEIGHT_DEG / height_deg)

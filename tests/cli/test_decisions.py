@@ -17,7 +17,7 @@ from study_app.store.files.output_files import Output, write_output
 from study_app.store.integrity.checksums import checked_line
 from study_app.store.receipt import read
 from study_app.store.unblinding import Unblinded
-from study_app.store.verification.reproduction import Reproduced
+from study_app.store.verification.reproduction import Reproduction
 from study_app.store.withdrawals import Withdrawn, proof_of_withdrawal, tombstones
 from tests.cli.test_transcripts import make_labs
 from tests.studies import once
@@ -144,7 +144,7 @@ def test_reproducing_lists_differences_then_followed_levels(
     labs: Path, monkeypatch: pytest.MonkeyPatch, differences: list[str], closing: str, code: int
 ) -> None:
     followed = ["block b: 4 of 5 levels are consistent with the answers"]
-    done = Reproduced(differences, followed)
+    done = Reproduction(differences, followed)
     monkeypatch.setattr("study_app.store.verification.reproduce_session", lambda _session: done)
     session = StudyFolder(labs / "A").session("P001", 1).path
     assert run("reproduce", session, code=code)[0] == [*differences, *followed, closing]

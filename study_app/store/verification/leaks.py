@@ -1,9 +1,9 @@
 """Search for words that reveal a condition, which shows that blinding is intact.
 
-A condition is revealed by its id, its liquid's id, the liquid's parameters and its delay; what a trial with a design
-presents by its level, standard and comparison. None of them may stand in a file or a name of a study folder, but for
-the sealed key, for the preregistration (which contains no codes), for the statements (whose words are shown to the
-participant anyway), for the moments of events and for the recordings, where forces and the ages of frames are measured.
+A condition is revealed by its id, its liquid's id, the liquid's parameters and its delay, a trial with a design also by
+its level, standard and comparison. None of these words may occur in the contents or names of a study folder's files.
+Exempt are the sealed key, the preregistration (which contains no codes), the statements (whose words are shown to the
+participant anyway), the times of events, and the recordings (which contain measured forces and frame ages).
 """
 
 import csv
@@ -25,13 +25,13 @@ from study_app.store.journals.journal_events import Event, Stepped, TrialStarted
 Tables: TypeAlias = Mapping[str, Any]
 
 _STATEMENTS = frozenset({"item", "items"})  # names of free texts in journal, receipt and tables
-_CLOCKS = frozenset({"t_s", "onset_s", "first_choice_s", "last_change_s", "trial_started_s"})
-_PASSED_OVER = _STATEMENTS | _CLOCKS  # times can have any value: 1.717 s does not reveal a wake of 1717 ticks
-_SETTINGS = frozenset(
+_TIMES = frozenset({"t_s", "onset_s", "first_choice_s", "last_change_s", "trial_started_s"})
+_IGNORED_NAMES = _STATEMENTS | _TIMES  # a time may equal a parameter by chance: 1.717 s and 1717 ticks
+_HARMLESS_NAMES = frozenset(
     {"id", "effects", "kind", "axes"}
 )  # words of the force model that do not reveal a condition by themselves
-_ANY_STUDY = (MISSING, "true", "false", "none")  # values in the files of any study
-_TELLING_DIGITS = 5  # number of digits that are unlikely to occur by chance
+_COMMON_VALUES = (MISSING, "true", "false", "none")  # values in the files of any study
+_MIN_CERTAIN_DIGITS = 5  # number of digits that are unlikely to occur by chance
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,13 +43,13 @@ class Leak:
 
 
 class Telltales:
-    """Words that reveal conditions; made by `telltales` and `certain_telltales`."""
+    """Words that reveal conditions, from `telltales` or `certain_telltales`."""
 
     def __init__(self, words: Iterable[str]) -> None:
         self.words = frozenset(words)
         longest_first = sorted(self.words, key=lambda word: (-len(word), word))
-        listed = "|".join(re.escape(word) for word in longest_first)
-        self._pattern = re.compile(rf"(?<!\w)(?<!\d\.)(?:{listed})(?!\w|\.\d)" if listed else r"(?!)")
+        alternatives = "|".join(re.escape(word) for word in longest_first)
+        self._pattern = re.compile(rf"(?<!\w)(?<!\d\.)(?:{alternatives})(?!\w|\.\d)" if alternatives else r"(?!)")
 
     def in_text(self, text: str) -> list[str]:
         """Return the revealing words that occur as whole words in ``text``: a window's title, a log line, a cell."""
@@ -59,10 +59,10 @@ class Telltales:
 def telltales(protocol: Protocol, recorded: Iterable[float] = ()) -> Telltales:
     """Return the words that reveal a condition or level of ``protocol``: ids, and numbers in every unit in use.
 
-    ``recorded`` are `recorded_numbers`.
+    ``recorded`` are further numbers, from `recorded_numbers`.
     """
-    terms = _telling_words(protocol.model_dump(mode="json", include={"liquids", "conditions"}, exclude_unset=True))
-    return Telltales(terms | _all_spelled({*presented_numbers(protocol), *recorded}))
+    terms = _revealing_words(protocol.model_dump(mode="json", include={"liquids", "conditions"}, exclude_unset=True))
+    return Telltales(terms | _all_notations({*presented_numbers(protocol), *recorded}))
 
 
 def presented_numbers(protocol: Protocol) -> frozenset[float]:
@@ -88,44 +88,44 @@ def recorded_numbers(protocol: Protocol, opened: Iterable[Event]) -> frozenset[f
     Methods may choose any level; levels that a participant set step by step are included.
     """
     numbers: set[float] = set()
-    setting, place = None, 0
+    setting, position = None, 0
     for line in opened:
         if isinstance(line, TrialStarted) and line.level:
             block, standard = protocol.blocks[line.block], line.standard
             numbers |= {line.level, protocol.stimulus_of(block).comparison(standard, line.level)}
-            setting, place = protocol.adjusting(block, standard, line.level), 0
+            setting, position = protocol.adjusting(block, standard, line.level), 0
         elif isinstance(line, Stepped) and setting is not None:
-            place = setting.moved(place, line.steps)
-            numbers |= {setting.level(place), setting.comparison(place)}
+            position = setting.moved(position, line.steps)
+            numbers |= {setting.level(position), setting.comparison(position)}
     return frozenset(numbers - {0.0})
 
 
 def certain_telltales(tables: Tables, published: Any, levels: Iterable[float] = ()) -> Telltales:
-    """Return the words that reveal a condition and do not occur by chance.
+    """Return the words that reveal a condition and are unlikely to occur by chance.
 
-    Short numbers, words of the ``published`` protocol and words in the files of any study may occur by chance.
-    ``tables`` are the sealed key's, ``published`` is the receipt's protocol, ``levels`` are `presented_numbers`.
+    Short numbers, words of the ``published`` protocol and words in the files of any study are left out. ``tables`` are
+    those of the sealed key, ``published`` is the receipt's protocol, ``levels`` are `presented_numbers`.
     """
     columns = [column.variable for column in every_column(intervals=True)]
-    known = " ".join(text for _, text in _texts([published, columns, _ANY_STUDY], "", frozenset()))
-    every = _telling_words(tables) | _all_spelled(levels)
-    certain = (word for word in every if not word[0].isdigit() or _count_digits(word) >= _TELLING_DIGITS)
-    return Telltales(word for word in certain if not Telltales([word]).in_text(known))
+    harmless_text = " ".join(text for _, text in _texts([published, columns, _COMMON_VALUES], "", frozenset()))
+    words = _revealing_words(tables) | _all_notations(levels)
+    certain = (word for word in words if not word[0].isdigit() or _count_digits(word) >= _MIN_CERTAIN_DIGITS)
+    return Telltales(word for word in certain if not Telltales([word]).in_text(harmless_text))
 
 
 def find_leaks(folder: Path, telling: Telltales) -> list[Leak]:
-    """Return the ``telling`` words in names and texts of ``folder``, except where they may stand (see above)."""
+    """Return the ``telling`` words in names and texts of ``folder``, except where they are permitted (see above)."""
     leaks: list[Leak] = []
     study = StudyFolder(folder)
     for path in paths_in(folder):
         name = path.relative_to(folder).as_posix()
         leaks += [Leak(f"the name {name}", word) for word in telling.in_text(name)]
         if path.is_file() and path not in (study.key, study.preregistration) and path.suffix != ".parquet":
-            leaks += _in_file(path, name, telling)
+            leaks += _find_in_file(path, name, telling)
     return leaks
 
 
-def _in_file(path: Path, name: str, telling: Telltales) -> Iterator[Leak]:
+def _find_in_file(path: Path, name: str, telling: Telltales) -> Iterator[Leak]:
     try:
         content = path.read_bytes().decode("utf-8", "replace")
     except FileNotFoundError:  # a running program has just removed it
@@ -142,54 +142,54 @@ def _in_file(path: Path, name: str, telling: Telltales) -> Iterator[Leak]:
 def _fragments(suffix: str, content: str) -> Iterator[tuple[str, str]]:
     """Yield the texts in a file other than statements, with their places."""
     if suffix == ".csv":
-        yield from _cells(content)
+        yield from _csv_cells(content)
     elif suffix == ".json":
-        yield from _parsed(content, "")
+        yield from _json_texts(content, "")
     else:
         for number, line in enumerate(content.splitlines(), start=1):
-            yield from _parsed(line, f", line {number}")
+            yield from _json_texts(line, f", line {number}")
 
 
-def _cells(content: str) -> Iterator[tuple[str, str]]:
+def _csv_cells(content: str) -> Iterator[tuple[str, str]]:
     header: list[str] = []
     for number, row in enumerate(csv.reader(io.StringIO(content, newline="")), start=1):
         header = header or row
         for column, cell in zip_longest(header, row, fillvalue=""):
-            if column not in _PASSED_OVER:
+            if column not in _IGNORED_NAMES:
                 yield f", row {number}, {column}", cell
 
 
-def _parsed(text: str, place: str) -> Iterator[tuple[str, str]]:
-    """Yield the texts in a JSON document with their places, or a text itself if it is not JSON."""
+def _json_texts(text: str, place: str) -> Iterator[tuple[str, str]]:
+    """Yield the texts in a JSON document with their places, or ``text`` itself if it is not JSON."""
     try:
         value = parse_json(text)
     except ValueError:
         yield place, text
         return
-    yield from _texts(value, place, _PASSED_OVER)
+    yield from _texts(value, place, _IGNORED_NAMES)
 
 
-def _texts(value: Any, place: str, passed_over: frozenset[str]) -> Iterator[tuple[str, str]]:
+def _texts(value: Any, place: str, ignored_names: frozenset[str]) -> Iterator[tuple[str, str]]:
     """Yield every name and value in a JSON value as text, with its place."""
     if isinstance(value, dict):
         for name, inner in value.items():
             yield place, name
-            if name not in passed_over:
-                yield from _texts(inner, f"{place}, {name}", passed_over)
+            if name not in ignored_names:
+                yield from _texts(inner, f"{place}, {name}", ignored_names)
     elif isinstance(value, list | tuple):
         for inner in value:
-            yield from _texts(inner, place, passed_over)
+            yield from _texts(inner, place, ignored_names)
     elif value is not None and not isinstance(value, bool):
         yield place, str(value)
 
 
-def _telling_words(tables: Tables) -> set[str]:
+def _revealing_words(tables: Tables) -> set[str]:
     spellings: set[str] = set()
 
     def collect(value: Any) -> None:
         if isinstance(value, Mapping):
             for name, inner in value.items():
-                if name not in _SETTINGS:
+                if name not in _HARMLESS_NAMES:
                     collect(inner)
         elif isinstance(value, list | tuple):
             for inner in value:
@@ -197,7 +197,7 @@ def _telling_words(tables: Tables) -> set[str]:
         elif isinstance(value, str):
             spellings.add(value)
         elif isinstance(value, int | float) and not isinstance(value, bool) and value:
-            spellings.update(_spelled(value))
+            spellings.update(_notations(value))
 
     for table in ("liquids", "conditions"):
         collect(tables[table])
@@ -205,12 +205,12 @@ def _telling_words(tables: Tables) -> set[str]:
     return spellings
 
 
-def _all_spelled(values: Iterable[float]) -> set[str]:
-    return {word for value in values for word in _spelled(value)}
+def _all_notations(values: Iterable[float]) -> set[str]:
+    return {word for value in values for word in _notations(value)}
 
 
-def _spelled(value: float) -> Iterator[str]:
-    """Yield the notations of a number: unchanged and, since it may be in milliseconds, in s, µs and ns."""
+def _notations(value: float) -> Iterator[str]:
+    """Yield the notations of a number, unchanged and, since it may be in milliseconds, in s, µs and ns."""
     for scaled in (value, value / 1000, value * 1000, value * 1_000_000):
         yield repr(scaled)
         if float(scaled).is_integer():

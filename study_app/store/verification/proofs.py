@@ -1,8 +1,8 @@
 """Proofs to store elsewhere: a line for each session and record, signed and time-stamped if possible.
 
-A line is one of ``fingerprints.txt`` with two check characters. Each withdrawal, reveal and exclusion (a reversed one,
-too) has a line that names its file and participant. Below the lines of a file may be ``signature KEY SIGNATURE``
-(Ed25519, base64) and ``stamp TOKEN`` (RFC 3161), both over the bytes of the lines.
+The line of a session is that of ``fingerprints.txt`` with two check characters. Each withdrawal, reveal, exclusion and
+reversed exclusion has a line that names its file and participant. The lines may be followed by ``signature KEY
+SIGNATURE`` (Ed25519, base64) and ``stamp TOKEN`` (RFC 3161), both over the bytes of the lines.
 """
 
 import atexit
@@ -26,15 +26,15 @@ from study_app.store.merged import folders_of
 from study_app.store.verification.time_stamps import WAITS_S, checked_stamp, optional_library, request_stamp
 from study_app.store.withdrawals import proof_of_withdrawal, tombstones
 
-_STORE: Final = ("liquid-study", "signing key of the lab")
+_KEYRING_ENTRY: Final = ("liquid-study", "signing key of the lab")
 
 
 @dataclass(frozen=True, slots=True)
 class Proof:
-    """A stored proof: its lines, with a text about its signature and time stamp."""
+    """A stored proof: its lines, and notes on its signature and time stamp for the report."""
 
     lines: Proofs
-    told: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
 
 def record_proofs(study: StudyFolder) -> Proofs:
@@ -46,8 +46,8 @@ def record_proofs(study: StudyFolder) -> Proofs:
     return (*map(proof_of_withdrawal, tombstones(study).values()), *opened, *dict.fromkeys(excluded))
 
 
-def _proof_lines(study: StudyFolder) -> str:
-    """Return the lines that prove the current state of a study; in a merged study the names begin with the site."""
+def _fingerprint_lines(study: StudyFolder) -> str:
+    """Return the lines that prove the current state of a study; in a merged study each name includes the site."""
     lines = [
         checked_line(proof, f"{site_prefix(study.path, folder)}{name}")
         for folder in folders_of(study.path).values()
@@ -59,12 +59,12 @@ def _proof_lines(study: StudyFolder) -> str:
 
 
 def site_prefix(study: Path, folder: Path) -> str:
-    """Return what the names in a proof begin with for a site in ``folder``: "sites/A/"; "" for the study itself."""
+    """Return the prefix of the names in a proof for a site in ``folder``, such as "sites/A/"; "" if not merged."""
     return "" if folder == study else f"{folder.relative_to(study).as_posix()}/"
 
 
 def _sign_lines(lines: str) -> str:
-    """Return the signature of ``lines`` as a line, made with the lab's key, which is created if missing."""
+    """Sign ``lines`` with the lab's key, which is created if missing, and return the signature as a line."""
     key = _signing_key(draws=True)
     public = base64.b64encode(key.public_key().public_bytes_raw()).decode()
     return f"signature {public} {base64.b64encode(key.sign(lines.encode())).decode()}\n"
@@ -82,20 +82,20 @@ def read_proof(path: Path) -> Proof:
     if not path.is_file():
         raise StoreError(f"{path} is not a file: specify a copy of a study's fingerprints.txt")
     text = (read_if_there(path) or b"").decode("utf-8-sig", "replace").replace("\r\n", "\n")
-    above, told = "", list[str]()
+    lines, notes = "", list[str]()
     for number, line in enumerate(text.splitlines(keepends=True), start=1):
         name, _, value = line.strip().partition(" ")
         if name == "signature":
-            told.append(_check_signature(path, above, *value.partition(" ")[::2]))
+            notes.append(_check_signature(path, lines, *value.partition(" ")[::2]))
         elif name == "stamp":
-            told.append(checked_stamp(path, above, value))
-        elif told and name:
+            notes.append(checked_stamp(path, lines, value))
+        elif notes and name:
             raise StoreError(
                 f"{path}, line {number} is below the signature or stamp, which does not cover it: remove it"
             )
         else:
-            above += line
-    return Proof(parse_copy(path, above), tuple(told))
+            lines += line
+    return Proof(parse_copy(path, lines), tuple(notes))
 
 
 def write_proof(study: StudyFolder, say: Callable[[str], object]) -> None:
@@ -119,44 +119,47 @@ def write_proof(study: StudyFolder, say: Callable[[str], object]) -> None:
 
 def proof_text(study: StudyFolder, *, server: str = "", sign: bool | None = None) -> str:
     """Return a study's proof, signed (None: if the lab has a key) and stamped if a ``server`` (URL) is given."""
-    lines, below = _proof_lines(study), ""
+    lines, suffix = _fingerprint_lines(study), ""
     if sign or (sign is None and _signing_key(draws=False) is not None):
-        below += _sign_lines(lines)
+        suffix += _sign_lines(lines)
     if server:
-        below += request_stamp(lines, server)
-    return lines + below
+        suffix += request_stamp(lines, server)
+    return lines + suffix
 
 
 def _signing_key(*, draws: bool) -> Any:
-    """Return the lab's private key from the system's key store; if missing, None or, with ``draws``, a new one."""
+    """Return the lab's private key from the system's key store; without one, draw it or return None."""
     if not draws and None in (find_spec("keyring"), find_spec("cryptography")):
         return None
-    store, ed25519 = optional_library("keyring"), optional_library("cryptography.hazmat.primitives.asymmetric.ed25519")
+    keyring, ed25519 = (
+        optional_library("keyring"),
+        optional_library("cryptography.hazmat.primitives.asymmetric.ed25519"),
+    )
     try:
-        held = store.get_password(*_STORE)
-        if held is None and draws:
-            held = base64.b64encode(ed25519.Ed25519PrivateKey.generate().private_bytes_raw()).decode()
-            store.set_password(*_STORE, held)
+        encoded_key = keyring.get_password(*_KEYRING_ENTRY)
+        if encoded_key is None and draws:
+            encoded_key = base64.b64encode(ed25519.Ed25519PrivateKey.generate().private_bytes_raw()).decode()
+            keyring.set_password(*_KEYRING_ENTRY, encoded_key)
     except optional_library("keyring.errors").KeyringError as error:
         if not draws:
             return None
         raise StoreError(
             f"the system's key store cannot be used ({error}): unlock it, or do not sign the proof"
         ) from error
-    return None if held is None else ed25519.Ed25519PrivateKey.from_private_bytes(base64.b64decode(held))
+    return None if encoded_key is None else ed25519.Ed25519PrivateKey.from_private_bytes(base64.b64decode(encoded_key))
 
 
 def _check_signature(path: Path, lines: str, public: str, signature: str) -> str:
-    """Return who signed the proof in ``path``; raise StoreError if the signature is wrong or by another key."""
+    """Return a text on who signed the proof in ``path``; StoreError if the signature is wrong or by another key."""
     ed25519 = optional_library("cryptography.hazmat.primitives.asymmetric.ed25519")
-    wrong = optional_library("cryptography.exceptions").InvalidSignature
+    invalid_signature = optional_library("cryptography.exceptions").InvalidSignature
     try:
         key = ed25519.Ed25519PublicKey.from_public_bytes(base64.b64decode(public))
         key.verify(base64.b64decode(signature), lines.encode())
-    except (wrong, ValueError) as error:
+    except (invalid_signature, ValueError) as error:
         raise StoreError(f"{path} was changed after it was signed") from error
-    own = _signing_key(draws=False)
-    if own is not None and own.public_key().public_bytes_raw() != key.public_bytes_raw():
+    own_key = _signing_key(draws=False)
+    if own_key is not None and own_key.public_key().public_bytes_raw() != key.public_bytes_raw():
         raise StoreError(f"{path} is signed with another computer's key ({public}): the signature was replaced")
-    signer = "this computer's key" if own is not None else f"the key {public}: compare it with your own"
+    signer = "this computer's key" if own_key is not None else f"the key {public}: compare it with your own"
     return f"is signed with {signer}"

@@ -15,9 +15,9 @@ from study_app.store.files.atomic import read_regular
 
 _EXTRA: Final = "from the optional proofs extra: pip install 'liquid-study[proofs]'"
 WAITS_S: Final = 10.0
-_LONGEST: Final = 1_000_000
+_MAX_ANSWER_BYTES: Final = 1_000_000
 """Greatest length of a time-stamp server's answer [bytes]."""
-_EXAMPLE: Final = "https://freetsa.org/tsr"
+_EXAMPLE_URL: Final = "https://freetsa.org/tsr"
 
 
 def optional_library(name: str) -> Any:
@@ -31,8 +31,8 @@ def optional_library(name: str) -> Any:
 def request_stamp(lines: str, server: str) -> str:
     """Request a time stamp of ``lines`` from ``server`` (URL) and return it as a line.
 
-    The answer must grant a token over exactly these lines, with the nonce of the request, and come from the configured
-    root certificate, if there is one.
+    The answer must grant a token over exactly these lines with the nonce of the request. If a root certificate is
+    configured, the token must be signed under it.
 
     Raises
     ------
@@ -42,11 +42,11 @@ def request_stamp(lines: str, server: str) -> str:
     client = optional_library("rfc3161_client")
     request = client.TimestampRequestBuilder().data(lines.encode()).build()
     if not server.startswith(("http://", "https://")):
-        raise StoreError(f"{_without_login(server)} is not a time-stamp server: specify a URL such as {_EXAMPLE}")
+        raise StoreError(f"{_without_login(server)} is not a time-stamp server: specify a URL such as {_EXAMPLE_URL}")
     answers = queue.SimpleQueue[bytes | Exception]()
     threading.Thread(target=_post_request, args=(server, request.as_bytes(), answers), daemon=True).start()
     try:
-        answer = answers.get(timeout=WAITS_S)  # the time-out of a connection applies to each packet
+        answer = answers.get(timeout=WAITS_S)  # the connection's own time-out applies to each packet
         if not isinstance(answer, Exception):
             check_granted(answer, request)
             if workstation.load_or_default()[0].stamp_root is not None:
@@ -82,21 +82,21 @@ def check_granted(answer: bytes, request: Any) -> None:
         raise ValueError("the token was issued for another request")
 
 
-def _post_request(server: str, question: bytes, answers: queue.SimpleQueue[bytes | Exception]) -> None:
-    """Put the server's answer, truncated after `_LONGEST`, or the error of the request; follow no redirect."""
-    import urllib.request as network  # noqa: PLC0415 - loads the network's modules: only where a stamp is asked for
+def _post_request(server: str, content: bytes, answers: queue.SimpleQueue[bytes | Exception]) -> None:
+    """Put the server's answer (at most `_MAX_ANSWER_BYTES`) or the error into ``answers``; follow no redirect."""
+    import urllib.request as network  # noqa: PLC0415 - loads network modules, needed only for a stamp
 
     try:
         opener = network.OpenerDirector()
-        kinds = (network.ProxyHandler, network.HTTPHandler, network.HTTPSHandler, network.HTTPDefaultErrorHandler)
-        for kind in (*kinds, network.HTTPErrorProcessor):
-            opener.add_handler(kind())
+        handlers = (network.ProxyHandler, network.HTTPHandler, network.HTTPSHandler, network.HTTPDefaultErrorHandler)
+        for handler in (*handlers, network.HTTPErrorProcessor):
+            opener.add_handler(handler())
         request = network.Request(  # noqa: S310 - http or https, as checked
-            server, question, {"Content-Type": "application/timestamp-query"}
+            server, content, {"Content-Type": "application/timestamp-query"}
         )
         with opener.open(request, timeout=WAITS_S) as answer:
-            answers.put(answer.read(_LONGEST))
-    except Exception as error:  # noqa: BLE001 - raised where the answer is waited for
+            answers.put(answer.read(_MAX_ANSWER_BYTES))
+    except Exception as error:  # noqa: BLE001 - raised by the waiting thread
         if isinstance(error, HTTPError):
             error.close()
         answers.put(error)
@@ -120,7 +120,7 @@ def checked_stamp(path: Path, lines: str, token: str) -> str:
 
 
 def _verify_stamp(token: bytes, lines: str) -> Any:
-    """Verify a stamp's lines and its signature by the configured root; return the decoded stamp."""
+    """Verify that a stamp covers ``lines`` and is signed under the configured root; return the decoded stamp."""
     client, x509 = optional_library("rfc3161_client"), optional_library("cryptography.x509")
     answer = client.decode_timestamp_response(token)
     root = read_regular(Path(str(workstation.load_or_default()[0].stamp_root)))

@@ -1,10 +1,11 @@
 """Verification of one session: its files against its journal, receipt, checksums and recordings.
 
-Of a session that is open in a program only the journal is judged, which that program does not change again; its other
-files follow the journal. If `fingerprints.txt` lists it as ended, its fingerprint is compared even if a lock says that
-it is open.
-`verify_study` checks everything, which takes a while; `session_discrepancies` checks a session before an analysis
-reads it, unless its files keep their checksums.
+If a program has the session open, only its journal is checked, because written lines do not change but the other files
+are still updated. If `fingerprints.txt` lists the session as ended, its fingerprint is compared even if a lock says
+that it is open.
+
+`verify_study` checks everything, which takes a while. `session_discrepancies` checks a session before an analysis reads
+it, and is fast if its files still have their checksums.
 """
 
 from __future__ import annotations
@@ -41,7 +42,7 @@ from study_app.store.sessions.recovery import RESTORE, files_beyond_journal
 from study_app.store.tables.session_tables import table_columns
 from study_app.store.tables.study_files import opened_or_none, row_from
 
-_BEGUN = "but the receipt, tables, recordings or checksums show that the session began: restore it from a backup"
+_BEGAN = "but the receipt, tables, recordings or checksums show that the session began: restore it from a backup"
 _ROUNDED_S = 1.1e-6
 _CHANGED = "has changed since the session ended (its checksum differs)"
 _REBUILT_AFTER = "states that the checksums or the fingerprint were rewritten after the session ended"
@@ -51,7 +52,7 @@ _COMPARE = "compare it with fingerprints stored elsewhere: liquid-study verify -
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """A problem and its path in the study folder; ``shares`` limits it to sharing."""
+    """A problem and its path in the study folder; with ``shares`` it matters only for sharing the data."""
 
     place: str
     message: str
@@ -114,9 +115,10 @@ class Findings:
 class CheckedSession:
     """The data of one session with which the study's own files are compared.
 
-    ``row`` is its row of the participants table: None if it has not begun, or its journal cannot be read (``readable``
-    is False). ``running`` means that a program has it open, ``chained`` that each line of its journal has the hash of
-    the previous ones. ``trials`` are their numbers. ``fingerprint`` is that of a session whose journal has its end.
+    ``row`` is the session's row of the participants table: None if it has not begun, or if its journal cannot be read
+    (``readable`` is False). ``running`` means that a program has it open, ``chained`` that each line of its journal has
+    the hash of the previous ones. ``trials`` are the numbers of its trials. ``fingerprint`` is "" unless the journal
+    records the session's end.
     """
 
     place: Place
@@ -131,7 +133,7 @@ class CheckedSession:
 def check_session(place: Place, key: Key | None, findings: Findings, *, recordings: bool = True) -> CheckedSession:
     """Check one session; repeat the check if there are errors and a program has opened it in the meantime.
 
-    Without ``recordings`` these are not read, which would take a while.
+    Without ``recordings`` the recordings are not read, which would take a while.
     """
     errors = Findings(findings.folder)
     checked = CheckedSession(place=place, running=is_open(place.folder.path))
@@ -151,8 +153,8 @@ def _check_files(
         findings.warning(folder.path, "is open in another program")
     else:
         for path in (*temporary_files(folder.path), *temporary_files(folder.recordings)):
-            what = "is an incomplete file left by a program that was killed; the rebuild command removes it"
-            findings.warning(path, what)
+            message = "is an incomplete file left by a program that was killed; the rebuild command removes it"
+            findings.warning(path, message)
         if is_there(folder.crash) and folder.crash.stat().st_size:
             findings.warning(folder.crash, "shows how the program crashed: send it to the developers")
     contents = _check_journal(folder, findings, running=running)
@@ -164,28 +166,32 @@ def _check_files(
     start = events.start_of(lines)
     expected = {"participant": folder.participant, "session": folder.number, "study": place.study}
     for name, value in expected.items():
-        if (told := getattr(start, name)) != value:
-            findings.error(folder.journal, f"belongs to {name} {told!r}, but is stored with the files for {value!r}")
-    told = lines
+        if (recorded := getattr(start, name)) != value:
+            findings.error(
+                folder.journal, f"belongs to {name} {recorded!r}, but is stored with the files for {value!r}"
+            )
+    opened = lines
     with findings.reading(folder.journal):
-        told = open_events(lines, key)
-    for wrong in (*_wrong_responses(lines), *_unconfirmed_answers(lines)):
-        findings.error(folder.journal, wrong)
+        opened = open_events(lines, key)
+    for problem in (*_changed_responses(lines), *_unconfirmed_answers(lines)):
+        findings.error(folder.journal, problem)
     ended = isinstance(lines[-1], events.SessionEnded)
     hashes = {}
     if ended or not running:
-        names = {*session_files(folder), *(_checksums(folder).keys() & set(system_files(folder)))}
-        hashes = {name: _hash(folder, name) for name in names if recordings or not name.endswith(".parquet")}
+        names = {*session_files(folder), *(_checksums_or_empty(folder).keys() & set(system_files(folder)))}
+        hashes = {
+            name: _file_hash_or_empty(folder, name) for name in names if recordings or not name.endswith(".parquet")
+        }
     if not running:
         _check_tables(place, lines, findings, ended=ended)
         if ended:
-            _check_checksums(place, lines, told, hashes, findings, recordings=recordings)
+            _check_checksums(place, lines, opened, hashes, findings, recordings=recordings)
         if recordings:
-            _check_recordings(folder, told, key, hashes, findings, ended=ended, damaged=contents.damage is not None)
+            _check_recordings(folder, opened, key, hashes, findings, ended=ended, damaged=contents.damage is not None)
     for name in system_files(folder):
         if name not in hashes:
-            what = "was created by the operating system, or is a copy made by a file-sharing program"
-            findings.warning(folder.path / name, what)
+            message = "was created by the operating system, or is a copy made by a file-sharing program"
+            findings.warning(folder.path / name, message)
     if is_there(folder.rebuilt):
         with findings.reading(folder.rebuilt):
             for line in read_own(folder.rebuilt, study_root(folder.rebuilt)).decode("utf-8", "replace").splitlines():
@@ -198,12 +204,12 @@ def _check_files(
         chained=lines[-1].previous is not None,
         row=row_from(folder, contents, opened_or_none(place.study_folder)),
         trials=frozenset(progress_of(lines).presented),
-        fingerprint=fingerprint(_listed(folder, hashes), lines) if ended and recordings else "",
+        fingerprint=fingerprint(_listed_hashes(folder, hashes), lines) if ended and recordings else "",
     )
 
 
 def _check_journal(folder: SessionFolder, findings: Findings, *, running: bool) -> Contents:
-    """Check the journal and return its contents, without lines if they cannot be those of the session."""
+    """Check the journal and return its contents, which are empty if it is missing or unreadable."""
     nothing = Contents([], 0)
     if not is_there(folder.journal):
         if is_never_begun(folder.path):
@@ -214,7 +220,7 @@ def _check_journal(folder: SessionFolder, findings: Findings, *, running: bool) 
                     "delete the folder",
                 )
         else:
-            findings.error(folder.journal, f"is missing, {_BEGUN}")
+            findings.error(folder.journal, f"is missing, {_BEGAN}")
         return nothing
     try:
         contents = journal.scan(folder.journal)
@@ -230,7 +236,7 @@ def _check_journal(folder: SessionFolder, findings: Findings, *, running: bool) 
             if not running:
                 findings.warning(folder.journal, "does not contain a complete line: there are no recorded data")
         elif contents.damage is None:
-            findings.error(folder.journal, f"does not contain a complete line, {_BEGUN}")
+            findings.error(folder.journal, f"does not contain a complete line, {_BEGAN}")
         return nothing
     for name in events.unknown_events(contents.lines):
         findings.warning(folder.journal, f"contains {name!r} events, which this version does not recognise")
@@ -276,17 +282,19 @@ def _check_receipt(folder: SessionFolder, lines: list[events.Event], key: Key | 
         differing = ["the settings used when the session began"]
     if differing:
         findings.error(path, f"differs from the journal in {', '.join(differing)}")
-    told = {str(entry.get("at")) for entry in held.get("resumed", ()) if isinstance(entry, dict)}
-    again = [line.at for line in lines if isinstance(line, events.SessionResumed) and line.receipt_hash is not None]
-    if lacking := [at for at in again if at not in told]:
+    recorded_times = {str(entry.get("at")) for entry in held.get("resumed", ()) if isinstance(entry, dict)}
+    resumed_times = [
+        line.at for line in lines if isinstance(line, events.SessionResumed) and line.receipt_hash is not None
+    ]
+    if unrecorded := [at for at in resumed_times if at not in recorded_times]:
         findings.warning(
             path,
             (
-                f"does not contain the settings used when the session was resumed at {', '.join(lacking)}: the "
+                f"does not contain the settings used when the session was resumed at {', '.join(unrecorded)}: the "
                 "program was killed at that time, or the entry was removed"
             ),
         )
-    if key is not None and not _is_protocol(held, start, key):
+    if key is not None and not _is_valid_protocol(held, start, key):
         findings.error(path, "its protocol has been changed: restore it from a backup")
     if receipt.has_other_format(held, start):
         findings.error(
@@ -314,50 +322,56 @@ def _check_receipt(folder: SessionFolder, lines: list[events.Event], key: Key | 
         )
 
 
-def _differing_fields(held: Mapping[str, Any], lines: Sequence[events.Event]) -> list[str]:
-    """Return the fields of a receipt that the journal contradicts, without those copied from its first line."""
+def _differing_fields(session_receipt: Mapping[str, Any], lines: Sequence[events.Event]) -> list[str]:
+    """Return the fields of a receipt that the journal contradicts, apart from those copied from its first line."""
     start = events.start_of(lines)
     resumed = {line.at: line.receipt_hash for line in lines if isinstance(line, events.SessionResumed)}
     expected: dict[str, Any] = {"started_at": start.at}
     if not isinstance(lines[-1], events.SessionEnded):
         expected |= {"status": receipt.UNFINISHED, "reason": "", "ended_at": None}
-    names = [name for name, value in expected.items() if held.get(name) != value]
-    if start.version == study_app.__version__ and held.get("generator") != receipt.GENERATOR:
+    names = [name for name, value in expected.items() if session_receipt.get(name) != value]
+    if start.version == study_app.__version__ and session_receipt.get("generator") != receipt.GENERATOR:
         names.append("generator")
-    parts = {
+    expected_parts = {
         "device": ("name", start.device),
         "clock": ("origin_at", start.at),
         "versions": ("liquid-study", start.version),
     }
-    names += [name for name, (part, value) in parts.items() if held.get(name, {}).get(part) != value]
-    for entry in held.get("resumed", ()):
+    names += [
+        name for name, (part, value) in expected_parts.items() if session_receipt.get(name, {}).get(part) != value
+    ]
+    for entry in session_receipt.get("resumed", ()):
         at = str(entry.get("at")) if isinstance(entry, dict) else ""
         if at not in resumed or resumed[at] not in (None, receipt.digest(entry)):
             names.append("resumed")
     return names
 
 
-def _is_protocol(held: Mapping[str, Any], start: events.SessionStarted, key: Key) -> bool:
+def _is_valid_protocol(session_receipt: Mapping[str, Any], start: events.SessionStarted, key: Key) -> bool:
     """Return whether a receipt's protocol, completed from the key, is valid and as this version writes it."""
     try:
-        whole = receipt.without_conditions(complete_protocol(held["protocol"], key))
-        is_earlier = start.version != study_app.__version__ or needs_upgrade(held["protocol"])
+        protocol = receipt.without_conditions(complete_protocol(session_receipt["protocol"], key))
+        is_earlier = start.version != study_app.__version__ or needs_upgrade(session_receipt["protocol"])
     except PlugInError:  # the plug-in is missing; `verify` reports it
         return True
     except (KeyError, TypeError, AttributeError, ValueError):
         return False
-    return is_earlier or _without_own_texts(parse_json(json.dumps(whole))) == _without_own_texts(held["protocol"])
+    return is_earlier or _without_own_texts(parse_json(json.dumps(protocol))) == _without_own_texts(
+        session_receipt["protocol"]
+    )
 
 
 def _without_own_texts(protocol: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Return a receipt's protocol without the questions of designs if a language is the lab's own.
+    """Return a receipt's protocol, without design questions if the lab added one of its languages.
 
     The file of such a language may have been changed since the session, or be missing on this computer.
     """
     if SHIPPED.keys() >= {*protocol["study"]["languages"]}:
         return protocol
-    asked = {name: form for name, form in protocol["questionnaires"].items() if not name.endswith(receipt.ANSWER)}
-    return {**protocol, "questionnaires": asked}
+    questionnaires = {
+        name: form for name, form in protocol["questionnaires"].items() if not name.endswith(receipt.ANSWER)
+    }
+    return {**protocol, "questionnaires": questionnaires}
 
 
 def _unconfirmed_answers(lines: Sequence[events.Event]) -> Iterator[str]:
@@ -383,40 +397,43 @@ def _unconfirmed_answers(lines: Sequence[events.Event]) -> Iterator[str]:
             form = shown
 
 
-def _wrong_responses(lines: Sequence[events.Event]) -> Iterator[str]:
+def _changed_responses(lines: Sequence[events.Event]) -> Iterator[str]:
     """Yield a sentence on each answer in ``responses`` that differs from the choices before it."""
-    now = Progress()
+    progress = Progress()
     for line in lines:
         if isinstance(line, events.Responses | events.FormAnswered):
-            chosen = dict(now.answers)
+            chosen = dict(progress.answers)
             where = f"form {line.form}" if isinstance(line, events.FormAnswered) else f"trial {line.trial}"
             line_name = f"line {line.n} ({line.event})"
-            hides = any(row.kind is not None for row in line.items)  # format 2: a question may have been hidden again
+            may_hide = any(
+                row.kind is not None for row in line.items
+            )  # format 2: a question may have been hidden again
             for row in line.items:
                 if not _same_answer(row, chosen.pop(row.item, events.Answer())):
-                    wrong = "that differs from the one chosen earlier: it has been changed"
-                    yield f"{line_name} has an answer for {row.item!r} in {where} {wrong}"
+                    problem = "that differs from the one chosen earlier: it has been changed"
+                    yield f"{line_name} has an answer for {row.item!r} in {where} {problem}"
             for item, answer in chosen.items():
-                if answer.given or not hides:
+                if answer.given or not may_hide:
                     yield f"{line_name} does not contain the answer to {item!r} in {where}: it has been changed"
-        now.process_line(line)
+        progress.process_line(line)
 
 
-def _same_answer(listed_answer: events.Answer, given: events.Answer) -> bool:
+def _same_answer(listed_answer: events.Answer, chosen: events.Answer) -> bool:
     """Return whether a confirmed answer equals the chosen one; times in lines are rounded to 1 µs."""
-    moments = ((getattr(listed_answer, name), getattr(given, name)) for name in ("onset_s", "first_s", "last_s"))
-    return (listed_answer.value, listed_answer.changes) == (given.value, given.changes) and all(
-        listed == ours or (None not in (listed, ours) and abs(listed - ours) <= _ROUNDED_S) for listed, ours in moments
+    moments = ((getattr(listed_answer, name), getattr(chosen, name)) for name in ("onset_s", "first_s", "last_s"))
+    return (listed_answer.value, listed_answer.changes) == (chosen.value, chosen.changes) and all(
+        confirmed == expected or (None not in (confirmed, expected) and abs(confirmed - expected) <= _ROUNDED_S)
+        for confirmed, expected in moments
     )
 
 
 def _check_tables(place: Place, lines: list[events.Event], findings: Findings, *, ended: bool) -> None:
     """Compare the tables with those made from the journal; report tables that contain more than the journal."""
-    telling: set[Path] = set()
+    reported: set[Path] = set()
     with contextlib.suppress(StoreError):  # already reported for receipt or journal
-        for path, what in files_beyond_journal(place, lines):
-            findings.error(path, f"{what}: {RESTORE}")
-            telling.add(path)
+        for path, problem in files_beyond_journal(place, lines):
+            findings.error(path, f"{problem}: {RESTORE}")
+            reported.add(path)
     try:
         key = opened_key(place.study_folder)
         expected = table_files(place, lines, key)
@@ -425,10 +442,10 @@ def _check_tables(place: Place, lines: list[events.Event], findings: Findings, *
         return
     columns = table_columns(lines, opened=key is not None)
     for (path, content), name in zip(expected, columns, strict=True):
-        held = path.read_bytes() if path.is_file() else content
-        if held != content and held == _sealed_tables(place, lines).get(path):
+        current = path.read_bytes() if path.is_file() else content
+        if current != content and current == _sealed_tables(place, lines).get(path):
             findings.error(path, f"does not contain the sealed columns: {INTERRUPTED}")
-        elif path not in telling:
+        elif path not in reported:
             check_table(path, content, columns[name], findings, may_differ=lambda _: not ended)
 
 
@@ -444,38 +461,38 @@ def check_table(
 ) -> None:
     """Compare a table with the one made from the journals, and its cells with the column dictionary.
 
-    ``may_differ`` tells for a line number whether its session has not ended, so that its tables are updated with the
-    next page or when it is rebuilt: a difference there is only a warning.
+    ``may_differ`` tells whether the line with a number belongs to a session that has not ended. Its tables are updated
+    with the next page or by a rebuild, so a difference there is only a warning.
     """
     try:
         content = read_regular(path)
     except OSError:
         findings.error(path, "is missing or cannot be read; the rebuild command recreates it")
         return
-    written = journal.as_written(content)
-    if content != written == expected:
-        findings.error(path, journal.notation_change(content))
+    normalized = journal.normalized_text(content)
+    if content != normalized == expected:
+        findings.error(path, journal.notation_problem(content))
         return
     pairs = zip_longest(content.split(b"\n"), expected.split(b"\n"))
-    differing = [number for number, (held, whole) in enumerate(pairs, start=1) if held != whole]
-    follows = all(map(may_differ, differing))
+    differing = [number for number, (line, expected_line) in enumerate(pairs, start=1) if line != expected_line]
+    may_all_differ = all(map(may_differ, differing))
     if differing:
-        report = findings.warning if follows else findings.error
+        report = findings.warning if may_all_differ else findings.error
         report(path, f"differs from the journal, starting at line {differing[0]}; the rebuild command recreates it")
-    if not (differing and follows):  # a row may be partly written: earlier versions wrote in place
+    if not (differing and may_all_differ):  # a row may be partly written: earlier versions wrote in place
         for problem in csv_files.table_problems(content, columns):
             findings.error(path, problem)
 
 
-def _hash(folder: SessionFolder, name: str) -> str:
-    """Return the current SHA-256 of a session's file, "" if it cannot be read."""
+def _file_hash_or_empty(folder: SessionFolder, name: str) -> str:
+    """Return the current SHA-256 of a session's file, or "" if it cannot be read."""
     try:
         return file_hash(folder, name)
     except StoreError:
         return ""
 
 
-def _checksums(folder: SessionFolder) -> dict[str, str]:
+def _checksums_or_empty(folder: SessionFolder) -> dict[str, str]:
     """Return the session's list of checksums, empty if it cannot be read."""
     try:
         return read_checksums(folder)
@@ -483,25 +500,25 @@ def _checksums(folder: SessionFolder) -> dict[str, str]:
         return {}
 
 
-def _listed(folder: SessionFolder, hashes: Mapping[str, str]) -> Mapping[str, str]:
-    """Return the present hashes of the files that the session's list names, all without a list."""
-    names = _checksums(folder)
+def _listed_hashes(folder: SessionFolder, hashes: Mapping[str, str]) -> Mapping[str, str]:
+    """Return the current hashes of the files in the session's list; of all files if there is no list."""
+    names = _checksums_or_empty(folder)
     return {name: hashes[name] for name in hashes if name in names} if names else hashes
 
 
 def _check_checksums(
     place: Place,
     lines: Sequence[events.Event],
-    told: Sequence[events.Event],
+    opened: Sequence[events.Event],
     hashes: Mapping[str, str],
     findings: Findings,
     *,
     recordings: bool,
 ) -> None:
     folder = place.folder
-    kept = [line for line in told if isinstance(line, events.Recorded)]
-    opened_hashes = {line.sha256: line.opened_sha256 for line in kept}
-    opened_hashes |= {line.frames_sha256: line.opened_frames_sha256 for line in kept}
+    recorded = [line for line in opened if isinstance(line, events.Recorded)]
+    opened_hashes = {line.sha256: line.opened_sha256 for line in recorded}
+    opened_hashes |= {line.frames_sha256: line.opened_frames_sha256 for line in recorded}
     if not is_there(folder.checksums):
         findings.error(
             folder.checksums,
@@ -526,12 +543,12 @@ def _check_checksums(
                 findings.warning(path, f"is unsealed, but its checksum was not updated: {INTERRUPTED}")
             else:
                 content = read_regular(path)
-                same_text = hashlib.sha256(journal.as_written(content)).hexdigest() == listed[name]
-                findings.error(path, journal.notation_change(content) if same_text else _CHANGED)
+                same_text = hashlib.sha256(journal.normalized_text(content)).hexdigest() == listed[name]
+                findings.error(path, journal.notation_problem(content) if same_text else _CHANGED)
 
 
 def _is_opened_table(place: Place, lines: Sequence[events.Event], path: Path, listed: str) -> bool:
-    """Return whether a table is the opened one, and ``listed`` the SHA-256 of the sealed one."""
+    """Return whether a table is unsealed, while ``listed`` is still the SHA-256 of the sealed table."""
     sealed = _sealed_tables(place, lines).get(path)
     if sealed is None or hashlib.sha256(sealed).hexdigest() != listed:
         return False
@@ -548,7 +565,7 @@ def _check_recordings(
     ended: bool,
     damaged: bool,
 ) -> None:
-    """Check that exactly the recordings named in the journal exist, complete and of the right trials."""
+    """Check that exactly the recordings named in the journal exist, each complete and of the right trial."""
     listed: set[str] = set()
     known = {line.which for line in lines if isinstance(line, events.Recorded | events.RecordingLost)}
     for line in lines:
@@ -556,7 +573,7 @@ def _check_recordings(
             findings.warning(folder.recordings, f"{attempt_name(*line.which)} does not have a recording: {line.reason}")
         if not isinstance(line, events.Recorded):
             continue
-        which = attempt_name(*line.which)
+        attempt = attempt_name(*line.which)
         if line.samples_unrecorded:
             findings.warning(folder.path / line.recording, f"is missing {line.samples_unrecorded} samples")
         for kind, name, rows, digests in (
@@ -565,10 +582,10 @@ def _check_recordings(
         ):
             listed.add(name)
             if name not in hashes:
-                findings.error(folder.path / name, f"is missing, but the journal mentions it ({which})")
+                findings.error(folder.path / name, f"is missing, but the journal mentions it ({attempt})")
                 continue
             if hashes[name] not in digests:
-                findings.error(folder.path / name, f"has changed since it was recorded ({which})")
+                findings.error(folder.path / name, f"has changed since it was recorded ({attempt})")
             if rows is not None:  # without a key sealed files cannot be read, as already reported
                 _check_facts(folder, line, kind, name, rows, key, findings)
     if events.start_of(lines).recordings:
@@ -577,17 +594,17 @@ def _check_recordings(
                 findings.warning(
                     folder.recordings, f"{attempt_name(*planned)} was not recorded, and the journal does not state why"
                 )
-    of_trials = {
+    expected = {
         path.relative_to(folder.path).as_posix()
         for recorded in recordable(lines)
         for path in recording_files(folder.recordings, *recorded)
     }
     for name in sorted(name for name in hashes.keys() - listed if name.endswith(".parquet")):
-        if name not in of_trials:
+        if name not in expected:
             findings.error(folder.path / name, "belongs to a trial that never started, according to the journal")
         else:
-            then = "" if ended or damaged else "; resuming the session adds it"
-            findings.warning(folder.path / name, f"does not appear in the journal{then}")
+            remedy = "" if ended or damaged else "; resuming the session adds it"
+            findings.warning(folder.path / name, f"does not appear in the journal{remedy}")
 
 
 def _check_facts(
@@ -620,39 +637,38 @@ class Discrepancy:
 def session_discrepancies(place: Place) -> tuple[Discrepancy, ...]:
     """Return the discrepancies of a session's journal, receipt, tables and checksums.
 
-    After the session's end its files are compared with their checksums, which were made when the tables agreed with the
-    journal. If any differs, the session is checked by `check_session`, and the first error of each file is returned, or
-    only that of the journal. A session that is open in a program is not judged, since its tables are still updated.
+    After the session's end its files are compared with their checksums, which were computed when the tables agreed with
+    the journal. If any differs, `check_session` checks the session, and the first error of each file is returned, or
+    only that of the journal. A session that is open in a program is not checked, since its tables are still updated.
     """
     folder = place.folder
     if is_open(folder.path):
         return ()
     discrepancies = (Discrepancy(folder.rebuilt, _REBUILT_AFTER, _COMPARE),) if is_there(folder.rebuilt) else ()
-    if _is_as_ended(place):
+    if _has_unchanged_files(place):
         return discrepancies
-    told = Findings(folder.path)
-    check_session(place, None, told, recordings=False)
-    first: dict[str, Finding] = {}
-    for finding in (*told.errors, *(warning for warning in told.warnings if warning.place.endswith(".csv"))):
-        first.setdefault(finding.place, finding)
-    if (of_journal := first.get(folder.journal.name)) is not None:
-        first = {of_journal.place: of_journal}
+    findings = Findings(folder.path)
+    check_session(place, None, findings, recordings=False)
+    first_findings: dict[str, Finding] = {}
+    for finding in (*findings.errors, *(warning for warning in findings.warnings if warning.place.endswith(".csv"))):
+        first_findings.setdefault(finding.place, finding)
+    if (journal_finding := first_findings.get(folder.journal.name)) is not None:
+        first_findings = {journal_finding.place: journal_finding}
     remedy = f"run liquid-study verify {place.study_folder.path} to check everything"
     return (
         *discrepancies,
-        *(Discrepancy(folder.path / error.place, error.message, remedy) for error in first.values()),
+        *(Discrepancy(folder.path / error.place, error.message, remedy) for error in first_findings.values()),
     )
 
 
-def _is_as_ended(place: Place) -> bool:
+def _has_unchanged_files(place: Place) -> bool:
     """Return whether journal, receipt and tables match the checksums of the session's end."""
     folder = place.folder
     tables = [folder.table(place.study, name) for name in ("responses", "trials", "intervals")]
     tables = [path for path in tables if path != tables[-1] or is_there(path)]  # few studies have intervals
     try:
         listed = read_checksums(folder)
-        return all(
-            listed.get(it.name) == file_hash(folder, it.name) for it in (folder.journal, folder.receipt, *tables)
-        )
+        files = (folder.journal, folder.receipt, *tables)
+        return all(listed.get(path.name) == file_hash(folder, path.name) for path in files)
     except StoreError:
         return False

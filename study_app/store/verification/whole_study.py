@@ -1,9 +1,9 @@
 """Verification of a study folder: every file against the journals, the column dictionary, the checksums and the key.
 
-Nothing is changed. An error is a file that cannot be trusted as it is; a warning is something to know before the
-analysis, such as a session that was not finished. No sentence shows a condition. Of sessions that are open in a program
-journals are judged, and what the list of fingerprints says of them, but no tables. In a merged study every site is
-checked separately, and the data that must agree between them.
+Nothing is changed. An error is a file that cannot be trusted; a warning is a fact to know before the analysis, such as
+an unfinished session. No message reveals a condition. For a session that is open in a program the journal and its entry
+in the list of fingerprints are checked, but not the tables. In a merged study each site is checked separately, and then
+the data that must agree between the sites.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from study_app.protocol.model import StudyHead
 from study_app.protocol.source import without_byte_order_mark
 from study_app.store import exclusions, receipt
 from study_app.store.blinded import blinding
-from study_app.store.blinded.allocation import Claim, claims, entries_begun, is_unchanged
+from study_app.store.blinded.allocation import Claim, claims, is_unchanged, recorded_entries
 from study_app.store.blinded.blinding import Key, complete_protocol, open_events, sealed_hash
 from study_app.store.files import csv_files
 from study_app.store.files.atomic import is_there, read_own, read_regular, temporary_files
@@ -57,7 +57,7 @@ from study_app.store.verification.verify_session import (
 from study_app.store.versions.study_runs import run_of
 from study_app.store.withdrawals import Tombstone, describe_session, proof_of_withdrawal, tombstones, unerased_files
 
-_IN_FILES: Final = ("question", "task", "method")
+_CHECKED_KINDS: Final = ("question", "task", "method")
 """The kinds of plug-ins without which a session cannot be checked in full."""
 Sessions: TypeAlias = list[CheckedSession]
 
@@ -70,8 +70,8 @@ def verify_study(folder: Path, fingerprints: Path | None = None) -> Findings:
     folder : Path
         The study folder.
     fingerprints : Path, optional
-        The proof of the study (`proofs`), or a copy of its ``fingerprints.txt`` if it is not merged, which was stored
-        elsewhere: it must contain every ended session unchanged, and all its records must exist.
+        A proof of the study (`proofs`), or for a study that is not merged a copy of its ``fingerprints.txt``, stored
+        elsewhere. Every ended session must be in it unchanged, and all its records must exist.
 
     Raises
     ------
@@ -87,18 +87,22 @@ def verify_study(folder: Path, fingerprints: Path | None = None) -> Findings:
         _check_sites(merged, findings)
         sessions = []
         for site in filter(Path.is_dir, map(merged.folder, merged.names)):  # `_check_sites` reports the missing ones
-            of_site = None if copy is None else (copy[0], _proof_of_site(copy[1], site_prefix(folder, site)))
+            site_copy = None if copy is None else (copy[0], _proof_of_site(copy[1], site_prefix(folder, site)))
             with findings.reading(site):
-                sessions += _verify_study(site, of_site, findings)
+                sessions += _verify_study(site, site_copy, findings)
     findings.sessions, findings.running = len(sessions), sum(session.running for session in sessions)
     return findings
 
 
 def _proof_of_site(proof: Proof, prefix: str) -> Proof:
-    """Return the lines of a proof whose names begin with a site, without it."""
-    size = len(prefix)
-    lines = tuple((print_, name[size:]) for print_, name in proof.lines if name.lower().startswith(prefix.lower()))
-    return Proof(lines, proof.told)
+    """Return the lines of a proof whose names begin with a site's ``prefix``, without that prefix."""
+    prefix_length = len(prefix)
+    lines = tuple(
+        (fingerprint, name[prefix_length:])
+        for fingerprint, name in proof.lines
+        if name.lower().startswith(prefix.lower())
+    )
+    return Proof(lines, proof.notes)
 
 
 def _verify_study(folder: Path, copy: tuple[Path, Proof] | None, findings: Findings) -> Sessions:
@@ -112,7 +116,7 @@ def _verify_study(folder: Path, copy: tuple[Path, Proof] | None, findings: Findi
     key = None
     with findings.reading(study.key):
         key = blinding.read_key(study.path)
-    early = read_list(study.fingerprints)
+    listed = read_list(study.fingerprints)
     withdrawn, unerased = _check_withdrawals(study, findings)
     sessions = [
         check_session(Place(study, session, name), key, findings)
@@ -124,9 +128,9 @@ def _verify_study(folder: Path, copy: tuple[Path, Proof] | None, findings: Findi
     if study.participants(name) not in unerased:
         _check_participants(study, name, sessions, findings)
     if early_journals := sum(session.row is not None and not session.chained for session in sessions):
-        many = "1 journal is" if early_journals == 1 else f"{early_journals} journals are"
-        findings.warning(study.data, f"{many} in format 1, which cannot show whether an earlier line was changed")
-    _check_fingerprints(study, sessions, early, withdrawn, findings)
+        subject = "1 journal is" if early_journals == 1 else f"{early_journals} journals are"
+        findings.warning(study.data, f"{subject} in format 1, which cannot show whether an earlier line was changed")
+    _check_fingerprints(study, sessions, listed, withdrawn, findings)
     if copy is not None:
         _check_copy(study, sessions, withdrawn, *copy, findings)
     _check_description(study, findings)
@@ -138,15 +142,15 @@ def _verify_study(folder: Path, copy: tuple[Path, Proof] | None, findings: Findi
     for path in {*study.data.glob("sub-*"), *study.data.glob("sub-*/ses-*")} - places:
         if path.is_dir() and (path.name.startswith("sub-") or path.parent in places):
             findings.warning(path, "is ignored because it is not a session folder; it may be a copy of one")
-    for path, original in _copies_of_lists(study, name):
+    for path, original in _stray_copies(study, name):
         findings.warning(path, f"is ignored because it seems to be a copy of {original.name}: compare the two files")
     for path in (*temporary_files(folder), *temporary_files(study.data)):
         findings.warning(path, "is being written, or is an incomplete file left by a program that was killed")
     return sessions
 
 
-def _copies_of_lists(study: StudyFolder, name: str) -> Iterator[tuple[Path, Path]]:
-    """Yield each copy of a study's own file that a file-sharing program or a person made, and that file."""
+def _stray_copies(study: StudyFolder, name: str) -> Iterator[tuple[Path, Path]]:
+    """Yield each copy of a study's own file, made by a file-sharing program or a person, and the original."""
     lists = (
         study.exclusions,
         study.reversed_exclusions,
@@ -157,10 +161,10 @@ def _copies_of_lists(study: StudyFolder, name: str) -> Iterator[tuple[Path, Path
     )
     for path in (*lists, study.participants(name)):
         stem, suffix = re.escape(path.stem), re.escape(path.suffix)
-        copied = re.compile(
+        pattern = re.compile(
             rf"{stem}(([ (\[~-]|_conflict|\.sync-conflict-).*{suffix}|{suffix}(~|\.bak))", re.IGNORECASE
         )
-        yield from ((copy, path) for copy in sorted(path.parent.glob("*")) if copied.fullmatch(copy.name))
+        yield from ((copy, path) for copy in sorted(path.parent.glob("*")) if pattern.fullmatch(copy.name))
 
 
 def _check_plug_ins(study: StudyFolder, findings: Findings) -> None:
@@ -168,12 +172,14 @@ def _check_plug_ins(study: StudyFolder, findings: Findings) -> None:
     used = receipt.recorded_plug_ins(session.receipt for session in study.sessions())
     findings.plug_ins |= used
     for package, names in used.items():
-        asked = {name: name.partition(" ") for name in names}
+        parts_by_name = {name: name.partition(" ") for name in names}
         if missing := [
-            name for name, (kind, _, own) in asked.items() if kind in _IN_FILES and own not in registry(kind)
+            name
+            for name, (kind, _, name_of_plug_in) in parts_by_name.items()
+            if kind in _CHECKED_KINDS and name_of_plug_in not in registry(kind)
         ]:
-            what = f"sessions used {', '.join(missing)} of {package}, which is not installed"
-            findings.warning(study.data, f"{what}: checks that need the plug-in were skipped")
+            message = f"sessions used {', '.join(missing)} of {package}, which is not installed"
+            findings.warning(study.data, f"{message}: checks that need the plug-in were skipped")
 
 
 def _check_contents(study: StudyFolder, findings: Findings) -> None:
@@ -184,8 +190,8 @@ def _check_contents(study: StudyFolder, findings: Findings) -> None:
         hashes.setdefault(run.version, set()).add(run.hash)
     for version, contents in hashes.items():
         if len(contents) > 1:
-            what = f"sessions with version {version} used {len(contents)} different study files (see protocol_hash)"
-            findings.warning(study.data, f"{what}: change study.version whenever the file changes")
+            message = f"sessions with version {version} used {len(contents)} different study files (see protocol_hash)"
+            findings.warning(study.data, f"{message}: change study.version whenever the file changes")
 
 
 def _check_allocation(study: StudyFolder, key: Key | None, withdrawn: Collection[str], findings: Findings) -> None:
@@ -195,7 +201,7 @@ def _check_allocation(study: StudyFolder, key: Key | None, withdrawn: Collection
     """
     if key is None:
         return
-    begun = entries_begun(study)
+    recorded = recorded_entries(study)
     holders: dict[str, Claim] = {}
     for claim in claims(study):
         if not claim.participant:
@@ -211,30 +217,30 @@ def _check_allocation(study: StudyFolder, key: Key | None, withdrawn: Collection
             findings.error(
                 claim.path, f"is a second entry for participant {claim.participant}, who already has entry {first}"
             )
-        elif claim.participant not in begun and claim.participant not in withdrawn:
+        elif claim.participant not in recorded and claim.participant not in withdrawn:
             findings.warning(claim.path, f"belongs to participant {claim.participant}, who does not have a session yet")
         holders.setdefault(claim.participant, claim)
     for claim in holders.values():
-        if claim.replaces is not None and not _same_entry(claim, holders.get(claim.replaces)):
+        if claim.replaces is not None and not _is_same_entry(claim, holders.get(claim.replaces)):
             findings.error(claim.path, f"replaces participant {claim.replaces}, who does not have a matching entry")
-    shared = Counter((own.group, own.entry) for own in begun.values() if own.replaces is None)
-    for participant, own in begun.items():
-        path = study.allocation(own.entry, own.group, None if own.replaces is None else participant)
+    shared = Counter((entry.group, entry.entry) for entry in recorded.values() if entry.replaces is None)
+    for participant, entry in recorded.items():
+        path = study.allocation(entry.entry, entry.group, None if entry.replaces is None else participant)
         if not is_there(path):
-            findings.error(path, f"is missing, although participant {participant} has entry {own.entry}")
-        elif (holder := holders.get(participant)) is None or holder.path != path or holder.replaces != own.replaces:
-            findings.error(path, f"does not belong to participant {participant}, whose journal has entry {own.entry}")
-        if shared[own.group, own.entry] > 1 and own.replaces is None:
-            what = f"entry {own.entry} of participant {participant} also belongs to another participant"
-            findings.error(study.allocated, what)
+            findings.error(path, f"is missing, although participant {participant} has entry {entry.entry}")
+        elif (holder := holders.get(participant)) is None or holder.path != path or holder.replaces != entry.replaces:
+            findings.error(path, f"does not belong to participant {participant}, whose journal has entry {entry.entry}")
+        if shared[entry.group, entry.entry] > 1 and entry.replaces is None:
+            message = f"entry {entry.entry} of participant {participant} also belongs to another participant"
+            findings.error(study.allocated, message)
 
 
-def _same_entry(claim: Claim, replaced: Claim | None) -> bool:
+def _is_same_entry(claim: Claim, replaced: Claim | None) -> bool:
     return replaced is not None and (claim.group, claim.entry) == (replaced.group, replaced.entry)
 
 
 def _check_withdrawals(study: StudyFolder, findings: Findings) -> tuple[dict[str, Tombstone], set[Path]]:
-    """Return the withdrawals, and what interrupted ones left of the participants, which is reported."""
+    """Return the withdrawals, and the files that interrupted withdrawals have not erased; report both."""
     unerased: set[Path] = set()
     try:
         withdrawn = tombstones(study)
@@ -242,25 +248,25 @@ def _check_withdrawals(study: StudyFolder, findings: Findings) -> tuple[dict[str
         findings.add_failure(study.withdrawals, error)
         return {}, unerased
     for participant, tombstone in withdrawn.items():
-        left: list[Path] = []
+        remains: list[Path] = []
         with contextlib.suppress(StoreError):  # reported for the unreadable list
-            left += unerased_files(study, participant)
-        for path in left:
-            what = "still exists" if path.is_dir() else f"still lists {participant}"
-            again = "the withdrawal was interrupted: run liquid-study withdraw again"
-            findings.error(path, f"{what}, although {participant} withdrew; {again}")
-        if not left:
-            when = f"at {tombstone.at} (recorded by {tombstone.by})"
-            findings.warning(study.withdrawals, f"participant {participant} withdrew {when}; the data were erased")
-        unerased.update(left)
+            remains += unerased_files(study, participant)
+        for path in remains:
+            problem = "still exists" if path.is_dir() else f"still lists {participant}"
+            advice = "the withdrawal was interrupted: run liquid-study withdraw again"
+            findings.error(path, f"{problem}, although {participant} withdrew; {advice}")
+        if not remains:
+            details = f"at {tombstone.at} (recorded by {tombstone.by})"
+            findings.warning(study.withdrawals, f"participant {participant} withdrew {details}; the data were erased")
+        unerased.update(remains)
     return withdrawn, unerased
 
 
 def _check_participants(study: StudyFolder, name: str, sessions: Sessions, findings: Findings) -> None:
     """Check the participants table if the journals of all sessions could be read.
 
-    Lines of sessions that have not ended may be behind their journals. The table is not judged if a program has the
-    study open or has had a session open since the check began, because it updates the table at its end.
+    Lines of sessions that have not ended may be behind their journals. The table is not checked if a program has the
+    study open, or has had a session open since the check began, because that program updates the table at the end.
     """
     if is_open(study.path) or not all(session.readable for session in sessions):
         return
@@ -270,42 +276,42 @@ def _check_participants(study: StudyFolder, name: str, sessions: Sessions, findi
     if path.is_file() and sealed != csv_files.csv_bytes(columns, ()) and path.read_bytes().startswith(sealed):
         findings.error(path, f"does not contain the sealed columns: {INTERRUPTED}")
         return
-    late = {number for number, row in enumerate(rows, start=2) if row["status"] == receipt.UNFINISHED}
-    told = Findings(findings.folder)
-    check_table(path, content, columns, told, may_differ=late.__contains__)
-    now = study.sessions()
-    written = (
-        len(now) != len(sessions)
+    unfinished = {number for number, row in enumerate(rows, start=2) if row["status"] == receipt.UNFINISHED}
+    table_findings = Findings(findings.folder)
+    check_table(path, content, columns, table_findings, may_differ=unfinished.__contains__)
+    current_sessions = study.sessions()
+    is_being_written = (
+        len(current_sessions) != len(sessions)
         or any(session.running for session in sessions)
-        or any(is_open(session.path) for session in now)
+        or any(is_open(session.path) for session in current_sessions)
     )
-    if not (told.errors and written):
-        findings.extend(told)
+    if not (table_findings.errors and is_being_written):
+        findings.extend(table_findings)
 
 
 def _check_fingerprints(
-    study: StudyFolder, sessions: Sessions, early: Proofs, withdrawn: Collection[str], findings: Findings
+    study: StudyFolder, sessions: Sessions, listed_before: Proofs, withdrawn: Collection[str], findings: Findings
 ) -> None:
     """Compare the sessions with the study's own list, read before they were checked.
 
-    A program lists a session once its files are final, just before closing it: a listed session is judged even while it
-    is open.
+    A program lists a session once its files are final, just before it closes the session. A listed session is therefore
+    checked even while it is open.
     """
     path = study.fingerprints
     for number in unreadable_lines(path):
         findings.error(path, f"line {number} is not a fingerprint: restore it from a backup")
     erased = tuple(f"data/sub-{participant}/" for participant in withdrawn)  # reported as an interrupted withdrawal
-    listed = [proof for proof in early if not proof[1].startswith(erased)]
-    _compare_proofs(study, sessions, listed, path.name, findings)
+    expected = [proof for proof in listed_before if not proof[1].startswith(erased)]
+    _compare_proofs(study, sessions, expected, path.name, findings)
     if is_open(study.path):  # written by a program that lists a session just after creating it
         return
-    known = {place for _, place in read_list(path)}
+    listed = {place for _, place in read_list(path)}
     for session in sessions:
         if (
             session.fingerprint
             and session.chained
             and not session.running
-            and place_of(study, session.place.folder) not in known
+            and place_of(study, session.place.folder) not in listed
         ):
             place = place_of(study, session.place.folder)
             findings.error(path, f"does not list {place}, which has ended; the rebuild command adds it")
@@ -320,8 +326,8 @@ def _check_copy(
     findings: Findings,
 ) -> None:
     """Compare sessions, records and withdrawals with a proof stored elsewhere."""
-    for told in proof.told:
-        findings.warning(study.path, f"{path} {told}")
+    for note in proof.notes:
+        findings.warning(study.path, f"{path} {note}")
     erased: set[tuple[str, str]] = set()
     recorded: Proofs = ()
     with contextlib.suppress(StoreError):  # already reported
@@ -331,28 +337,32 @@ def _check_copy(
     )
     for participant, tombstone in withdrawn.items():
         folders = [study.session(participant, erased.session) for erased in tombstone.sessions]
-        own = {
-            (erased.fingerprint, place_of(study, at)) for erased, at in zip(tombstone.sessions, folders, strict=True)
+        proofs_of_erased = {
+            (erased.fingerprint, place_of(study, folder))
+            for erased, folder in zip(tombstone.sessions, folders, strict=True)
         }
-        if own.isdisjoint(kept):
+        if proofs_of_erased.isdisjoint(kept):
             continue
-        erased |= {*own, *(line for line in kept if line[1] == f"{study.exclusions.name}/sub-{participant}")}
-        if (told_of := proof_of_withdrawal(tombstone)) not in kept:
-            add = "create a new proof" if proof.told else f"add the line: {checked_line(*told_of)}"
-            advice = f"if {participant} requested it, {add}"
+        erased |= {
+            *proofs_of_erased,
+            *(line for line in kept if line[1] == f"{study.exclusions.name}/sub-{participant}"),
+        }
+        if (withdrawal_proof := proof_of_withdrawal(tombstone)) not in kept:
+            remedy = "create a new proof" if proof.notes else f"add the line: {checked_line(*withdrawal_proof)}"
+            advice = f"if {participant} requested it, {remedy}"
             findings.error(study.withdrawals, f"the withdrawal of {participant} is not in {path}: {advice}")
     copy = [line for line in kept if line not in erased]
     for record, place in copy:
         if not place.startswith("data/") and (record, place) not in recorded:
-            what = f"does not contain {record} ({place}), although {path} lists it: it was deleted or changed"
-            findings.error(study.path / place.partition("/")[0], what)
+            message = f"does not contain {record} ({place}), although {path} lists it: it was deleted or changed"
+            findings.error(study.path / place.partition("/")[0], message)
     _compare_proofs(study, sessions, copy, str(path), findings)
-    known = {place for _, place in copy}
+    listed = {place for _, place in copy}
     for session in sessions:
-        if session.fingerprint and not session.running and place_of(study, session.place.folder) not in known:
-            lacks = f"(fingerprint {session.fingerprint}) is not in {path}"
+        if session.fingerprint and not session.running and place_of(study, session.place.folder) not in listed:
+            problem = f"(fingerprint {session.fingerprint}) is not in {path}"
             findings.error(
-                session.place.folder.path, f"{lacks}: the session was added or ended after that copy was made"
+                session.place.folder.path, f"{problem}: the session was added or ended after that copy was made"
             )
 
 
@@ -377,15 +387,15 @@ def _compare_proofs(
             findings.error(path, f"is missing, but {name} lists it: the session was deleted after it had ended")
             continue
         if proof != session.fingerprint:
-            now = f"its fingerprint is {session.fingerprint}" if session.fingerprint else "its end is missing"
-            findings.error(path, f"is not the session that {name} lists as {proof}: it has been changed ({now})")
+            state = f"its fingerprint is {session.fingerprint}" if session.fingerprint else "its end is missing"
+            findings.error(path, f"is not the session that {name} lists as {proof}: it has been changed ({state})")
 
 
 def _check_description(study: StudyFolder, findings: Findings) -> None:
     """Compare the description with the one that this version writes for the study in one of the receipts."""
-    held = read_own(study.description, study.path)
+    current = read_own(study.description, study.path)
     opened = bool(blinding.reveals(study.path))
-    sealed = not (opened or has_sealed_columns(held))
+    sealed = not (opened or has_sealed_columns(current))
     heads: set[bytes] = set()
     sealed_heads: set[bytes] = set()
     for protocol in _published_protocols(study):
@@ -394,12 +404,12 @@ def _check_description(study: StudyFolder, findings: Findings) -> None:
             describe = partial(description_bytes, head, intervals=has_intervals(protocol))
             heads.add(describe(sealed=sealed))
             sealed_heads.add(describe(sealed=True))
-    if not heads or held in heads:
+    if not heads or current in heads:
         return
-    if opened and held in sealed_heads:
+    if opened and current in sealed_heads:
         findings.error(study.description, f"does not contain the sealed columns: {INTERRUPTED}")
         return
-    if any(is_same_description(held, head) for head in heads):
+    if any(is_same_description(current, head) for head in heads):
         findings.warning(
             study.description, "contains the column descriptions of an earlier version of the program", shares=True
         )
@@ -478,8 +488,8 @@ def _check_sites(merged: Merged, findings: Findings) -> None:
     for site in merged.sites:
         folder = merged.folder(site.name)
         if not folder.is_dir():
-            lists = f"{merged.manifest.name} lists site {site.name}"
-            findings.error(folder, f"is missing, although {lists}: restore it from a backup")
+            reason = f"{merged.manifest.name} lists site {site.name}"
+            findings.error(folder, f"is missing, although {reason}: restore it from a backup")
             continue
         if sealed_hash(folder) != site.key_hash:
             key = StudyFolder(folder).key
@@ -510,10 +520,10 @@ def _check_site(merged: Merged, site: Site, findings: Findings) -> None:
         )
     with contextlib.suppress(StoreError):  # reported when the site is checked
         withdrawn, merged_at = list(tombstones(study).values()), datetime.fromisoformat(site.merged_at)
-        before = site.withdrawals  # clocks of sites may differ, so times decide only for format 1
-        if before is None:
-            before = sum(datetime.fromisoformat(tombstone.at) < merged_at for tombstone in withdrawn)
-        erased = sum(len(tombstone.sessions) for tombstone in withdrawn[before:])
+        earlier_withdrawals = site.withdrawals  # clocks of sites may differ, so times decide only for format 1
+        if earlier_withdrawals is None:
+            earlier_withdrawals = sum(datetime.fromisoformat(tombstone.at) < merged_at for tombstone in withdrawn)
+        erased = sum(len(tombstone.sessions) for tombstone in withdrawn[earlier_withdrawals:])
         if (present := len(study.sessions())) + erased < site.sessions:
-            which = f"{present} of the {site.sessions} sessions that {merged.manifest.name} lists"
-            findings.error(study.path, f"contains only {which}: restore the others from a backup")
+            count = f"{present} of the {site.sessions} sessions that {merged.manifest.name} lists"
+            findings.error(study.path, f"contains only {count}: restore the others from a backup")

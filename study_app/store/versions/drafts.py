@@ -44,7 +44,7 @@ class Draft:
 
 
 class Keeper:
-    """Write the draft of one study at most `REST_S` after an edit, even if edits continue.
+    """Writes the draft of one study at most `REST_S` after an edit, even if edits continue.
 
     ``others`` counts the drafts of other programs that were stored as versions.
     """
@@ -99,9 +99,9 @@ class Keeper:
         return True
 
     def note_saved(self, base: str) -> None:
-        """Delete the draft after its text was saved. If that fails, deletion stays due and `write` reports why.
+        """Delete the draft after its text was saved, unless another program wrote it.
 
-        The draft of another program stays.
+        If that fails, deletion stays due and `write` raises the error.
         """
         self.base, self._pending, self._obsolete = base, None, True
         with suppress(StoreError):
@@ -123,22 +123,22 @@ def write_draft(file: Path, draft: Draft) -> None:
         The draft cannot be written.
     """
     path = _draft_file(file)
-    kept = {
+    record = {
         "file": str(file.resolve()),
         "base": draft.base,
         "selected": list(draft.selected),
         "kept_at": datetime.now(UTC).astimezone().isoformat(timespec="seconds"),
         "text": draft.text,
     }
-    write_whole(path, json.dumps(kept, ensure_ascii=False).encode())
+    write_whole(path, json.dumps(record, ensure_ascii=False).encode())
 
 
 def draft_of(file: Path) -> Draft | None:
     """Return the draft of a study's file, or None if there is no readable draft."""
     try:
-        kept: Any = parse_json(_draft_file(file).read_bytes())
-        selected = tuple(step for step in kept["selected"] if isinstance(step, str | int))
-        draft = Draft(text=kept["text"], base=kept["base"], selected=selected, kept_at=kept["kept_at"])
+        record: Any = parse_json(_draft_file(file).read_bytes())
+        selected = tuple(step for step in record["selected"] if isinstance(step, str | int))
+        draft = Draft(text=record["text"], base=record["base"], selected=selected, kept_at=record["kept_at"])
     except (OSError, ValueError, KeyError, TypeError):
         return None
     return draft if all(isinstance(value, str) for value in (draft.text, draft.base, draft.kept_at)) else None
@@ -147,9 +147,9 @@ def draft_of(file: Path) -> Draft | None:
 def drafted_files() -> tuple[Path, ...]:
     """Return the files that have a readable draft, sorted."""
     files: list[Path] = []
-    for kept in draft_files():
+    for path in draft_files():
         try:
-            file = Path(parse_json(kept.read_bytes())["file"])
+            file = Path(parse_json(path.read_bytes())["file"])
         except (OSError, ValueError, KeyError, TypeError):
             continue
         if draft_of(file) is not None:
@@ -164,8 +164,8 @@ def draft_files() -> tuple[Path, ...]:
 
 def unsaved_files(folder: Path) -> tuple[Path, ...]:
     """Return the study files in a folder that exist only as a draft."""
-    whole = folder.resolve()
-    return tuple(file for file in drafted_files() if file.parent == whole and not file.exists())
+    resolved = folder.resolve()
+    return tuple(file for file in drafted_files() if file.parent == resolved and not file.exists())
 
 
 def delete_draft(file: Path) -> None:

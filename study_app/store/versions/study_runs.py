@@ -51,10 +51,10 @@ class Run:
     def protocol(self) -> Mapping[str, Any] | None:
         """The protocol in the receipt; None if it can no longer be read."""
         try:
-            held = None if self.receipt is None else receipt.read(self.receipt).get("protocol")
+            protocol = None if self.receipt is None else receipt.read(self.receipt).get("protocol")
         except StoreError:
             return None
-        return held if isinstance(held, dict) else None
+        return protocol if isinstance(protocol, dict) else None
 
 
 def runs_of_study(results: Path, study: str) -> tuple[Run, ...]:
@@ -67,14 +67,15 @@ def runs_of_study(results: Path, study: str) -> tuple[Run, ...]:
     results : Path
         The folder with the studies' folders.
     study : str
-        The study's name; its pilots and rehearsals are in folders of their own. No session has a name that `check`
-        refuses.
+        The study's name, whose pilots and rehearsals have their own folders. An invalid name has no sessions.
     """
     if not _NAME.fullmatch(study):
         return ()
     by_hash: dict[str, Run] = {}
-    others = (folder for kind in ("pilot", "rehearsal") for folder in sorted(results.glob(f"{study}-{kind}-*")))
-    for folder in (results / study, results / f"{study}-pilot", *others):
+    numbered_folders = (
+        folder for kind in ("pilot", "rehearsal") for folder in sorted(results.glob(f"{study}-{kind}-*"))
+    )
+    for folder in (results / study, results / f"{study}-pilot", *numbered_folders):
         for session in StudyFolder(folder).sessions():
             if (session_run := run_of(session.receipt)) is not None:
                 run = by_hash.get(session_run.hash, replace(session_run, sessions=0, pilots=0, rehearsals=0))
@@ -98,23 +99,23 @@ def run_of(path: Path) -> Run | None:
 
 @lru_cache(maxsize=4096)
 def _read_run(path: Path, _changed_ns: int) -> Run:
-    held = receipt.read(path)
-    version = str(held.get("protocol", {}).get("study", {}).get("version", ""))
-    simulated, pilot = bool(held.get("simulated")), bool(held.get("pilot"))
+    session_receipt = receipt.read(path)
+    version = str(session_receipt.get("protocol", {}).get("study", {}).get("version", ""))
+    simulated, pilot = bool(session_receipt.get("simulated")), bool(session_receipt.get("pilot"))
     return Run(
-        hash=str(held.get("protocol_hash")),
+        hash=str(session_receipt.get("protocol_hash")),
         version=version,
         sessions=int(not simulated and not pilot),
         pilots=int(pilot),
         rehearsals=int(simulated and not pilot),
-        last=str(receipt.began_at(held) or ""),
+        last=str(receipt.began_at(session_receipt) or ""),
         receipt=path,
     )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RecordedContent:
-    """A content of a study's file as the receipts of a results folder hold it: without its conditions.
+    """A content of a study's file as recorded in the receipts of a results folder, without its conditions.
 
     Attributes
     ----------
@@ -123,7 +124,7 @@ class RecordedContent:
     protocol : mapping
         The protocol in the receipt.
     participant : str
-        The participant of the first session that was run with it; of a merged study with the site.
+        The participant of the first session that was run with it; in a merged study the ID includes the site.
     began : str
         When this session began, as ISO 8601.
     saved_by : str
@@ -139,18 +140,18 @@ class RecordedContent:
     @property
     def name(self) -> str:
         """The version and its first session: "0.2 (first session: P002, 2026-11-27; saved by AK)"."""
-        by = f"; saved by {self.saved_by}" if self.saved_by else ""
-        return f"{self.version} (first session: {self.participant}, {self.began[:10]}{by})"
+        saver = f"; saved by {self.saved_by}" if self.saved_by else ""
+        return f"{self.version} (first session: {self.participant}, {self.began[:10]}{saver})"
 
 
 def recorded_contents(folder: Path) -> tuple[RecordedContent, ...]:
-    """Return the contents of the study's file that the receipts in a results folder hold, in the order of first use.
+    """Return the contents of the study's file recorded in the receipts of a results folder, in the order of first use.
 
-    No file of the study is needed. A receipt that cannot be read is left out (`verify` reports it).
+    The study's file is not needed. A receipt that cannot be read is left out (`verify` reports it).
     """
     first: dict[str, RecordedContent] = {}
-    for prefix, place in folders_of(folder).items():
-        for session in StudyFolder(place).sessions():
+    for prefix, site_folder in folders_of(folder).items():
+        for session in StudyFolder(site_folder).sessions():
             run = run_of(session.receipt)
             if run is None or (protocol := run.protocol) is None:
                 continue
@@ -172,12 +173,12 @@ def content_changes(contents: Sequence[RecordedContent]) -> Iterator[tuple[Recor
         yield after, differences(before.protocol, after.protocol) or (_HIDDEN_CHANGE,)
 
 
-def recorded_items(known: Iterable[Run]) -> dict[tuple[str, str], int]:
+def recorded_items(runs: Iterable[Run]) -> dict[tuple[str, str], int]:
     """Return the number of participants' sessions in which each item was asked, by questionnaire and id."""
     counts: dict[tuple[str, str], int] = {}
-    for run in known:
-        held = run.protocol if run.sessions else None
-        for name, questionnaire in (held or {}).get("questionnaires", {}).items():
+    for run in runs:
+        protocol = run.protocol if run.sessions else None
+        for name, questionnaire in (protocol or {}).get("questionnaires", {}).items():
             for item in questionnaire.get("items", ()):
                 counts[name, item["id"]] = counts.get((name, item["id"]), 0) + run.sessions
     return counts
@@ -189,7 +190,7 @@ def source_of(run: Run) -> str | None:
     return None if content is None else content.decode("utf-8", "replace")
 
 
-def keep_run_content(file: Path, known: Iterable[Run]) -> None:
+def keep_run_content(file: Path, runs: Iterable[Run]) -> None:
     """Store the file's content if it was used in sessions, before another program can change it.
 
     Raises
@@ -201,5 +202,5 @@ def keep_run_content(file: Path, known: Iterable[Run]) -> None:
         source = with_liquid_files(file.read_bytes(), file.parent)
     except OSError:
         return
-    if any(run.hash == content_hash(source) for run in known):
+    if any(run.hash == content_hash(source) for run in runs):
         keep_content(source)

@@ -14,10 +14,10 @@ from study_app.user_folder import data_folder
 def kept_original(file: Path) -> str:
     """Return the name of the study from which a study was copied; "" if it is not known to be a copy."""
     try:
-        kept: Any = parse_json(_kept_file(file).read_bytes())
+        record: Any = parse_json(_settings_file(file).read_bytes())
     except (OSError, ValueError):
         return ""
-    original = kept.get("copy_of") if isinstance(kept, dict) else None
+    original = record.get("copy_of") if isinstance(record, dict) else None
     return original if isinstance(original, str) else ""
 
 
@@ -25,10 +25,10 @@ def keep_original(file: Path, copy_of: str = "") -> None:
     """Store the name of the study from which a new file was copied ("" for none); ignore write errors."""
     with contextlib.suppress(StoreError, OSError):
         if copy_of:
-            write_whole(_kept_file(file), json.dumps({"file": str(file.resolve()), "copy_of": copy_of}).encode())
+            write_whole(_settings_file(file), json.dumps({"file": str(file.resolve()), "copy_of": copy_of}).encode())
         else:
-            _kept_file(file).unlink(missing_ok=True)  # left by another study with this path
+            _settings_file(file).unlink(missing_ok=True)  # left by another study with this path
 
 
-def _kept_file(file: Path) -> Path:
+def _settings_file(file: Path) -> Path:
     return data_folder() / "settings" / f"{file_key(file)}.json"

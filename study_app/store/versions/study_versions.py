@@ -1,4 +1,4 @@
-"""Saving a study's file: never over another program's content, and every content stays under its hash."""
+"""Saving a study's file without overwriting another program's content; every content is kept under its hash."""
 
 import contextlib
 import hashlib
@@ -23,7 +23,7 @@ from study_app.store.workstation import load_or_default
 from study_app.user_folder import data_folder
 
 _Origin: TypeAlias = Literal["saved", "found", "draft"]
-"""Saved by this program, found in the file when it was overwritten, or the draft of another program."""
+"""Whether a content was saved by this program, found in the file on overwriting, or another program's draft."""
 _ORIGINS: Final = frozenset({"saved", "found", "draft"})
 
 
@@ -86,7 +86,9 @@ def save_study(file: Path, text: str, base: str) -> str:
             keep_version(file, content, "found")
         elif base:
             raise ChangedOutsideError(f"{file} was deleted or moved by another program: save it as another study")
-        keep_version(file, source, "saved")  # first: an error after the file was written would suggest that it was not
+        keep_version(
+            file, source, "saved"
+        )  # before the file, so that an error always means that the file was not written
         write_whole(target, source)
         if mode is not None:
             target.chmod(mode)
@@ -132,10 +134,10 @@ def _listed_versions(path: Path) -> tuple[Kept, ...]:
     versions: list[Kept] = []
     for line in lines:
         with contextlib.suppress(ValueError):
-            held = parse_json(line)
-            if isinstance(held, dict) and held.get("origin") in _ORIGINS:
-                texts = {name: str(held.get(name, "")) for name in ("hash", "at", "by")}
-                versions.append(Kept(origin=held["origin"], **texts))
+            record = parse_json(line)
+            if isinstance(record, dict) and record.get("origin") in _ORIGINS:
+                texts = {name: str(record.get(name, "")) for name in ("hash", "at", "by")}
+                versions.append(Kept(origin=record["origin"], **texts))
     return tuple(versions)
 
 
@@ -179,13 +181,13 @@ def _locked_file(file: Path) -> Iterator[None]:
     folder = data_folder() / "saving" / file_key(file)
     make_folder(folder, waits=False)
     try:
-        opening = lock_folder(folder)
+        lock = lock_folder(folder)
     except StoreError as error:
         raise StoreError(f"{file} cannot be saved while another program is saving it: try again ({error})") from error
     try:
         yield
     finally:
-        opening.release()
+        lock.release()
 
 
 def _list_file(file: Path) -> Path:

@@ -129,7 +129,7 @@ def test_a_signature_tells_a_changed_copy_and_another_key(study: Path, key_store
         verify_study(study, kept)
     key_store.unlink()
     kept.write_text(whole, encoding="utf-8", newline="\n")
-    assert "compare it with your own" in "\n".join(read_proof(kept).told)
+    assert "compare it with your own" in "\n".join(read_proof(kept).notes)
     proof_text(StudyFolder(study), sign=True)
     with pytest.raises(StoreError, match=r"signed with another computer's key .*: the signature was replaced"):
         verify_study(study, kept)
