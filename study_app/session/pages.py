@@ -1,6 +1,6 @@
-"""The participant's pages as values: made by the state machine, drawn by widgets.
+"""The participant's pages as data: the state machine creates them, and widgets draw them.
 
-Texts are already in the participant's language. Lengths are metres in the hand frame, times seconds.
+Texts are already in the participant's language. Lengths are in metres in the hand frame, times in seconds.
 """
 
 from dataclasses import dataclass, field
@@ -15,8 +15,8 @@ class Progress:
     """The progress shown: part ``part`` of ``parts``, and setting ``index`` of ``of`` in it, with a neutral label.
 
     ``part`` is None outside the parts, as in practice. A text page has no label, except for a break among trials of
-    intervals; the settings before ``index`` are done, and all of them if it is ``of + 1``. With ``at_most`` the block
-    may end before ``of``.
+    intervals. The settings before ``index`` are done; ``index`` is ``of + 1`` when all are done. With ``at_most`` the
+    block may end before ``of``.
     """
 
     part: int | None
@@ -31,7 +31,7 @@ class Progress:
 class Interval:
     """The current or next interval of a trial: ``number`` (from 1) of ``of``.
 
-    ``announced`` is its name or, in the rest, the announcement of the interval or of a repeated trial.
+    ``announced`` is its name or, in a rest, the announcement of the interval or of the repetition of the trial.
     """
 
     number: int
@@ -47,7 +47,7 @@ class TaskPage:
     ``workspace_m`` holds the full sizes of the tank along x, y, z, centred on the device's centre; ``interval`` is None
     in a trial without a design. ``question`` is the instruction for an adjustment, "" if there is none; ``adjusts``
     means that this interval is adjusted, so that the question replaces the instruction. ``video`` tells whether a video
-    replaces the drawn tank, ``overlay`` whether ball and targets are drawn over it; never printed.
+    replaces the drawn tank, ``overlay`` whether ball and targets are drawn over it; neither must be printed.
     """
 
     trial: int
@@ -72,9 +72,9 @@ class TaskPage:
 class TextPage:
     """A text with a button to continue: consent, instructions, announcements, breaks, the debrief.
 
-    ``language`` is the language of all pages from here on; ``languages`` are those that can be chosen, including it,
-    empty without a choice. ``stays_until_s`` is the earliest time at which the page can be left [s, session's clock],
-    None at once. ``coming`` is the next task, which can be prepared in the meantime.
+    ``language`` is the language of all pages from here on; ``languages`` are all that can be chosen, empty without a
+    choice. ``stays_until_s`` is the earliest time at which the page can be left [s, session's clock]; None if it can be
+    left at once. ``coming`` is the next task, which can be prepared in the meantime.
     """
 
     id: str
@@ -94,8 +94,8 @@ class QuestionnairePage:
     """The questions about one setting, or a separate form.
 
     If all are statements, ``labels`` name the points of their scale, lowest first; otherwise it is empty. ``chosen``
-    holds (item id, value) of earlier choices if the page is shown again after a pause. ``trial`` is None if the page is
-    a ``form``, which is its name, asked for the ``time``-th time.
+    holds (item id, value) of earlier choices if the page is shown again after a pause. ``form`` is the name of a
+    separate form, which is asked for the ``time``-th time; ``trial`` is then None.
     """
 
     trial: int | None

@@ -1,13 +1,13 @@
 """The tasks in the tank, tracked on the device's clock and drawn later.
 
-A tracker eats samples and knows two things: whether the task is over, and what it looked like at any moment since it
-began. Whoever draws asks for (now − delay), so that lit target, dwell arc and count are as old as the proxy; whoever
-decides never waits for the screen.
+A tracker processes samples and answers two questions: whether the task is over, and how it looked at any time since it
+began. Drawing code requests the time now minus the delay, so that lit target, dwell arc and count are as old as the
+proxy. Decisions use the newest sample and never wait for the screen.
 
-The task begins with the first sample fed. A target is entered by the first sample whose proxy centre lies within its
-radius (border included), and is reached by the first sample at which the proxy has been inside without a break for the
-dwell time. Leaving starts the dwell anew. The next target lights up with the sample that reached the one before, and is
-entered by a later sample at the earliest.
+The task begins with the first sample. A target is entered by the first sample with the proxy's centre within its radius
+(border included), and reached by the first sample at which the proxy has been inside without interruption for the dwell
+time. Leaving the target restarts the dwell time. The next target lights up with the sample that reached the previous
+one, and only a later sample can enter it.
 """
 
 from bisect import bisect_right
@@ -66,7 +66,7 @@ class TargetReached:
 
 
 class Tracker:
-    """Tracks one task through the samples of its trial; `new_tracker` chooses the subclass.
+    """Track one task through the samples of its trial; `new_tracker` chooses the subclass.
 
     ``outcome`` and ``end_ns`` (time of the sample that ended the task) are None while the task runs.
     """
@@ -91,9 +91,9 @@ class Tracker:
         if self._start_ns is None:
             self._start_ns = self._newest_ns = int(times[0])
         limit_ns = self._start_ns + self._limit_ns
-        kept = int(np.searchsorted(times, limit_ns)) + 1
-        times = times[:kept]
-        reached = self._follow(times, samples["position_m"][:kept])
+        count = int(np.searchsorted(times, limit_ns)) + 1
+        times = times[:count]
+        reached = self._follow(times, samples["position_m"][:count])
         if not self.done:
             self._newest_ns = int(times[-1])
             if self._newest_ns >= limit_ns:
@@ -112,7 +112,7 @@ class Tracker:
         return True
 
     def at(self, time_ns: int) -> TaskView:
-        """Return the view of the task at ``time_ns``; earlier than its beginning, the view at the beginning."""
+        """Return the view of the task at ``time_ns``, limited to the time from its start to the newest sample."""
         start_ns = self._start_ns
         if start_ns is None:
             return self._view(0, 0)
@@ -120,7 +120,7 @@ class Tracker:
         return self._view(time_ns, time_ns - start_ns)
 
     def now(self) -> TaskView:
-        """Return the view at the newest sample: for decisions, never for the participant."""
+        """Return the view at the newest sample, for decisions; the participant sees an older one."""
         return self.at(self._newest_ns)
 
     def summary(self) -> dict[str, Any]:
@@ -192,46 +192,46 @@ class ReachTracker(Tracker):
 
     def _follow(self, times: NDArray[np.int64], positions: NDArray[np.float64]) -> list[TargetReached]:
         reached: list[TargetReached] = []
-        first = 0
-        while first < len(times) and (lit := self._marks[-1].lit) is not None:
-            offset = positions[first:] - self._targets_m[lit]
-            inside = np.einsum("ij,ij->i", offset, offset) <= self._radius_m**2
+        row = 0
+        while row < len(times) and (lit := self._marks[-1].lit) is not None:
+            from_target_m = positions[row:] - self._targets_m[lit]
+            inside = np.einsum("ij,ij->i", from_target_m, from_target_m) <= self._radius_m**2
             entered_ns = self._marks[-1].entered_ns
             if entered_ns is None:
                 if not inside.any():
                     break
-                before = int(inside.argmax())
-                first, inside = first + before, inside[before:]
-                entered_ns = int(times[first])
-                self._mark(entered_ns, entered_ns)
-            left = len(times) if inside.all() else first + int(inside.argmin())
-            held = first + int(np.searchsorted(times[first:], entered_ns + self._dwell_ns))
-            if held < left:
-                reached.append(self._reach(int(times[held]), lit))
-            elif left < len(times):
-                self._mark(int(times[left]), None)
-            first = min(held, left) + 1
+                offset_rows = int(inside.argmax())
+                row, inside = row + offset_rows, inside[offset_rows:]
+                entered_ns = int(times[row])
+                self._add_mark(entered_ns, entered_ns)
+            left_row = len(times) if inside.all() else row + int(inside.argmin())
+            reached_row = row + int(np.searchsorted(times[row:], entered_ns + self._dwell_ns))
+            if reached_row < left_row:
+                reached.append(self._reach(int(times[reached_row]), lit))
+            elif left_row < len(times):
+                self._add_mark(int(times[left_row]), None)
+            row = min(reached_row, left_row) + 1
         return reached
 
-    def _mark(self, time_ns: int, entered_ns: int | None) -> None:
-        before = self._marks[-1]
+    def _add_mark(self, time_ns: int, entered_ns: int | None) -> None:
+        previous = self._marks[-1]
         self._mark_times.append(time_ns)
-        self._marks.append(_Mark(reached=before.reached, lit=before.lit, entered_ns=entered_ns))
+        self._marks.append(_Mark(reached=previous.reached, lit=previous.lit, entered_ns=entered_ns))
 
     def _reach(self, time_ns: int, lit: int) -> TargetReached:
         reached = self._marks[-1].reached + 1
-        enough = reached == self._count
+        is_complete = reached == self._count
         self._mark_times.append(time_ns)
-        self._marks.append(_Mark(reached=reached, lit=None if enough else reached % len(self._targets_m)))
-        if enough:
+        self._marks.append(_Mark(reached=reached, lit=None if is_complete else reached % len(self._targets_m)))
+        if is_complete:
             self._finish("complete", time_ns)
         return TargetReached(lit, (time_ns - (self._start_ns or 0)) / _NS)
 
 
 def new_tracker(task: Task) -> Tracker:
     """Return a tracker at the beginning of ``task``."""
-    made: Tracker = resolve_name(task.tracker)(task)
-    return made
+    tracker: Tracker = resolve_name(task.tracker)(task)
+    return tracker
 
 
 def _nanoseconds(seconds: float) -> int:

@@ -1,8 +1,8 @@
-"""The events and commands of a session. Events alone change the state machine; the runner carries commands out.
+"""The events and commands of a session. Only events change the state machine; the runner executes the commands.
 
-``at_s`` is seconds on the session's monotonic clock (0 = the session's clock origin). Nothing but commands acts, in the
-order given: safety of the hand first (``StopForce``, ``StopTrial``, ``Rest``), then what must be on disk (``Write``,
-``WriteTables``), then what the participant feels and sees (``FadeIn``, ``StartTrial``, ``ShowPage``).
+``at_s`` is the time on the session's monotonic clock [s since its origin]. All side effects are commands, in this
+order: first the safety of the hand (``StopForce``, ``StopTrial``, ``Rest``), then writing to the disk (``Write``,
+``WriteTables``), then force and display (``FadeIn``, ``StartTrial``, ``ShowPage``).
 """
 
 from dataclasses import dataclass, field
@@ -33,12 +33,12 @@ class ShowPage(Command):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StartTrial(Command):
-    """Prepare a trial or one of its intervals: ``presented`` is loaded with the tank's first painted frame.
+    """Prepare a trial or one of its intervals; ``presented`` is loaded when the tank's first frame is painted.
 
     The tank remains visible for ``linger_s`` after the task, so that its end is seen. This is the longest delay of the
-    block, equal for all its trials, so that neither the participant nor any time on the disk reveals the delay.
-    ``interval`` counts from 1, None in a trial without a design; with ``adjusts`` the participant sets its level and
-    ends it. Contents and delays are never printed.
+    block and equal for all its trials, so that neither the participant nor a recorded time can reveal the delay.
+    ``interval`` counts from 1, and is None in a trial without a design; with ``adjusts`` the participant sets its level
+    and ends it. Contents and delays must not be printed.
     """
 
     trial: int
@@ -262,10 +262,10 @@ class Reconnected(Event):
 
 @dataclass(frozen=True, slots=True)
 class WriteFailed(Event):
-    """Writing failed for a reason; ``left`` are the failed command and the later ones, of time ``at_s``."""
+    """Writing failed for a reason; ``pending`` are the failed command and the later ones, of time ``at_s``."""
 
     reason: str
-    left: tuple[Command, ...]
+    pending: tuple[Command, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -279,6 +279,6 @@ class WriteCompleted(Event):
 
 
 def broken(at_s: float, error: BaseException) -> Broke:
-    """Return the event for an ``error`` that stops the session."""
+    """Return the `Broke` event for an ``error`` that stops the session."""
     what = str(error) if isinstance(error, StudyError) else f"{type(error).__name__}: {error}"
     return Broke(at_s, what, "device" if isinstance(error, DeviceError | ServoFault | VideoError) else "program")

@@ -76,10 +76,10 @@ def continue_reading(state: SessionState, event: Continue) -> Result:
         return state, ()
     text = state.plan.protocol.pages[state.page_id]
     left = journal.PageLeft(page=state.page_id)
-    if agreed := text.kind == "consent":
+    if is_consent := text.kind == "consent":
         version = state.plan.protocol.study.version
         left = replace(left, text_sha256=consent_hash(state, text), study_version=version)
-    return enter_step(state, state.index + 1, (Write(left, waits=agreed),), at_s=event.at_s)
+    return enter_step(state, state.index + 1, (Write(left, waits=is_consent),), at_s=event.at_s)
 
 
 def choose_language(state: SessionState, event: LanguageChosen) -> Result:
@@ -114,7 +114,7 @@ def adjust_level(state: SessionState, event: Stepped) -> Result:
 
 
 def confirm_setting(state: SessionState, _event: Submitted) -> Result:
-    """End a setting at the participant's request; a `TaskDone` event follows. Elsewhere there is nothing to confirm."""
+    """End a setting at the participant's request; a `TaskDone` event follows. Other tasks are not affected."""
     return state, (LeaveTask(),) if state.adjusts else ()
 
 
@@ -187,17 +187,17 @@ def take_over_pause(state: SessionState, event: PauseRequested) -> Result:
 def resume_session(state: SessionState, event: ResumeRequested) -> Result:
     """Return to the interrupted phase and fade the force in if it was off; only the operator ends a held pause."""
     if state.held is not None and event.by != "operator":
-        what = "the force was stopped" if state.held == "force" else "the operator paused the session"
-        raise SessionError(f"{what}: only the operator can resume it, not the {event.by}")
-    back: Commands = (Write(journal.Resumed(by=event.by)),)
+        reason = "the force was stopped" if state.held == "force" else "the operator paused the session"
+        raise SessionError(f"{reason}: only the operator can resume it, not the {event.by}")
+    commands: Commands = (Write(journal.Resumed(by=event.by)),)
     if state.force_off:
-        back = (*back, Write(journal.ForceRestored(by=event.by)), FadeIn())
+        commands = (*commands, Write(journal.ForceRestored(by=event.by)), FadeIn())
     state = replace(state, phase=state.interrupted or Phase.READING, interrupted=None, force_off=False, held=None)
     if state.phase in {Phase.TASK, Phase.RESTING}:
-        return start_trial(replace(state, attempt=state.attempt + 1), back, event.at_s)
+        return start_trial(replace(state, attempt=state.attempt + 1), commands, event.at_s)
     if state.phase is Phase.FEEDBACK:
-        return enter_step(state, state.index + 1, back, at_s=event.at_s)
-    return state, (*back, show_page(state))
+        return enter_step(state, state.index + 1, commands, at_s=event.at_s)
+    return state, (*commands, show_page(state))
 
 
 def stop_force(state: SessionState, event: ForceStopped) -> Result:
@@ -248,15 +248,15 @@ def call_operator(state: SessionState, event: Broke) -> Result:
     """Stop the force, write all data, and wait for the operator.
 
     If the device failed, ``interrupted`` is the phase to which the session returns after reconnection. In a study
-    with videos the journal does not say whether a device or a video failed: that would tell the trial's condition.
+    with videos the journal does not say whether a device or a video failed, which would reveal the trial's condition.
     """
-    waits = state.phase in {Phase.OPENING, Phase.PAUSED, Phase.TROUBLE}
-    before = state.interrupted if waits else state.phase
-    interrupted = before if event.by == "device" else None
+    keeps_phase = state.phase in {Phase.OPENING, Phase.PAUSED, Phase.TROUBLE}
+    phase = state.interrupted if keeps_phase else state.phase
+    interrupted = phase if event.by == "device" else None
     trouble = replace(state, phase=Phase.TROUBLE, interrupted=interrupted, force_off=True)
     videos = any(condition.shows_video for condition in state.plan.protocol.conditions.values())
-    what = CAUSE_WITHHELD if videos and event.by == "device" else event.what
-    written = (Write(journal.Broke(what=what)), WriteTables())
+    cause = CAUSE_WITHHELD if videos and event.by == "device" else event.what
+    written = (Write(journal.Broke(what=cause)), WriteTables())
     return trouble, (StopForce(), *interrupt_trial(state), *written, show_page(trouble))
 
 
@@ -277,15 +277,15 @@ def reconnect_device(state: SessionState, event: Reconnected) -> Result:
 
 def stall_session(state: SessionState, event: WriteFailed) -> Result:
     """Stop the force and show a waiting page until the pending writes succeed."""
-    first = Stall(event.reason, event.left, event.at_s, state.phase)
-    again = first if state.stall is None else replace(first, before=state.stall.before, by=state.stall.by)
-    stalled = replace(state, phase=Phase.STALLED, stall=again)
+    failure = Stall(event.reason, event.pending, event.at_s, state.phase)
+    stall = failure if state.stall is None else replace(failure, before=state.stall.before, by=state.stall.by)
+    stalled = replace(state, phase=Phase.STALLED, stall=stall)
     return stalled, (StopForce(), StopTrial(), Rest(), show_page(stalled))
 
 
 def retry_writes(state: SessionState, _event: WriteRetried) -> Result:
     """Retry the pending commands in order, each once; success is a separate event."""
-    return state, _stall(state).left
+    return state, _stall(state).pending
 
 
 def recover_from_stall(state: SessionState, event: WriteCompleted) -> Result:
@@ -305,7 +305,7 @@ def stop_force_of_stalled(state: SessionState, event: ForceStopped) -> Result:
 
 
 def end_stalled_session(state: SessionState, _event: EndRequested) -> Result:
-    """End without a line in the journal: the session stays unfinished; pending writes are still tried."""
+    """End the session without a line in the journal, so that it stays unfinished; pending writes are still retried."""
     if state.over:
         raise SessionError("the session has ended, but its last lines have not yet been written to disk")
     ended = replace(state, stall=replace(_stall(state), before=Phase.ENDED))

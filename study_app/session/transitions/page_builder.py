@@ -1,7 +1,7 @@
-"""Pages made from a session's state: texts of protocol and interface in the participant's language.
+"""Build the participant's pages from a session's state, with the protocol's and interface texts in one language.
 
-The state is that of a session that runs, or of a preview: the session that a seed gives before any is run. For that no
-sealed key is read: the codes are drawn from the seed, so that a preview reveals nothing of a study that is run.
+The state is that of a running session or of a preview, which is the session that follows from a seed. For a preview the
+codes are drawn from the seed and no sealed key is read, so that it reveals nothing about a study that is being run.
 """
 
 import hashlib
@@ -27,34 +27,34 @@ Kind: TypeAlias = Literal["text", "tank", "questions", "feedback"]
 
 
 def build_page(state: SessionState) -> pages.Page:
-    """Return the page of any phase after the first page is shown."""
+    """Return the page for a state of any phase except OPENING."""
     match state.phase:
         case Phase.TASK | Phase.RESTING:
-            made = replace(_task_page(state, state.trial), task=state.task, interval=_interval(state))
-            return made if state.phase is Phase.RESTING else _with_presentation(state, made)
+            page = replace(_task_page(state, state.trial), task=state.task, interval=_interval(state))
+            return page if state.phase is Phase.RESTING else _with_presentation(state, page)
         case Phase.ANSWERING:
             return _answer_page(state)
         case Phase.FEEDBACK:
             return pages.FeedbackPage(right=state.heard[-1].correct is True)
         case Phase.PAUSED:
-            paused = _task_page(state, state.step) if isinstance(state.step, Trial) else None
-            return pages.PausePage(force_off=state.force_off, held=state.held, coming=paused)
+            coming = _task_page(state, state.step) if isinstance(state.step, Trial) else None
+            return pages.PausePage(force_off=state.force_off, held=state.held, coming=coming)
         case Phase.STALLED if state.stall is not None and state.over:
             return build_page(replace(state, phase=state.stall.before, stall=None))
         case Phase.TROUBLE | Phase.STALLED:
-            return pages.TroublePage(_words(state).trouble_title, _words(state).trouble_body)
+            return pages.TroublePage(_interface_texts(state).trouble_title, _interface_texts(state).trouble_body)
         case Phase.COMPLETE:
-            last = state.plan.schedule.steps[-1]  # a study with its own farewell shows no second one
+            last = state.plan.schedule.steps[-1]  # a study's own last page replaces the title
             text = state.plan.protocol.pages[last.page_id] if isinstance(last, PageStep) else None
-            title = _words(state).end_title if text is None else _text(state, text.title)
-            return pages.EndPage(title, _words(state).end_body)
+            title = _interface_texts(state).end_title if text is None else _text(state, text.title)
+            return pages.EndPage(title, _interface_texts(state).end_body)
         case Phase.ENDED:
-            return pages.EndPage(_words(state).ended_early_title, _words(state).ended_early_body)
+            return pages.EndPage(_interface_texts(state).ended_early_title, _interface_texts(state).ended_early_body)
         case _:
             return _text_page(state)
 
 
-def _words(state: SessionState) -> Words:
+def _interface_texts(state: SessionState) -> Words:
     return words(state.plan.language)
 
 
@@ -70,12 +70,12 @@ def _text_page(state: SessionState) -> pages.TextPage:
         kind=text.kind,
         title=_text(state, text.title),
         paragraphs=protocol.paragraphs(text.body, language),
-        button=_words(state).continue_ if text.button is None else _text(state, text.button),
-        progress=_progress_between(state) if text.kind in {"instructions", "break"} else None,
+        button=_interface_texts(state).continue_ if text.button is None else _text(state, text.button),
+        progress=_text_page_progress(state) if text.kind in {"instructions", "break"} else None,
         language=language,
         languages=state.languages,
         stays_until_s=state.stays_until_s,
-        coming=None if (trial := _coming_trial(state)) is None else _task_page(state, trial),
+        coming=None if (trial := _next_trial(state)) is None else _task_page(state, trial),
     )
 
 
@@ -88,54 +88,54 @@ def consent_hash(state: SessionState, text: PageText) -> str:
 
 def _task_page(state: SessionState, trial: Trial) -> pages.TaskPage:
     protocol = state.plan.protocol
-    return task_page(protocol, state.plan.language, trial, protocol.scene_for(_drawn_condition(state, trial)).body)
+    return task_page(protocol, state.plan.language, trial, protocol.scene_for(_condition_of_ball(state, trial)).body)
 
 
 def task_page(protocol: Protocol, language: str, trial: Trial, body: Body) -> pages.TaskPage:
     """Return the tank page of a trial in a session's own protocol, before anything is presented."""
     block = protocol.blocks[trial.block]
     task, questionnaire = protocol.tasks[block.task], protocol.questionnaire_of(block.id)
-    set_by_hand = block.design is not None and protocol.design_of(block).adjusts
-    follows = words(language).follow_target
+    is_adjusted = block.design is not None and protocol.design_of(block).adjusts
+    follow_text = words(language).follow_target
     return pages.TaskPage(
         trial=trial.number,
-        instruction=follows if task.instruction is None else protocol.text(task.instruction, language),
+        instruction=follow_text if task.instruction is None else protocol.text(task.instruction, language),
         task=task,
         workspace_m=protocol.device.workspace_m,
         body_radius_m=body.diameter_m / 2 / protocol.scene.scale,
         progress=_progress_in_block(protocol, trial, trial.label(protocol, language), trial.index),
-        question=protocol.text(questionnaire.intro, language) if set_by_hand and questionnaire is not None else "",
+        question=protocol.text(questionnaire.intro, language) if is_adjusted and questionnaire is not None else "",
     )
 
 
-def _drawn_condition(state: SessionState, trial: Trial) -> str:
+def _condition_of_ball(state: SessionState, trial: Trial) -> str:
     """Return the condition whose ball a trial draws."""
     protocol = state.plan.protocol
-    designed = protocol.blocks[trial.block].design is not None
-    return protocol.conditions_in(trial.block)[0] if designed else state.plan.condition(trial)
+    has_design = protocol.blocks[trial.block].design is not None
+    return protocol.conditions_in(trial.block)[0] if has_design else state.plan.condition(trial)
 
 
-def _with_presentation(state: SessionState, made: pages.TaskPage) -> pages.TaskPage:
+def _with_presentation(state: SessionState, page: pages.TaskPage) -> pages.TaskPage:
     """Return a task page with the visible properties of the trial or interval."""
-    named = _drawn_condition(state, state.trial)
+    condition_id = _condition_of_ball(state, state.trial)
     if state.due is not None:
-        named = state.due.intervals[state.interval - 1].condition
-    condition = state.plan.protocol.conditions[named]
-    shown = condition.overlay == "shown"
-    return replace(made, adjusts=state.adjusts, video=condition.shows_video, overlay=shown)
+        condition_id = state.due.intervals[state.interval - 1].condition
+    condition = state.plan.protocol.conditions[condition_id]
+    has_overlay = condition.overlay == "shown"
+    return replace(page, adjusts=state.adjusts, video=condition.shows_video, overlay=has_overlay)
 
 
 def _interval(state: SessionState) -> pages.Interval | None:
     """Return the interval of the current trial; None without a design."""
-    design, said = state.design, _words(state)
+    design, texts = state.design, _interface_texts(state)
     if design is None:
         return None
     number, resting = state.interval, state.phase is Phase.RESTING
-    ordinal = said.design_answers[ORDINALS[number - 1]]
-    named = said.interval_begins.format(ordinal=ordinal, of=design.intervals)
-    coming = said.once_more if number == 1 and state.invalid else said.interval_coming[number - 1]
-    announced = coming if resting else named
-    return pages.Interval(number, design.intervals, resting, announced)
+    ordinal = texts.design_answers[ORDINALS[number - 1]]
+    beginning = texts.interval_begins.format(ordinal=ordinal, of=design.intervals)
+    announcement = texts.once_more if number == 1 and state.invalid else texts.interval_coming[number - 1]
+    text = announcement if resting else beginning
+    return pages.Interval(number, design.intervals, resting, text)
 
 
 def _answer_page(state: SessionState) -> pages.Page:
@@ -147,9 +147,9 @@ def _answer_page(state: SessionState) -> pages.Page:
         return pages.ChoicePage(state.trial.number, view, progress)
     assert isinstance(view, NumberView)  # noqa: S101 - the only other reply
     if design.first is not None and state.trial.index == 1:
-        words = _words(state)
-        modulus = f"{design.first.number:g}".replace(".", words.decimal_sign)
-        view = replace(view, text=words.modulus.format(number=modulus))
+        texts = _interface_texts(state)
+        modulus = f"{design.first.number:g}".replace(".", texts.decimal_sign)
+        view = replace(view, text=texts.modulus.format(number=modulus))
     return pages.NumberPage(state.trial.number, view, progress)
 
 
@@ -158,11 +158,11 @@ def _questionnaire_page(state: SessionState) -> pages.QuestionnairePage:
     trial = step if isinstance(step, Trial) else None
     form = step.form if isinstance(step, FormStep) else None
     label = (form or "").replace("_", " ").capitalize() if trial is None else _label(state, trial)
-    made = _questions_page(state.plan.protocol, questionnaire, state.questions, state.context, label)
+    page = _questions_page(state.plan.protocol, questionnaire, state.questions, state.context, label)
     return replace(
-        made,
+        page,
         trial=None if trial is None else trial.number,
-        intro="" if trial is not None and state.design is not None else made.intro,
+        intro="" if trial is not None and state.design is not None else page.intro,
         progress=None if trial is None else _progress(state, trial),
         chosen=tuple((item, answer.value) for item, answer in state.answers.items() if answer.given),
         form=form,
@@ -199,36 +199,41 @@ def _progress(state: SessionState, trial: Trial) -> pages.Progress:
     return _progress_in_block(state.plan.protocol, trial, _label(state, trial), trial.index)
 
 
-def _progress_between(state: SessionState) -> pages.Progress | None:
-    """Return the progress shown on a text page: before the first trial of its part, or after a number of trials.
+def _text_page_progress(state: SessionState) -> pages.Progress | None:
+    """Return the progress shown on a text page, or None outside the parts of the study.
 
-    None outside the parts, except for a break among trials of intervals, which names the last trial.
+    A page before the first trial of a part shows the progress of the next trial, a break that of the last one. A break
+    among trials of intervals has a label, and is shown outside the parts, too.
     """
-    steps, coming = state.plan.schedule.steps, _coming_trial(state)
-    done = next((step for step in reversed(steps[: state.index]) if isinstance(step, Trial)), None)
-    if done is not None and (coming is None or state.plan.protocol.pages[state.page_id].kind == "break"):
-        designed = state.plan.protocol.blocks[done.block].design is not None
-        if designed and coming is not None:
-            return _progress_in_block(state.plan.protocol, done, _label(state, done), done.index + 1)
-        return None if done.part is None else _progress_in_block(state.plan.protocol, done, "", done.index + 1)
-    if coming is None or coming.part is None:
+    steps, next_trial = state.plan.schedule.steps, _next_trial(state)
+    last_trial = next((step for step in reversed(steps[: state.index]) if isinstance(step, Trial)), None)
+    if last_trial is not None and (next_trial is None or state.plan.protocol.pages[state.page_id].kind == "break"):
+        has_design = state.plan.protocol.blocks[last_trial.block].design is not None
+        if has_design and next_trial is not None:
+            return _progress_in_block(state.plan.protocol, last_trial, _label(state, last_trial), last_trial.index + 1)
+        return (
+            None
+            if last_trial.part is None
+            else _progress_in_block(state.plan.protocol, last_trial, "", last_trial.index + 1)
+        )
+    if next_trial is None or next_trial.part is None:
         return None
-    return _progress_in_block(state.plan.protocol, coming, "", coming.index)
+    return _progress_in_block(state.plan.protocol, next_trial, "", next_trial.index)
 
 
-def _coming_trial(state: SessionState) -> Trial | None:
+def _next_trial(state: SessionState) -> Trial | None:
     return next((step for step in state.plan.schedule.steps[state.index + 1 :] if isinstance(step, Trial)), None)
 
 
 def _progress_in_block(protocol: Protocol, trial: Trial, label: str, index: int) -> pages.Progress:
-    """Return the progress of trial ``index`` in its block; a block with a criterion may end early."""
+    """Return the progress at trial ``index`` of a block; a block with a criterion may end early."""
     at_most = protocol.blocks[trial.block].until is not None
     return pages.Progress(part=trial.part, parts=protocol.parts, label=label, index=index, of=trial.of, at_most=at_most)
 
 
 @dataclass(frozen=True, slots=True)
 class Preview:
-    """A previewed session of a study with its own protocol; with groups, it has the steps of the participant's group.
+    """A previewed session with its protocol, which in a study with groups has the steps of the participant's group.
 
     ``codes`` is block → code → condition or track; levels are drawn from ``secret``.
     """
@@ -240,7 +245,7 @@ class Preview:
 
 
 def preview(study: Protocol, seed: int = SEED, participant: str = PARTICIPANT) -> Preview:
-    """Return the first session of a study folder that begins with this seed and participant.
+    """Return the first session that a new study folder would have with this seed and participant.
 
     All its randomness, including the codes, follows from the seed; the number in the participant's id determines the
     row of a square.
@@ -249,13 +254,13 @@ def preview(study: Protocol, seed: int = SEED, participant: str = PARTICIPANT) -
     secret = draw_secret(draw)
     codes = draw_key(study, draw)
     group = group_of(study.shares, secret, 1) if study.randomises else next(iter(study.groups), None)
-    own = study.for_session(group, 1)
-    return Preview(own, build_schedule(own, participant, seed), codes, secret)
+    protocol = study.for_session(group, 1)
+    return Preview(protocol, build_schedule(protocol, participant, seed), codes, secret)
 
 
 @dataclass(frozen=True, slots=True)
 class Moment:
-    """A page of a step: its kind and, for the tank of a trial with a design, the interval (from 1)."""
+    """One page of a step: its kind and, for the tank of a trial with a design, the interval (from 1)."""
 
     kind: Kind
     interval: int = 1
@@ -293,15 +298,15 @@ def previewed_page(
     if moment.kind == "tank":
         return build_page(replace(state, phase=Phase.TASK))
     if moment.kind == "text":
-        made = build_page(replace(state, phase=Phase.READING))
-        return replace(made, coming=None) if isinstance(made, pages.TextPage) else made
+        page = build_page(replace(state, phase=Phase.READING))
+        return replace(page, coming=None) if isinstance(page, pages.TextPage) else page
     questions = {question.id: question for question in state.questions}
-    kept = {
+    kept_answers = {
         item: Answer(onset_s=0.0, first_s=0.0, last_s=0.0, value=value)
         for item, value in (answers or {}).items()
         if item in questions and questions[item].problem(value, state.context) is None
     }
-    return build_page(replace(state, phase=Phase.ANSWERING, answers=kept))
+    return build_page(replace(state, phase=Phase.ANSWERING, answers=kept_answers))
 
 
 def presented_condition(shown: Preview, index: int) -> str | None:
@@ -309,7 +314,7 @@ def presented_condition(shown: Preview, index: int) -> str | None:
     step = shown.schedule.steps[index]
     if not isinstance(step, Trial):
         return None
-    return _drawn_condition(_state(shown, index, shown.protocol.study.languages[0]), step)
+    return _condition_of_ball(_state(shown, index, shown.protocol.study.languages[0]), step)
 
 
 def _state(shown: Preview, index: int, language: str) -> SessionState:

@@ -40,10 +40,10 @@ FINAL = frozenset({Phase.COMPLETE, Phase.ENDED})
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """The constant data of a session, except the language, which the participant may choose at its beginning.
+    """The data of a session that do not change, except the language, which the participant may choose at the start.
 
     ``key`` (block → code → condition or track) and ``secret``, from which levels are drawn, are blinded and never
-    printed. ``start`` is its starting step, which is not the first one after an interruption.
+    printed. ``start`` is the point at which the session starts or was resumed.
     """
 
     protocol: Protocol = field(repr=False)
@@ -64,13 +64,13 @@ class Plan:
 
 @dataclass(frozen=True, slots=True)
 class Stall:
-    """A failed write: its reason, and the pending commands of time ``at_s``.
+    """A failed write: its reason, and the ``pending`` commands of time ``at_s``.
 
     ``before`` is the phase to which the session returns, ``by`` the person who stopped its force during the stall.
     """
 
     reason: str
-    left: tuple[Command, ...] = field(repr=False)
+    pending: tuple[Command, ...] = field(repr=False)
     at_s: float
     before: Phase
     by: Literal["participant", "operator", "device", "program"] = "program"
@@ -82,14 +82,14 @@ class SessionState:
 
     ``index`` counts the schedule's steps (−1 before the first, their number after the last), ``attempt`` the
     presentations of the current trial from 1. ``answers`` holds the shown or answered statements of the current
-    questionnaire. ``interrupted`` is the phase to which a pause, or the failure of a device, returns. ``force_off``
-    means that the force was stopped and has not been faded in again, ``held`` that only the operator can resume a pause
-    or force. ``stall`` is set while writes fail. ``since_s`` is the start time of the current step [s, session's
-    clock]. For trials with a design ``heard`` holds those answered so far, ``due`` the content of the current one,
+    questionnaire. ``interrupted`` is the phase to which the session returns after a pause or a device failure.
+    ``force_off`` means that the force was stopped and has not been faded in again, ``held`` that only the operator can
+    end the pause. ``stall`` is set while writes fail. ``since_s`` is the start time of the current step [s, session's
+    clock]. For trials with a design, ``heard`` holds the results so far, ``due`` the content of the current trial,
     ``interval`` its current interval (from 1), and ``until_s`` the end of a rest or a feedback [s, session's clock].
-    ``errors_ms`` is the mean error of the visual delay in each of its intervals so far, ``invalid`` the number of its
-    attempts that were not delivered as requested. ``steps`` are the requested steps of the current adjustment;
-    ``place`` is the resulting place, which depends on its start.
+    ``errors_ms`` is the mean error of the delay in each of its intervals so far, ``invalid`` the number of its attempts
+    that were not delivered as requested. ``steps`` is the sum of the requested steps of the current adjustment, and
+    ``place`` the resulting position on the scale of levels, which depends on the start.
     """
 
     plan: Plan = field(repr=False)
@@ -136,17 +136,19 @@ class SessionState:
 
     @property
     def stays_until_s(self) -> float | None:
-        """The earliest time at which the text page may be left [s, session's clock]; None: at once."""
+        """The earliest time at which the text page can be left [s, session's clock]; None if it can be left at once."""
         least_s = self.plan.protocol.pages[self.page_id].min_s
         return None if least_s is None else self.since_s + least_s
 
     @property
     def languages(self) -> tuple[str, ...]:
         """The languages that can be chosen now: those of the study until consent is given, then none."""
-        offered, pages = self.plan.protocol.study.languages, self.plan.protocol.pages
-        before = self.plan.schedule.steps[: self.index]
-        early = all(isinstance(step, PageStep) and pages[step.page_id].kind != "consent" for step in before)
-        return offered if len(offered) > 1 and early and isinstance(self.step, PageStep) else ()
+        languages, pages = self.plan.protocol.study.languages, self.plan.protocol.pages
+        earlier_steps = self.plan.schedule.steps[: self.index]
+        is_before_consent = all(
+            isinstance(step, PageStep) and pages[step.page_id].kind != "consent" for step in earlier_steps
+        )
+        return languages if len(languages) > 1 and is_before_consent and isinstance(self.step, PageStep) else ()
 
     @property
     def trial(self) -> Trial:

@@ -31,17 +31,17 @@ from study_app.store.journals.journal_events import UNDELIVERED, Answer, Respons
 Commands: TypeAlias = tuple[Command, ...]
 Result: TypeAlias = tuple[SessionState, Commands]
 _END_SHOWN_S: Final = 0.1
-"""Time that a closed ring is shown before the next page [s]."""
-_AGAIN_S: Final = 1.5
+"""Time for which a closed ring is shown before the next page [s]."""
+_REPEAT_REST_S: Final = 1.5
 """Rest before a trial that was not delivered as requested is presented again [s]."""
 FADE_OUT_S: Final = 0.05
-"""Time in which the force fades to zero, after which a rest begins [s]."""
+"""Time in which the force fades to zero before a rest begins [s]."""
 
 
 def enter_step(state: SessionState, index: int, done: Commands = (), *, at_s: float) -> Result:
     """Go to the step at ``index``, or to the next that is not skipped; ``done`` ends the previous step."""
-    reached, passed = find_due_step(state, index, at_s=at_s)
-    return enter_reached(reached, (*done, *passed))
+    reached, skip_commands = find_due_step(state, index, at_s=at_s)
+    return enter_reached(reached, (*done, *skip_commands))
 
 
 def find_due_step(state: SessionState, index: int, *, at_s: float) -> Result:
@@ -51,25 +51,25 @@ def find_due_step(state: SessionState, index: int, *, at_s: float) -> Result:
     """
     steps = state.plan.schedule.steps
     start = state.plan.start
-    passed: list[Write] = []
+    skip_commands: list[Write] = []
     while True:
         step = steps[index] if index < len(steps) else None
-        before = steps[index - 1] if index else None
-        if (missed := _missed_criterion(state, before, step)) is not None:
+        previous = steps[index - 1] if index else None
+        if (missed := _missed_criterion(state, previous, step)) is not None:
             state = replace(state, phase=Phase.ENDED, index=index - 1, interrupted=None)
             reason = f"the criterion of block {missed.id} was not met"
-            return state, (*passed, Finish("aborted", reason))
+            return state, (*skip_commands, Finish("aborted", reason))
         due = state.plan.due(step, state.heard) if isinstance(step, Trial) and _block(state, step).design else None
-        skipped = _passed_over_event(state, before, step, due)
+        skipped = _skip_event(state, previous, step, due)
         if skipped is None:
             break
-        passed.append(Write(skipped))
+        skip_commands.append(Write(skipped))
         index += 1
     state = replace(state, index=index, attempt=1, answers={}, since_s=at_s, due=due, interval=1, until_s=None)
     state = replace(state, invalid=start.invalid if index == start.step else 0)
     if isinstance(step, Trial):
         state = replace(state, attempt=start.presented.get(step.number, 0) + 1)
-    return state, tuple(passed)
+    return state, tuple(skip_commands)
 
 
 def enter_reached(state: SessionState, done: Commands) -> Result:
@@ -80,10 +80,10 @@ def enter_reached(state: SessionState, done: Commands) -> Result:
         state = replace(state, phase=Phase.COMPLETE)
         return state, (*done, Finish("completed"), show_page(state))
     if isinstance(step := state.step, Trial):
-        before = state.plan.schedule.steps[state.index - 1] if state.index else None
-        follows = state.design is not None and isinstance(before, Trial) and before.block == step.block
-        between_s = state.design.between_s if state.design is not None and follows else 0.0
-        rest_until_s = state.since_s + between_s if between_s else None
+        previous = state.plan.schedule.steps[state.index - 1] if state.index else None
+        continues_block = state.design is not None and isinstance(previous, Trial) and previous.block == step.block
+        pause_s = state.design.between_s if state.design is not None and continues_block else 0.0
+        rest_until_s = state.since_s + pause_s if pause_s else None
         return start_trial(state, done, state.since_s, rest_until_s=rest_until_s)
     if isinstance(step, FormStep):
         state = replace(state, phase=Phase.ANSWERING)
@@ -117,8 +117,8 @@ def present_again(state: SessionState, done: Commands, at_s: float) -> Result:
     state = replace(state, invalid=state.invalid + 1)
     if state.invalid >= (state.plan.protocol.limits.attempts or 1):
         return enter_step(state, state.index + 1, done, at_s=at_s)
-    again = replace(state, attempt=state.attempt + 1)
-    return start_trial(again, done, at_s, rest_until_s=at_s + FADE_OUT_S + _AGAIN_S)
+    repeated = replace(state, attempt=state.attempt + 1)
+    return start_trial(repeated, done, at_s, rest_until_s=at_s + FADE_OUT_S + _REPEAT_REST_S)
 
 
 def start_interval(state: SessionState, done: Commands, at_s: float) -> Result:
@@ -154,7 +154,7 @@ def rest_before_interval(state: SessionState, done: Commands, until_s: float) ->
 
 
 def is_before_end(state: SessionState, at_s: float) -> bool:
-    """Return whether the time of a rest or feedback is not over yet."""
+    """Return whether a rest or feedback has not ended at ``at_s``."""
     return state.until_s is not None and at_s < state.until_s
 
 
@@ -165,12 +165,12 @@ def interrupt_trial(state: SessionState) -> Commands:
     ended = Write(journal.TrialEnded(**attempt_fields(state), outcome="interrupted"), measured=state.due is None)
     if state.due is None or state.phase is Phase.RESTING:
         return (StopTrial(), Rest(), ended)
-    of_interval = journal.IntervalEnded(**attempt_fields(state), interval=state.interval, outcome="interrupted")
-    return (StopTrial(), Rest(), Write(of_interval, measured=True), ended)
+    interval_ended = journal.IntervalEnded(**attempt_fields(state), interval=state.interval, outcome="interrupted")
+    return (StopTrial(), Rest(), Write(interval_ended, measured=True), ended)
 
 
 def attempt_fields(state: SessionState) -> dict[str, Any]:
-    """Return the event fields for trial, attempt and interval."""
+    """Return the event fields for trial and attempt."""
     return {"trial": state.trial.number, "attempt": state.attempt}
 
 
@@ -183,19 +183,19 @@ def _block(state: SessionState, trial: Trial) -> Block:
     return state.plan.protocol.blocks[trial.block]
 
 
-def _passed_over_event(
-    state: SessionState, before: Step | None, step: Step | None, due: Presentation | None
+def _skip_event(
+    state: SessionState, previous: Step | None, step: Step | None, due: Presentation | None
 ) -> journal.PassedOver | None:
     """Return the event for a skipped step (a trial that is not due, or a break after one), else None."""
     if isinstance(step, Trial):
         block = _block(state, step)
         if block.design is None or due is not None:
             return None
-        return journal.PassedOver(trial=step.number, reason=_undelivered_reason(state, block))
-    if isinstance(step, PageStep) and isinstance(before, Trial):
-        block = _block(state, before)
-        if block.design is not None and step.page_id == block.break_page and not _has_presented_trial(state, before):
-            return journal.PassedOver(page=step.page_id, reason=_undelivered_reason(state, block))
+        return journal.PassedOver(trial=step.number, reason=_skip_reason(state, block))
+    if isinstance(step, PageStep) and isinstance(previous, Trial):
+        block = _block(state, previous)
+        if block.design is not None and step.page_id == block.break_page and not _has_presented_trial(state, previous):
+            return journal.PassedOver(page=step.page_id, reason=_skip_reason(state, block))
     return None
 
 
@@ -213,18 +213,18 @@ def _has_presented_trial(state: SessionState, last: Trial) -> bool:
     return False
 
 
-def _undelivered_reason(state: SessionState, block: Block) -> str:
+def _skip_reason(state: SessionState, block: Block) -> str:
     return "criterion_met" if is_criterion_met(block, state.plan.schedule, state.heard) else "track_ended"
 
 
-def _missed_criterion(state: SessionState, before: Step | None, step: Step | None) -> Block | None:
+def _missed_criterion(state: SessionState, previous: Step | None, step: Step | None) -> Block | None:
     """Return the ended block whose unmet criterion ends the session, or None."""
-    if not isinstance(before, Trial):
+    if not isinstance(previous, Trial):
         return None
-    block = _block(state, before)
-    goes_on = isinstance(step, Trial) and step.block == block.id
-    goes_on = goes_on or (isinstance(step, PageStep) and step.page_id == block.break_page)
-    if goes_on or block.until is None or block.until.missed != "end":
+    block = _block(state, previous)
+    continues = isinstance(step, Trial) and step.block == block.id
+    continues = continues or (isinstance(step, PageStep) and step.page_id == block.break_page)
+    if continues or block.until is None or block.until.missed != "end":
         return None
     if is_criterion_met(block, state.plan.schedule, state.heard):
         return None
@@ -236,7 +236,7 @@ def show_item(state: SessionState, event: ItemShown) -> Result:
     _check_item(state, event.item)
     answer = state.answers.get(event.item, Answer()).shown(event.at_s)
     written = Write(journal.ItemShown(**_page_fields(state), item=event.item))
-    return _with_answer(state, event.item, answer), (written,)
+    return _set_answer(state, event.item, answer), (written,)
 
 
 def record_choice(state: SessionState, event: Chosen) -> Result:
@@ -248,13 +248,13 @@ def record_choice(state: SessionState, event: Chosen) -> Result:
     line = journal.Choice(
         **_page_fields(state), item=event.item, kind=state.questionnaire.item(event.item).kind_id, value=event.value
     )
-    return _without_hidden(_with_answer(state, event.item, answer), (Write(line, waits=True),))
+    return _remove_hidden_answers(_set_answer(state, event.item, answer), (Write(line, waits=True),))
 
 
 def retract_answer(state: SessionState, event: Retracted) -> Result:
     """Remove an answer, and the answers to questions that are hidden without it."""
     _check_shown(state, event.item)
-    return _without_hidden(*_remove_answer(state, event.item))
+    return _remove_hidden_answers(*_remove_answer(state, event.item))
 
 
 def submit_answers(state: SessionState, event: Submitted) -> Result:
@@ -277,32 +277,34 @@ def submit_answers(state: SessionState, event: Submitted) -> Result:
     )
     written = Write(line, waits=True)
     if state.due is not None:
-        return _keep_result(state, written, event.at_s)
+        return _store_result(state, written, event.at_s)
     return enter_step(state, state.index + 1, (written,), at_s=event.at_s)
 
 
 def keep_setting(state: SessionState, done: Commands, at_s: float) -> Result:
     """Write the steps of a setting as the answer, and continue; ``done`` ends its interval."""
     state, chosen = record_choice(state, Chosen(at_s, state.items[0], state.steps))
-    state, kept = submit_answers(state, Submitted(at_s))
-    return state, (*done, *chosen, *kept)
+    state, submitted = submit_answers(state, Submitted(at_s))
+    return state, (*done, *chosen, *submitted)
 
 
-def _keep_result(state: SessionState, written: Write, at_s: float) -> Result:
+def _store_result(state: SessionState, written: Write, at_s: float) -> Result:
     """Store the answer for later levels, and show feedback if it is due."""
     trial, due, design = state.trial, state.due, state.design
     assert due is not None and design is not None  # noqa: S101, PT018 - checked by the caller
     protocol, answer = state.plan.protocol, str(state.answers[design.name].value)
     block = protocol.blocks[trial.block]
-    heard = trial_result(protocol, block, trial.number, trial.code, due.level, due.arrangement, answer, catch=due.catch)
-    state = replace(state, heard=(*state.heard, heard))
-    if heard.correct is None or not design.shows_feedback(trial.phase == "practice"):
+    result = trial_result(
+        protocol, block, trial.number, trial.code, due.level, due.arrangement, answer, catch=due.catch
+    )
+    state = replace(state, heard=(*state.heard, result))
+    if result.correct is None or not design.shows_feedback(trial.phase == "practice"):
         return enter_step(state, state.index + 1, (written,), at_s=at_s)
     shown = replace(state, phase=Phase.FEEDBACK, until_s=at_s + design.feedback_s)
     return shown, (written, Write(journal.FeedbackShown(**attempt_fields(shown))), show_page(shown))
 
 
-def _with_answer(state: SessionState, item: str, answer: Answer) -> SessionState:
+def _set_answer(state: SessionState, item: str, answer: Answer) -> SessionState:
     return replace(state, answers={**state.answers, item: answer})
 
 
@@ -328,10 +330,10 @@ def _remove_answer(state: SessionState, item: str) -> Result:
     if not answer.given:
         return state, ()
     written = Write(journal.AnswerRemoved(**_page_fields(state), item=item), waits=True)
-    return _with_answer(state, item, answer.removed()), (written,)
+    return _set_answer(state, item, answer.removed()), (written,)
 
 
-def _without_hidden(state: SessionState, done: Commands) -> Result:
+def _remove_hidden_answers(state: SessionState, done: Commands) -> Result:
     """Remove the answers to questions that are no longer shown."""
     shown = set(state.shown)
     for item in [item for item in state.items if item not in shown]:

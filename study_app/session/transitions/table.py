@@ -1,25 +1,27 @@
-"""The state machine of a session: it makes decisions without side effects.
+"""The state machine of a session, which decides without side effects.
 
 Rules of this file:
 
-1. ``advance(state, event)`` is pure. It gives the next state and the commands that the runner carries out in order.
-2. Every legal pair of phase and event is a row of ``_TRANSITIONS``. Any other pair raises ``SessionError`` and nothing
-   has changed. Nothing but an event moves the machine.
-3. A ``Write`` comes before the ``ShowPage`` it leads to, and one of an answer, a consent, a note or the reason for a
-   repetition ``waits``: what a person gave is on the disk before its consequence is visible. Nothing else waits for the
-   disk.
-4. The safety of the hand comes before everything: ``StopForce``, ``StopTrial`` and ``Rest`` lead every list.
+1. ``advance(state, event)`` is pure. It returns the next state and the commands that the runner executes in order.
+2. Every permitted pair of phase and event is a row of ``_TRANSITIONS``. Any other pair raises ``SessionError`` and
+   changes nothing. Only events change the state.
+3. A ``Write`` precedes the ``ShowPage`` that follows from it. A ``Write`` of an answer, a consent, a note or the reason
+   for a repetition ``waits``, so that a person's input is on the disk before its effect is visible. Nothing else waits
+   for the disk.
+4. The safety of the hand comes first: ``StopForce``, ``StopTrial`` and ``Rest`` are at the beginning of every list.
 
-A session is the steps of its schedule: pages to read, forms to fill in, and trials. A trial is a task, then a
-questionnaire if its block has one. Where its block has a design it is several intervals with rests between them, then
-one question, then feedback where that is due; where the participant sets the level of the last interval, that setting
-is the answer. What it presents is known when it is entered, and a trial that is not due
-is passed over. A rest belongs to the trial's attempt. A pause during a task or a rest (asked for, or after a force
-stop) ends the attempt, and the trial starts again as the next attempt; a pause while reading or answering goes back to
-the same page with every choice kept, one in a feedback goes on. Whatever breaks leaves the force off and all answers on
-the disk, and waits for the operator: to end the session, or, where the device failed, to connect it again. Then the
-session is paused, and the operator resumes it. A disk that takes nothing stalls the session until it does; then the
-session is paused.
+A session consists of the steps of its schedule: pages to read, forms to fill in, and trials. A trial is a task,
+followed by a questionnaire if its block has one. If its block has a design, a trial consists of several intervals with
+rests between them, one question, and feedback if it is due. If the participant sets the level of the last interval,
+that setting is the answer. The presented content is determined when the trial is entered, and a trial that is not due
+is skipped.
+
+A rest belongs to the trial's attempt. A pause during a task or a rest (requested, or after the force was stopped) ends
+the attempt, and the trial starts again as the next attempt. A pause while reading or answering returns to the same page
+with all choices; a pause during feedback continues with the next step. After a failure the force stays off, all answers
+are on the disk, and the session waits for the operator, who can end it or, if the device failed, reconnect it. Then the
+session is paused until the operator resumes it. If the disk accepts no data, the session stalls until it does, and is
+then paused.
 """
 
 from collections.abc import Callable, Mapping
@@ -132,10 +134,10 @@ def advance(state: SessionState, event: Event) -> tuple[SessionState, tuple[Comm
     move = _TRANSITIONS.get((state.phase, type(event)))
     if move is None:
         if state.stall is not None:
-            waits = f"{state.stall.reason}; until then, the session waits"
-            raise SessionError(f"{type(event).__name__} is not possible while {state.phase.value}: {waits}")
-        taken = ", ".join(sorted(kind.__name__ for phase, kind in _TRANSITIONS if phase is state.phase))
+            reason = f"{state.stall.reason}; until then, the session waits"
+            raise SessionError(f"{type(event).__name__} is not possible while {state.phase.value}: {reason}")
+        possible = ", ".join(sorted(kind.__name__ for phase, kind in _TRANSITIONS if phase is state.phase))
         raise SessionError(
-            f"{type(event).__name__} is not possible while {state.phase.value}; possible events: {taken}"
+            f"{type(event).__name__} is not possible while {state.phase.value}; possible events: {possible}"
         )
     return move(state, event)
