@@ -13,7 +13,7 @@ from study_app.errors import AnalysisError
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import build_schedule
 from study_app.session.resume import REHEARSED_SCREENS, resume_at
-from study_app.session.simulated.answers_only import DEVICE, Answering, Kept, SimulatedTime, rehearse_answers
+from study_app.session.simulated.answers_only import DEVICE, Answering, SimulatedStore, SimulatedTime, rehearse_answers
 from study_app.session.simulated.rehearsal import ConditionFeatures
 from study_app.session.transitions.table import initial_state
 from study_app.store.blinded.allocation import session_protocol
@@ -55,7 +55,9 @@ class CutOff:
         raise CutOffError
 
 
-def run(study: Protocol, store: SessionStore, kept: Kept, felt: ConditionFeatures, passed: SimulatedTime) -> None:
+def run(
+    study: Protocol, store: SessionStore, kept: SimulatedStore, felt: ConditionFeatures, passed: SimulatedTime
+) -> None:
     """Answer a session from where its journal ends."""
     begun = store.lines[0]
     own = session_protocol(store.place.study_folder, store.as_recorded(study), begun.participant, begun.session)

@@ -22,7 +22,7 @@ from study_app.protocol.warnings.untranslated import untranslated_on_pages
 from study_app.session import preflight_measurements
 from study_app.session.preflight import Measurements, PredictedDelivery, Screen, preflight_checks, refusal_reasons
 from study_app.session.preflight_measurements import measure_servo_and_disk
-from study_app.session.start import NewSession, participant_with_other_contents, seen_late
+from study_app.session.start import NewSession, late_device_sentence, participant_with_other_contents
 from study_app.store import receipt
 from study_app.store.files.folders import StudyFolder
 from study_app.store.journals.journal_events import TrialStarted
@@ -233,7 +233,7 @@ def test_a_bench_test_shows_that_a_device_is_late(
     )  # fmt: skip
     save_settings(DEFAULTS.with_bench(measured))
     told = f"In the bench test of 2026-11-21, the device answered after {ticks} ticks, but the servo assumes 1 tick"
-    assert seen_late(RIG, StudyFolder(tmp_path / "study"), "double") == (told if ticks else "")
+    assert late_device_sentence(RIG, StudyFolder(tmp_path / "study"), "double") == (told if ticks else "")
 
 
 def hold_session(folder: StudyFolder, who: str, delays: tuple[int | None, ...]) -> None:
@@ -250,15 +250,15 @@ def hold_session(folder: StudyFolder, who: str, delays: tuple[int | None, ...]) 
 def test_the_last_session_shows_that_a_device_is_late(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("LIQUID_STUDY_CONFIG", str(tmp_path))
     folder = StudyFolder(tmp_path / "small")
-    assert seen_late(RIG, folder, "single") == ""
+    assert late_device_sentence(RIG, folder, "single") == ""
     hold_session(folder, "P002", (None, 3, None, 5, None))
     told = "the device answered after 5 ticks, but the servo assumes 1 tick"
-    assert seen_late(RIG, folder, "single") == f"In trial 4 of the last session (participant P002), {told}"
-    assert seen_late(RIG, folder, "double") == ""
+    assert late_device_sentence(RIG, folder, "single") == f"In trial 4 of the last session (participant P002), {told}"
+    assert late_device_sentence(RIG, folder, "double") == ""
     unblind(folder.path, "AK", "end of the study")
-    assert seen_late(RIG, folder, "double") == f"In trial 4 of the last session (participant P002), {told}"
+    assert late_device_sentence(RIG, folder, "double") == f"In trial 4 of the last session (participant P002), {told}"
     hold_session(folder, "P001", (None, None))
-    assert seen_late(RIG, folder, "single") == ""
+    assert late_device_sentence(RIG, folder, "single") == ""
 
 
 @pytest.mark.parametrize(("language", "told"), [("fr", "4 texts; still in English"), ("en", "")])

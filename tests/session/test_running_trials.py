@@ -11,7 +11,7 @@ from study_app.protocol.trials.stimuli import Stimulated
 from study_app.protocol.trials.tasks import Explore, Follow
 from study_app.session.tasks import TaskView
 from study_app.session.transitions.events import StartTrial
-from study_app.session.trial import _LEAST_SET_S, SETTLED_S, Recording, RunningTrial
+from study_app.session.trial import _MIN_SETTING_S, SETTLED_S, Recording, RunningTrial
 from study_app.video.frames import VideoFrame, VideoStatistics
 from tests.session.fakes import FakeServo
 
@@ -219,7 +219,7 @@ def test_late_and_lost_frames_are_counted_once_each() -> None:
     }
 
 
-@pytest.mark.parametrize(("adjusts", "calls"), [(True, [1.5 + _LEAST_SET_S]), (False, ["left"])])
+@pytest.mark.parametrize(("adjusts", "calls"), [(True, [1.5 + _MIN_SETTING_S]), (False, ["left"])])
 def test_a_level_is_set_for_a_moment_before_it_can_be_left(adjusts: bool, calls: list[Any]) -> None:
     told: list[Any] = []
     tracker = SimpleNamespace(finish=told.append, leave=lambda: told.append("left"))

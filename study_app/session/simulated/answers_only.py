@@ -1,13 +1,13 @@
-"""Simulated sessions of answers alone: state machine, questionnaires and answer model, without a servo.
+"""Simulated sessions with answers only: state machine, questionnaires and answer model, without a servo.
 
-What a trial felt like is drawn from what rehearsed participants felt in its condition (`condition_features`); a task
-takes its least time, and nothing of it is measured, so those columns say n/a. Everything else is as in a rehearsal: the
-same machine, orders, answer model and files, and every row says that it is simulated. Who feels what the rehearsed
-participant felt answers word for word as in the rehearsal.
+The percept of a trial is drawn from the percepts of rehearsed participants in the same condition
+(`condition_features`). A task takes its shortest time and is not measured, so its columns are n/a. Everything else is
+as in a rehearsal: the state machine, the orders, the answer model and the files, whose rows are marked as simulated.
+With equal percepts the answers equal those of the rehearsal.
 
-A session can begin at a later step: a simulated participant answers what comes before, sensing varied numbers as they
-were requested and nothing else, and it is resumed there. The journal notes which steps were simulated, and the session
-counts as simulated.
+A session can also begin at a later step: a simulated participant, who senses varied numbers exactly as requested and
+nothing else, answers the steps before it, and the session is resumed there. The journal notes which steps were
+simulated, and the session counts as simulated.
 """
 
 import time
@@ -56,8 +56,8 @@ from study_app.store.sessions import SessionStart, SimulatedStudy, begin_session
 from study_app.workspace import workspace
 
 DEVICE = {"name": "answers-only", "measured": False}
-SAY_EVERY_S = 5.0
-_BEGINS: Final = (PageShown, FormShown, TrialStarted)
+REPORT_INTERVAL_S = 5.0
+_STEP_EVENTS: Final = (PageShown, FormShown, TrialStarted)
 """The events that begin a step."""
 
 
@@ -102,32 +102,46 @@ def rehearse_answers(
     source = source_bytes(protocol)
     study = parse(source, str(protocol))
     folder = rehearsal_folder(workspace().results, study.study.name) if results is None else Path(results)
-    people = tuple(f"P{number:03d}" for number in range(1, participants + 1))
-    groups = simulated_groups(StudyFolder(folder), study, people, group)
-    kept = SimulatedStudy(folder, study, source, people, seed=seed, device=DEVICE, screens=REHEARSED_SCREENS)
+    participant_ids = tuple(f"P{number:03d}" for number in range(1, participants + 1))
+    groups = simulated_groups(StudyFolder(folder), study, participant_ids, group)
+    simulated_study = SimulatedStudy(
+        folder, study, source, participant_ids, seed=seed, device=DEVICE, screens=REHEARSED_SCREENS
+    )
     if features is None:
         features = condition_features(study, seed=seed, people=REHEARSED_PEOPLE, progress=progress)
-    said_s = time.perf_counter()
-    with kept:
-        for number, person in enumerate(people, start=1):
+    last_report_s = time.perf_counter()
+    with simulated_study:
+        for number, participant in enumerate(participant_ids, start=1):
             session = 1
-            while _answer_session(study, person, groups[person], kept, features, session=session):
+            while _answer_session(study, participant, groups[participant], simulated_study, features, session=session):
                 session += 1
-            if progress is not None and (time.perf_counter() - said_s >= SAY_EVERY_S or number == participants):
-                said_s = time.perf_counter()
-                progress(f"{person}: {number} of {participants} simulated participants have answered")
+            if progress is not None and (
+                time.perf_counter() - last_report_s >= REPORT_INTERVAL_S or number == participants
+            ):
+                last_report_s = time.perf_counter()
+                progress(f"{participant}: {number} of {participants} simulated participants have answered")
     return folder
 
 
 def _answer_session(
-    study: Protocol, who: str, group: str | None, kept: SimulatedStudy, features: ConditionFeatures, *, session: int
+    study: Protocol,
+    participant: str,
+    group: str | None,
+    simulated_study: SimulatedStudy,
+    features: ConditionFeatures,
+    *,
+    session: int,
 ) -> bool:
     """Simulate the answers of one session and return whether another follows; ``group`` is pre-existing."""
     time_passed = SimulatedTime()
-    store = kept.begin(who, SessionClock(time_passed.ns, datetime.now().astimezone()), group, session=session)
-    own = store.protocol
-    schedule = begun_schedule(own, start_of(store.lines), kept.key)
-    state = initial_state(own, schedule, kept.key.codes, study.study.languages[0], secret=kept.key.nonce)
+    store = simulated_study.begin(
+        participant, SessionClock(time_passed.ns, datetime.now().astimezone()), group, session=session
+    )
+    protocol = store.protocol
+    schedule = begun_schedule(protocol, start_of(store.lines), simulated_study.key)
+    state = initial_state(
+        protocol, schedule, simulated_study.key.codes, study.study.languages[0], secret=simulated_study.key.nonce
+    )
     answering = Answering(
         study, state, store, time_passed, lambda block, condition: features[block, condition], session=session
     )
@@ -135,7 +149,7 @@ def _answer_session(
     return answering.state.phase is Phase.COMPLETE and session < store.planned
 
 
-class Kept(typing.Protocol):
+class SimulatedStore(typing.Protocol):
     """The interface of the store of a simulated session."""
 
     def append(self, event: Line, *, t_s: float | None = None) -> None: ...  # noqa: D102
@@ -160,17 +174,17 @@ class Answering(SimulatedParticipant):
         self,
         study: Protocol,
         state: SessionState,
-        kept: Kept,
+        store: SimulatedStore,
         time_passed: SimulatedTime,
         features: Callable[[str, str], Sequence[TrialFeatures]],
         *,
         session: int = 1,
     ) -> None:
         self._features_of = features
-        self._feels = NO_FEATURES
-        self._sensed_in: dict[int, list[float]] = {}  # by trial, in the order of intervals
+        self._features = NO_FEATURES
+        self._sensed: dict[int, list[float]] = {}  # by trial, in the order of intervals
         self._time = time_passed
-        self._store = kept
+        self._store = store
         super().__init__(study, state.plan.schedule, session=session)
         self.state = state
 
@@ -202,36 +216,36 @@ class Answering(SimulatedParticipant):
                     raise SessionError(f"the session failed at {self.page}")
 
     def _adjust_level(self, page: TaskPage) -> None:
-        """Adjust the level from exactly sensed values until the setting is done or its time is over."""
+        """Adjust the level, which is sensed exactly, until the setting is done or its time is over."""
         observer, began_s = self._adjusting_observer(page.trial), self._time.seconds
-        sensed = self._sensed_in[page.trial]
+        sensed = self._sensed[page.trial]
         self._wait(page.task.judged_from_s)
         while True:
             self._wait(LOOK_AT_SETTING_S)
             steps = observer.steps(sensed[-1], self._reference_magnitude(page.trial, sensed[-1]))
-            over = self._time.seconds - began_s >= page.task.limit_s
-            if over or not steps:
+            timed_out = self._time.seconds - began_s >= page.task.limit_s
+            if timed_out or not steps:
                 break
             self._post(Stepped(self._time.seconds, steps))
-        self._post(TaskDone(self._time.seconds, "timeout" if over else "complete", {}))
+        self._post(TaskDone(self._time.seconds, "timeout" if timed_out else "complete", {}))
 
     def _perceived_features(self, _trial: int | None) -> TrialFeatures:
-        return self._feels
+        return self._features
 
     def _sensed_magnitudes(self, block: Block) -> Mapping[int, Sequence[float]]:
-        return {number: sensed for number, sensed in self._sensed_in.items() if self._trials[number].block == block.id}
+        return {number: sensed for number, sensed in self._sensed.items() if self._trials[number].block == block.id}
 
     def _sense(self, trial: int, presented: Stimulated) -> None:
-        """Store the percept of a trial: a varied number exactly as requested, a condition from its features."""
+        """Store the percept of a trial: a varied number exactly as requested, or drawn features of its condition."""
         block = self.state.trial.block
         if presented.vary is not None:
-            self._sensed_in.setdefault(trial, []).append(as_requested(presented))
+            self._sensed.setdefault(trial, []).append(as_requested(presented))
             return
         features = self._features_of(block, presented.condition)
-        self._feels = features[int(len(features) * self._stream(f"{trial}/felt")())]
+        self._features = features[int(len(features) * self._stream(f"{trial}/felt")())]
         if self.state.due is not None:
             attended = Comparison.of(self._study, self._study.blocks[block], self.observer)
-            self._sensed_in.setdefault(trial, []).append(attended.sensed(self._feels))
+            self._sensed.setdefault(trial, []).append(attended.sensed(self._features))
 
     def _seconds(self) -> float:
         return self._time.seconds
@@ -252,7 +266,7 @@ class Answering(SimulatedParticipant):
             case StartTrial(trial=trial, presented=presented):
                 self._sense(trial, presented)
             case Adjust(presented=presented, line=line):
-                self._sensed_in[line.trial].pop()
+                self._sensed[line.trial].pop()
                 self._sense(line.trial, presented)
                 self._store.append(line, t_s=at_s)
             case ShowPage(page):
@@ -260,11 +274,11 @@ class Answering(SimulatedParticipant):
             case Finish(status, reason):
                 self._store.finish(status, reason)
             case _:
-                """What moves, measures or stops something has nothing to do here."""
+                pass  # commands for the servo, the recorder and the device have no effect without a device
 
 
 def begin_session_at_step(results: Path, study: Protocol, source: bytes, start: SessionStart, step: int) -> Path:
-    """Begin a simulated session in a new study folder, answer the steps before ``step``; return the session's folder.
+    """Begin a session in a new study folder, simulate the answers before ``step``, and return the session's folder.
 
     The session is unfinished; when resumed exactly, it continues at ``step`` or the next step that is due.
 
@@ -288,18 +302,20 @@ def begin_session_at_step(results: Path, study: Protocol, source: bytes, start: 
     StoreError
         The folder cannot be written.
     """
-    shown = preview(study, start.seed, start.participant)
-    state = initial_state(shown.protocol, shown.schedule, shown.codes, start.language, secret=shown.secret)
-    lines, passed = _Lines(), SimulatedTime()
-    answering = Answering(study, state, lines, passed, lambda _block, _condition: (NO_FEATURES,))
+    previewed = preview(study, start.seed, start.participant)
+    state = initial_state(
+        previewed.protocol, previewed.schedule, previewed.codes, start.language, secret=previewed.secret
+    )
+    lines, time_passed = _LinesBeforeStep(), SimulatedTime()
+    answering = Answering(study, state, lines, time_passed, lambda _block, _condition: (NO_FEATURES,))
     lines.session = answering
     lines.until = step
     answering.run(until=step)
     if step and answering.state.index < step:
         raise SessionError(f"step {step + 1} cannot be reached: {lines.reason or 'the session ends before this step'}")
-    clock = SessionClock(lambda: 0, datetime.now().astimezone() - timedelta(seconds=passed.seconds))
+    clock = SessionClock(lambda: 0, datetime.now().astimezone() - timedelta(seconds=time_passed.seconds))
     with begin_session(results, study, source, start, clock=clock) as store:
-        if store.key.codes != shown.codes:
+        if store.key.codes != previewed.codes:
             raise SessionError(f"{results} contains sessions with a different seed: use a new folder")
         if step:
             text = f"A simulated participant completed steps 1 to {step} without force."
@@ -310,7 +326,7 @@ def begin_session_at_step(results: Path, study: Protocol, source: bytes, start: 
 
 
 @dataclass
-class _Lines:
+class _LinesBeforeStep:
     """A store that keeps only the lines before a given step."""
 
     kept: list[tuple[Line, float]] = field(default_factory=list)
@@ -320,9 +336,9 @@ class _Lines:
     _begun: bool = False
 
     def append(self, event: Line, *, t_s: float | None = None) -> None:
-        """Store a line unless the step has begun."""
+        """Store a line, unless the step has begun."""
         assert self.session is not None  # noqa: S101 - set before the session runs
-        self._begun = self._begun or (isinstance(event, _BEGINS) and self.session.state.index >= self.until)
+        self._begun = self._begun or (isinstance(event, _STEP_EVENTS) and self.session.state.index >= self.until)
         if not self._begun:
             self.kept.append((event, t_s or 0.0))
 

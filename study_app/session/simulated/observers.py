@@ -1,9 +1,9 @@
-"""SIMULATED participants, for rehearsals: they read, explore, reach for what they see lit, and answer what they felt.
+"""SIMULATED participants, for rehearsals: they read, explore, reach for lit targets, and answer from what they felt.
 
-What such a participant knows is what a person would know: the pages, the tank as it was drawn (as late as that was),
-and the force on the hand. Nothing here knows a condition. A tank is explored by strokes, circles, zigzags and stops,
-round after round in random order; only sums, products, quotients and square roots of the numbers drawn are used, so
-that a seed gives the same motion everywhere.
+A simulated participant has the same information as a person: the pages, the tank as drawn (with its delay), and the
+force on the hand, but never a condition. A tank is explored by strokes, circles, zigzags and stops, in rounds of random
+order. Only sums, products, quotients and square roots of the drawn numbers are used, so that a seed gives the same
+motion on every computer.
 """
 
 import math
@@ -36,9 +36,9 @@ _Figure: TypeAlias = Callable[[Draw, Floats, Floats], list[Floats]]
 _SECONDS_PER_WORD = 0.12
 _REACTION_S = (0.2, 0.35)  # reaction time from a lit target to the movement [s]
 ANSWER_S = (0.8, 2.6)
-_CHANGES_MIND = 0.08
+_REVISION_PROBABILITY = 0.08
 _AIM_ERROR = 0.3  # largest error of aim along each axis, as a fraction of the target's radius
-_FOLLOWED_HZ = 200.0
+_PATH_RATE_HZ = 200.0
 _CORRECTION_S = 0.35  # time at rest outside the target before another attempt [s]
 _LONGEST_PATH_S: Final = 60.0
 """Time after which the path repeats, unless the task ends earlier [s]."""
@@ -55,7 +55,7 @@ _SAMPLE = np.dtype([("time_ns", np.int64), ("position_m", np.float64, 3)])
 class SensedTrial:
     """The forces felt and frames seen in one trial; ``scale`` is scene metres per hand metre.
 
-    ``period_s`` is the time between two ticks [s] in studies with a delayed force, else None.
+    ``period_s`` is the tick period [s] in studies with a delayed force, else None.
     """
 
     scale: float
@@ -67,11 +67,11 @@ class SensedTrial:
 
     def feel(self, samples: Any) -> None:
         """Add samples felt by the hand (recarray of ``layout.SAMPLE``) if a liquid was present."""
-        wet = samples[samples["scene"] != 0]
-        self.forces_n.append(wet["device_force_n"])
-        self.velocities_mps.append(wet["velocity_mps"])
+        in_liquid = samples[samples["scene"] != 0]
+        self.forces_n.append(in_liquid["device_force_n"])
+        self.velocities_mps.append(in_liquid["velocity_mps"])
         if self.period_s is not None:
-            self.model_n.append(wet["force_n"])
+            self.model_n.append(in_liquid["force_n"])
 
     def see(self, painted_ns: int, view: TankView) -> None:
         """Add a frame that was seen."""
@@ -101,7 +101,7 @@ class SensedTrial:
         )
 
     def _force_delay_s(self, force_n: Any) -> float:
-        """Return the delay with which the force was sent [s]."""
+        """Return the delay of the sent force behind the model's force [s]."""
         if self.period_s is None or not self.model_n:
             return 0.0
         rows = lag(force_n, np.concatenate(self.model_n), round(LONGEST_S / self.period_s))
@@ -109,15 +109,15 @@ class SensedTrial:
 
 
 def exploration(draw: Draw, half_m: tuple[float, float, float], duration_s: float) -> tuple[Floats, Floats]:
-    """Return times (n,) [s] and positions (n, 3) [m] of exploring for at least ``duration_s`` within ±``half_m``."""
+    """Return times (n,) [s] and positions (n, 3) [m] of exploring ±``half_m`` for at least ``duration_s``."""
     reach_m = 0.7 * np.asarray(half_m)
-    pieces = [np.zeros((1, 3))]
-    coming: list[_Figure] = []
-    while sum(map(len, pieces)) < duration_s * RATE_HZ:
-        coming = coming or list(shuffle(_FIGURES, draw))
-        pieces += coming.pop()(draw, reach_m, pieces[-1][-1])
-        pieces.append(np.tile(pieces[-1][-1], (_rows(_draw_between(draw, *_REST_S)), 1)))
-    position_m = np.concatenate(pieces)
+    segments = [np.zeros((1, 3))]
+    figures: list[_Figure] = []
+    while sum(map(len, segments)) < duration_s * RATE_HZ:
+        figures = figures or list(shuffle(_FIGURES, draw))
+        segments += figures.pop()(draw, reach_m, segments[-1][-1])
+        segments.append(np.tile(segments[-1][-1], (_row_count(_draw_uniform(draw, *_REST_S)), 1)))
+    position_m = np.concatenate(segments)
     return np.arange(len(position_m)) / RATE_HZ, position_m
 
 
@@ -128,7 +128,7 @@ def _strokes(along: int, aside: int, sides: tuple[int, ...]) -> _Figure:
         ends_m = np.zeros((len(sides), 3))
         ends_m[:, along], ends_m[:, aside] = (
             np.array(sides) * reach_m[along],
-            _draw_between(draw, -1, 1) * reach_m[aside] * 0.5,
+            _draw_uniform(draw, -1, 1) * reach_m[aside] * 0.5,
         )
         return _path_through(draw, start_m, list(ends_m))
 
@@ -136,22 +136,22 @@ def _strokes(along: int, aside: int, sides: tuple[int, ...]) -> _Figure:
 
 
 def _zigzag(draw: Draw, reach_m: Floats, start_m: Floats) -> list[Floats]:
-    """Return the path of a crossing of the tank in legs that turn by about 90°."""
+    """Return a path across the tank in legs that turn by about 90°."""
     across = np.linspace(-1, 1, 6) * reach_m[0]
     side = reach_m[2] * 0.5
     return _path_through(draw, start_m, [np.array([x, 0.0, side * (1 - 2 * (i % 2))]) for i, x in enumerate(across)])
 
 
 def _circles(draw: Draw, reach_m: Floats, start_m: Floats) -> list[Floats]:
-    """Return a stirring path: three circles about the centre, at full speed from beginning to end."""
-    radius_m = min(reach_m[0], reach_m[2]) * _draw_between(draw, 0.6, 1.0)
-    pace_mps = _draw_between(draw, *_PACE_MPS)
+    """Return a stirring path: three circles about the centre at constant speed."""
+    radius_m = min(reach_m[0], reach_m[2]) * _draw_uniform(draw, 0.6, 1.0)
+    pace_mps = _draw_uniform(draw, *_PACE_MPS)
     first = np.array([radius_m, 0.0, 0.0])
     corners = np.empty(_CORNERS + 1, complex)
     corners[0] = 1.0
     for k in range(_CORNERS):
         corners[k + 1] = corners[k] * _TURN
-    rows = _rows(3 * 2 * np.pi * radius_m / pace_mps)
+    rows = _row_count(3 * 2 * np.pi * radius_m / pace_mps)
     corner = (np.arange(1, rows + 1) * (3 * _CORNERS / rows)) % _CORNERS
     x = np.interp(corner, np.arange(_CORNERS + 1), corners.real)
     z = np.interp(corner, np.arange(_CORNERS + 1), corners.imag)
@@ -161,18 +161,18 @@ def _circles(draw: Draw, reach_m: Floats, start_m: Floats) -> list[Floats]:
 def _path_through(draw: Draw, start_m: Floats, places_m: list[Floats]) -> list[Floats]:
     """Return the path through positions, each stroke with its own speed."""
     return [
-        _stroke(begin, end, _draw_between(draw, *_PACE_MPS))
+        _stroke(begin, end, _draw_uniform(draw, *_PACE_MPS))
         for begin, end in zip([start_m, *places_m[:-1]], places_m, strict=True)
     ]
 
 
 def _stroke(begin_m: Floats, end_m: Floats, pace_mps: float) -> Floats:
-    """Return the rows of a minimum-jerk stroke after its first (Flash & Hogan 1985, eq. 10)."""
-    way = end_m - begin_m
-    rows = _rows(float(np.sqrt((way * way).sum())) / pace_mps)
-    share = np.arange(1, rows + 1) / rows
-    done = share * share * share * (10.0 + share * (6.0 * share - 15.0))
-    return np.asarray(begin_m + done[:, None] * way)
+    """Return the positions of a minimum-jerk stroke without its first point (Flash & Hogan 1985, eq. 10)."""
+    displacement_m = end_m - begin_m
+    rows = _row_count(float(np.sqrt((displacement_m * displacement_m).sum())) / pace_mps)
+    progress = np.arange(1, rows + 1) / rows
+    fraction = progress * progress * progress * (10.0 + progress * (6.0 * progress - 15.0))
+    return np.asarray(begin_m + fraction[:, None] * displacement_m)
 
 
 _FIGURES: tuple[_Figure, ...] = (
@@ -184,11 +184,11 @@ _FIGURES: tuple[_Figure, ...] = (
 )
 
 
-def _rows(duration_s: float) -> int:
+def _row_count(duration_s: float) -> int:
     return max(1, round(duration_s * RATE_HZ))
 
 
-def _draw_between(draw: Draw, low: float, high: float) -> float:
+def _draw_uniform(draw: Draw, low: float, high: float) -> float:
     return low + (high - low) * draw()
 
 
@@ -229,7 +229,7 @@ class Reacher:
             return False
         if lit != self._seen:
             self._seen = lit
-            self._move_s = now_s + _draw_between(self._draw, *_REACTION_S)
+            self._move_s = now_s + _draw_uniform(self._draw, *_REACTION_S)
             self._outside_since_s = None
         elif self._move_s and now_s >= self._move_s:
             self._reach_for(lit)
@@ -249,19 +249,21 @@ class Reacher:
     def _reach_for(self, target: int) -> None:
         self._move_s = 0.0
         error_m = _AIM_ERROR * self._task.radius_m
-        x, y, z = (place + error_m * _draw_between(self._draw, -1, 1) for place in self._task.targets_m[target])
+        x, y, z = (
+            coordinate_m + error_m * _draw_uniform(self._draw, -1, 1) for coordinate_m in self._task.targets_m[target]
+        )
         self._device.reach_to(x, y, z)
 
 
 class Follower:
-    """Follow the moving target, anticipating its regular swing, with an error of aim."""
+    """Follow the moving target without a lag, since its swing is regular, but with an error of aim."""
 
     def __init__(self, task: Task, device: HandOrders, draw: Draw, _now_s: float) -> None:
-        t_s = np.arange(round(task.limit_s * _FOLLOWED_HZ) + 1) / _FOLLOWED_HZ
+        t_s = np.arange(round(task.limit_s * _PATH_RATE_HZ) + 1) / _PATH_RATE_HZ
         error_m = _AIM_ERROR * task.radius_m
         path_m = _target_path(task, t_s)
         path_m += (
-            np.array([error_m * _draw_between(draw, -1, 1) for _ in range(3)]) * np.minimum(t_s, 1.0)[:, np.newaxis]
+            np.array([error_m * _draw_uniform(draw, -1, 1) for _ in range(3)]) * np.minimum(t_s, 1.0)[:, np.newaxis]
         )
         device.follow(t_s, path_m)
 
@@ -280,8 +282,8 @@ class Hand(Protocol):
 
 def hand_behaviour(task: Task, device: HandOrders, draw: Draw, now_s: float) -> Hand:
     """Return the behaviour for a task with a simulated hand, from ``now_s`` on [s]."""
-    made: Hand = resolve_name(task.hand)(task, device, draw, now_s)
-    return made
+    behaviour: Hand = resolve_name(task.hand)(task, device, draw, now_s)
+    return behaviour
 
 
 def _target_path(task: Task, times_s: Floats) -> Floats:
@@ -292,7 +294,7 @@ def _target_path(task: Task, times_s: Floats) -> Floats:
 def rest_hand(task: Task, device: HandOrders) -> None:
     """Move a simulated hand after a task to the start of the next interval: a fixed position, or the middle.
 
-    If it stayed, it would jump there when the next trial begins, which causes forces that a person would not feel.
+    Otherwise the hand would jump there when the next trial begins, with forces that a person would not feel.
     """
     if task.start_m is not None:
         device.reach_to(*task.start_m)
@@ -311,8 +313,8 @@ class Choice:
 
 def fill_in_page(page: QuestionnairePage, features: TrialFeatures, person: Rater, draw: Draw) -> list[Choice]:
     """Return the choices that answer a page, from the features of the trial."""
-    judged = judgements([item.id for item in page.items], features, person, draw)
-    answers = {item.id: item.simulated(judged[item.id], draw) for item in page.items}
+    judgement_by_item = judgements([item.id for item in page.items], features, person, draw)
+    answers = {item.id: item.simulated(judgement_by_item[item.id], draw) for item in page.items}
     visible = shown_questions(page.items, answers)
     return answer_choices([item for item in page.items if item.id in visible], answers, draw)
 
@@ -320,14 +322,14 @@ def fill_in_page(page: QuestionnairePage, features: TrialFeatures, person: Rater
 def answer_choices(
     items: Iterable[ItemView], answers: Mapping[str, Value], draw: Draw, *, changes_mind: bool = True
 ) -> list[Choice]:
-    """Return the choices that give ``answers`` in order, sometimes with a neighbouring value first."""
-    given: list[Choice] = []
+    """Return the choices that lead to ``answers``, in order; some first choose a neighbouring value."""
+    choices: list[Choice] = []
     for item in items:
         value = answers[item.id]
-        if changes_mind and draw() < _CHANGES_MIND and (nearby := item.nearby(value)) != value:
-            given.append(Choice(item.id, nearby, _draw_between(draw, *ANSWER_S)))
-        given.append(Choice(item.id, value, _draw_between(draw, *ANSWER_S)))
-    return given
+        if changes_mind and draw() < _REVISION_PROBABILITY and (first_value := item.nearby(value)) != value:
+            choices.append(Choice(item.id, first_value, _draw_uniform(draw, *ANSWER_S)))
+        choices.append(Choice(item.id, value, _draw_uniform(draw, *ANSWER_S)))
+    return choices
 
 
 def newly_shown_questions(
@@ -348,7 +350,7 @@ def _norm(vectors: Any) -> Any:
 class ProgrammedBall:
     """A ball that repeats a path of ``duration_s`` [s] through a task in a tank of these full sizes [m].
 
-    With ``hidden_after_lead`` it is not drawn once the task's lead is over; ``seed`` is that of an exploration.
+    With ``hidden_after_lead`` it is not drawn once the task's lead-in is over; ``seed`` is used for an exploration.
     """
 
     def __init__(
@@ -369,8 +371,8 @@ class ProgrammedBall:
         """Return the view of the tank ``elapsed_s`` after the ball began to move [s]."""
         now_ns = round(elapsed_s % self.duration_s * 1e9)
         position_m = np.array([np.interp(now_ns, self._times_ns, axis) for axis in self._positions_m.T])
-        shown = self._tracker.at(now_ns)
-        return TankView(position_m, shown, now_ns, self._hides and shown.elapsed_s >= self._task.judged_from_s)
+        task_view = self._tracker.at(now_ns)
+        return TankView(position_m, task_view, now_ns, self._hides and task_view.elapsed_s >= self._task.judged_from_s)
 
 
 def task_path(
@@ -378,23 +380,23 @@ def task_path(
 ) -> tuple[Floats, Floats]:
     """Return times (n,) [s] and positions (n, 3) [m, hand frame] of a path of about ``duration_s``."""
     if isinstance(task, Reach):
-        return _reaches(task, duration_s)
+        return _reaching_path(task, duration_s)
     if task.paced:
         times_s = np.arange(0.0, duration_s, 1 / RATE_HZ)
         return times_s, _target_path(task, times_s)
     x, y, z = (size / 2 for size in workspace_m)
     times_s, positions_m = exploration(stream(seed, "preview/hand").random, (x, y, z), duration_s)
-    kept = times_s <= duration_s
-    return times_s[kept], positions_m[kept]
+    in_time = times_s <= duration_s
+    return times_s[in_time], positions_m[in_time]
 
 
-def _reaches(task: Reach, duration_s: float) -> tuple[Floats, Floats]:
+def _reaching_path(task: Reach, duration_s: float) -> tuple[Floats, Floats]:
     """Return minimum-jerk movements from target to target (Flash & Hogan 1985), with a stay at each."""
-    each_s = _MOVE_S + task.dwell_s + _STAY_S
-    count = max(1, min(int(duration_s / each_s), task.count or int(duration_s / each_s)))
-    ends_m = np.array([(0.0, 0.0, 0.0), *(task.targets_m[at % len(task.targets_m)] for at in range(count))])
-    times_s = np.arange(0.0, min(count * each_s, duration_s), 1 / RATE_HZ)
-    at = np.minimum((times_s / each_s).astype(int), count - 1)
-    share = np.clip((times_s - at * each_s) / _MOVE_S, 0.0, 1.0)
-    way = share**3 * (10 - 15 * share + 6 * share**2)
-    return times_s, ends_m[at] + way[:, None] * (ends_m[at + 1] - ends_m[at])
+    leg_s = _MOVE_S + task.dwell_s + _STAY_S
+    leg_count = max(1, min(int(duration_s / leg_s), task.count or int(duration_s / leg_s)))
+    ends_m = np.array([(0.0, 0.0, 0.0), *(task.targets_m[leg % len(task.targets_m)] for leg in range(leg_count))])
+    times_s = np.arange(0.0, min(leg_count * leg_s, duration_s), 1 / RATE_HZ)
+    leg = np.minimum((times_s / leg_s).astype(int), leg_count - 1)
+    progress = np.clip((times_s - leg * leg_s) / _MOVE_S, 0.0, 1.0)
+    fraction = progress**3 * (10 - 15 * progress + 6 * progress**2)
+    return times_s, ends_m[leg] + fraction[:, None] * (ends_m[leg + 1] - ends_m[leg])

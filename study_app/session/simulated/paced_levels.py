@@ -1,7 +1,7 @@
-"""Levels of liquids with inertia in the motion of a target that is followed: whether the safety layer delivers them.
+"""Check whether the safety layer can deliver the levels of liquids with inertia while the hand follows a target.
 
-Added mass and history return energy to the hand, which the safety layer permits in part: no force of a uniform motion
-tells how much.
+Added mass and history return energy to the hand, which the safety layer permits only in part. How much it permits
+depends on the motion, so that the motion of the target is simulated.
 """
 
 from collections.abc import Iterator
@@ -23,26 +23,26 @@ _INERTIAL = {effect.name for effect in EFFECTS if effect.damping_nspm is not Non
 def undelivered_levels(protocol: Protocol) -> Iterator[str]:
     """Yield a sentence for each stimulus whose lowest or highest level would never be delivered."""
     for block in protocol.blocks.values():
-        task, where = protocol.tasks[block.task], f"stimuli.{block.stimulus}.levels"
+        task, key = protocol.tasks[block.task], f"stimuli.{block.stimulus}.levels"
         if block.stimulus is None or not isinstance(task, Follow):
             continue
         stimulus = protocol.stimulus_of(block)
         if stimulus.vary in OF_CONDITION:
             continue
-        t_s = np.arange(round(task.limit_s * protocol.device.rate_hz)) / protocol.device.rate_hz
-        hand_m, missed = np.array([task.target_m(time_s) for time_s in t_s.tolist()]), list[str]()
+        times_s = np.arange(round(task.limit_s * protocol.device.rate_hz)) / protocol.device.rate_hz
+        hand_m, missed = np.array([task.target_m(time_s) for time_s in times_s.tolist()]), list[str]()
         for standard, level, scene in extreme_levels(protocol, block):
             if not any(_INERTIAL & set(liquid.effects) for liquid in resolve(scene).liquids):
                 continue
             presented = Stimulated(protocol.condition_of(stimulus), stimulus.vary, stimulus.comparison(standard, level))
-            samples = judged_fields(samples_along(scene, Motion(t_s, scene.origin_m + scene.scale * hand_m)))
-            samples["time_ns"], samples["position_m"] = np.rint(1e9 * t_s), hand_m
+            samples = judged_fields(samples_along(scene, Motion(times_s, scene.origin_m + scene.scale * hand_m)))
+            samples["time_ns"], samples["position_m"] = np.rint(1e9 * times_s), hand_m
             delivery = delivered_values(protocol, presented, task, samples)
             if "level_error_percent" in broken_interval_limits(protocol.limits, presented, task, delivery):
                 missed.append(f"{level:.3g}")
         if missed:
             yield (
-                f"{where}: level{'s' * (len(missed) > 1)} {' and '.join(missed)} cannot be rendered if the hand "
+                f"{key}: level{'s' * (len(missed) > 1)} {' and '.join(missed)} cannot be rendered if the hand "
                 "follows the target, because the safety layer removes energy that the liquid returns. Trials at these "
                 "levels would be repeated and never answered. Choose a smaller scene.scale, or effects "
                 "without added_mass, history and unsteady_drag"

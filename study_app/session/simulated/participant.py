@@ -1,6 +1,6 @@
-"""The behaviour of every simulated participant on a page of questions: notice, answer, and confirm.
+"""The behaviour of all simulated participants on a page of questions: notice, answer and confirm.
 
-Settings are adjusted until the strength equals the remembered one, as it is taken.
+In an adjustment they change the level until its perceived strength crosses that of the remembered standard.
 """
 
 from __future__ import annotations
@@ -21,43 +21,43 @@ from study_app.session.simulated.observers import Choice, Draw, answer_choices, 
 from study_app.session.transitions.events import Chosen, Event, ItemShown, Submitted
 
 LOOK_AT_SETTING_S: Final = 0.5
-"""Time that the observer judges a level before the next steps [s]: half a swing of a target at 1 Hz."""
-_FAST: Final = 4
+"""Time for which the observer judges a level before the next steps [s]: half a swing of a target at 1 Hz."""
+_COARSE_STEPS: Final = 4
 """Size of the first steps, until the remembered strength is crossed. [choice]"""
-_MOST_LOOKS: Final = 60
-"""Number of judgements after which the observer stops: the remembered strength may lie beyond the levels."""
+_MAX_JUDGEMENTS: Final = 60
+"""Number of judgements after which the observer stops, since the remembered strength may lie beyond the levels."""
 
 
 class AdjustingObserver:
-    """An observer that perceives standard and adjusted level with noise and adjusts until the two cross.
+    """An observer that perceives standard and adjusted level with noise, and adjusts the level until they cross.
 
-    The noise of a setting is drawn once, so that settings vary like the difference of two single percepts.
+    The noise is drawn once per setting, so that settings vary like the difference between two single percepts.
     """
 
     def __init__(self, attended: Comparison, draw: Draw) -> None:
         self._attended = attended
         self._remembered_noise, self._noise = (attended.noisy(self._neutral, draw) for _ in range(2))
-        self._hop = _FAST
-        self._way = 0
-        self._looks = 0
+        self._step_size = _COARSE_STEPS
+        self._direction = 0
+        self._judgements = 0
 
     def steps(self, sensed: float, standard: float) -> int:
         """Return the next steps for a sensed level, 0 if the setting is done; ``standard`` is the sensed standard.
 
         Both are those of `Comparison.sensed`.
         """
-        self._looks += 1
-        short = self._perceived_magnitude(standard, self._remembered_noise) - self._perceived_magnitude(
+        self._judgements += 1
+        shortfall = self._perceived_magnitude(standard, self._remembered_noise) - self._perceived_magnitude(
             sensed, self._noise
         )
-        way = 1 if short > 0 else -1
-        crossed = self._way not in {0, way}
-        if short == 0 or self._looks > _MOST_LOOKS or (crossed and self._hop == 1):
+        direction = 1 if shortfall > 0 else -1
+        crossed = self._direction not in {0, direction}
+        if shortfall == 0 or self._judgements > _MAX_JUDGEMENTS or (crossed and self._step_size == 1):
             return 0
         if crossed:
-            self._hop = 1
-        self._way = way
-        return way * self._hop
+            self._step_size = 1
+        self._direction = direction
+        return direction * self._step_size
 
     @property
     def _neutral(self) -> float:
@@ -78,14 +78,16 @@ class SimulatedParticipant(ABC):
     ) -> None:
         self.page: Page | None = None
         self._study = study
-        self._seed, self._who = schedule.seed, schedule.participant
+        self._seed, self._participant = schedule.seed, schedule.participant
         self._trials = {trial.number: trial for trial in schedule.trials}
-        own = f"rehearsal/{self._who}"
-        self._streams = own if session == 1 else f"{own}/session {session}"
-        self.observer = observer or observer_of(stream(self._seed, f"{own}/observer").random)
-        self._person = rater(stream(self._seed, f"{own}/person").random, study.simulated_participants or REHEARSED)
+        stream_prefix = f"rehearsal/{self._participant}"
+        self._streams = stream_prefix if session == 1 else f"{stream_prefix}/session {session}"
+        self.observer = observer or observer_of(stream(self._seed, f"{stream_prefix}/observer").random)
+        self._person = rater(
+            stream(self._seed, f"{stream_prefix}/person").random, study.simulated_participants or REHEARSED
+        )
         self._courses = courses_of(schedule)
-        self._said: dict[int, str | int | float] = {}
+        self._answers: dict[int, str | int | float] = {}
 
     @abstractmethod
     def _seconds(self) -> float:
@@ -121,10 +123,12 @@ class SimulatedParticipant(ABC):
     def _reference_magnitude(self, trial: int, sensed: float) -> float:
         """Return the reference of a setting: the interval before, else the mean of earlier settings, else itself."""
         block = self._study.blocks[self._trials[trial].block]
-        known = self._sensed_magnitudes(block)
+        sensed_by_trial = self._sensed_magnitudes(block)
         if self._study.design_of(block).intervals > 1:
-            return known[trial][0]
-        earlier = [magnitude for number in sorted(known) if number < trial for magnitude in known[number]]
+            return sensed_by_trial[trial][0]
+        earlier = [
+            magnitude for number in sorted(sensed_by_trial) if number < trial for magnitude in sensed_by_trial[number]
+        ]
         return sum(earlier) / len(earlier) if earlier else sensed
 
     def _fill_in(self, page: QuestionnairePage | DesignPage) -> None:
@@ -147,11 +151,11 @@ class SimulatedParticipant(ABC):
         draw, trial = self._stream(page.stream), page.trial
         block = None if trial is None else self._study.blocks[self._trials[trial].block]
         if trial is not None and block is not None and block.design is not None:
-            given = self._design_answer(block, trial, draw)
-            if isinstance(given, float):
-                given = plain_number(max(0.01, round(given, 2)))
+            answer = self._design_answer(block, trial, draw)
+            if isinstance(answer, float):
+                answer = plain_number(max(0.01, round(answer, 2)))
             return answer_choices(
-                page.items, {page.items[0].id: given}, draw, changes_mind=not isinstance(page, ChoicePage)
+                page.items, {page.items[0].id: answer}, draw, changes_mind=not isinstance(page, ChoicePage)
             )
         assert isinstance(page, QuestionnairePage)  # noqa: S101 - only designs have other pages
         return fill_in_page(page, self._perceived_features(trial), self._person, draw)
@@ -161,16 +165,16 @@ class SimulatedParticipant(ABC):
         sensed, design = self._sensed_magnitudes(block), self._study.design_of(block)
         before: list[float] = []
         last: str | int | float | None = None
-        for number in sorted(known for known in sensed if known <= trial):
-            answered = len(sensed[number]) == design.intervals  # else it was given up after its last attempt
-            if number == trial or (answered and number not in self._said):
+        for number in sorted(other for other in sensed if other <= trial):
+            answered = len(sensed[number]) == design.intervals  # otherwise its last attempt was not delivered either
+            if number == trial or (answered and number not in self._answers):
                 source = draw if number == trial else self._stream(f"{number}/answers")
                 course = Course(self._courses[number], last)
                 attended = self._comparison_of(number)
-                self._said[number] = attended.answer(self._study, design, sensed[number], before, source, course)
-            last = self._said.get(number, last)
+                self._answers[number] = attended.answer(self._study, design, sensed[number], before, source, course)
+            last = self._answers.get(number, last)
             before += sensed[number]
-        return self._said[trial]
+        return self._answers[trial]
 
     def _notice_questions(
         self, page: QuestionnairePage | DesignPage, answers: Mapping[str, Value], seen: Collection[str]

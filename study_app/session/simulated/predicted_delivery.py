@@ -1,8 +1,8 @@
-"""How many trials would not be delivered because the safety layer withholds too much force, predicted for a delay.
+"""Predict, for a device's delay, how many trials are lost because the safety layer withholds too much force.
 
-A simulated participant does each task `_MOTIONS` times in what a trial or an interval presents. A trial of intervals is
-missing if each of its presentations has an interval in which more is withheld than `limits.withheld_percent`; another
-trial is out of limits.
+A simulated participant performs the task of each scene `_MOTIONS` times. A trial of intervals is lost (missing) if
+every presentation has an interval in which more than `limits.withheld_percent` of the force is withheld. Another trial
+violates the limits if that happens in its only presentation.
 """
 
 from collections.abc import Iterator, Mapping
@@ -26,40 +26,40 @@ from study_app.session.preflight import PredictedDelivery
 from study_app.session.simulated.observers import task_path
 
 _MOTIONS: Final = 5
-_LONGEST_S: Final = 4.0
+_MAX_TASK_S: Final = 4.0
 """Longest simulated part of a task [s]."""
 _REST_S: Final = 1.0
 """Time without force between two motions, in which the hand moves to the next start [s]."""
-_READ_S: Final = 0.5
+_CHUNK_S: Final = 0.5
 
 
 def predicted_delivery(protocol: Protocol, delay_ticks: int) -> PredictedDelivery:
     """Predict the main trials that a simulated participant would lose on a device with this delay [ticks].
 
-    If sessions differ, for example between groups, the prediction is for the one that loses most trials.
+    If sessions differ, for example between groups, the prediction is that of the session which loses most trials.
     """
     with _late_rig(protocol, delay_ticks) as rig:
         failing = _FailingScenes(protocol, rig)
-        shares = {block.id: _lost_share(protocol, block, failing) for block in protocol.main_blocks}
+        shares = {block.id: _lost_fraction(protocol, block, failing) for block in protocol.main_blocks}
     return max(
-        (_in_session(variant.protocol, shares) for variant in variants(protocol)),
+        (_predict_session(variant.protocol, shares) for variant in variants(protocol)),
         key=lambda prediction: (prediction.missing, prediction.out),
     )
 
 
-def _in_session(protocol: Protocol, shares: Mapping[str, float]) -> PredictedDelivery:
+def _predict_session(protocol: Protocol, shares: Mapping[str, float]) -> PredictedDelivery:
     """Return the predicted loss of one kind of session; ``shares`` has the lost fraction of each main block."""
-    counts: dict[bool, float] = {True: 0.0, False: 0.0}
+    lost: dict[bool, float] = {True: 0.0, False: 0.0}
     trials: dict[bool, int] = {True: 0, False: 0}
     for block in orders_of(protocol).blocks:
         if block.id in shares:
             has_intervals = protocol.blocks[block.id].design is not None
-            counts[has_intervals] += block.trials * shares[block.id]
+            lost[has_intervals] += block.trials * shares[block.id]
             trials[has_intervals] += block.trials
     return PredictedDelivery(
-        missing=round(counts[True]),
+        missing=round(lost[True]),
         asked=trials[True],
-        out=round(counts[False]),
+        out=round(lost[False]),
         judged=trials[False],
         limit_percent=protocol.limits.withheld_percent,
     )
@@ -94,19 +94,19 @@ def _withheld_shares(
     assert hand is not None  # noqa: S101 - a scripted device has one
     reader, shares = servo.telemetry.reader(), list[float]()
     for seed in range(_MOTIONS):
-        path_s, path_m = task_path(task, workspace_m, min(task.expected_s, _LONGEST_S), seed)
+        path_s, path_m = task_path(task, workspace_m, min(task.expected_s, _MAX_TASK_S), seed)
         hand.reach_to(*path_m[0].tolist())
         servo.advance(round(_REST_S * servo.rate_hz))
         serial = servo.load(scene)
         hand.follow(path_s, path_m)
         reader.read()
         permitted_n = withheld_n = 0.0
-        for _ in range(round(path_s[-1] / _READ_S)):
-            servo.advance(round(_READ_S * servo.rate_hz))
+        for _ in range(round(path_s[-1] / _CHUNK_S)):
+            servo.advance(round(_CHUNK_S * servo.rate_hz))
             samples = reader.read()
-            felt = samples[samples["scene"] == serial]
-            permitted_n += float(felt["permitted_n"].sum())
-            withheld_n += float(felt["withheld_n"].sum())
+            in_liquid = samples[samples["scene"] == serial]
+            permitted_n += float(in_liquid["permitted_n"].sum())
+            withheld_n += float(in_liquid["withheld_n"].sum())
         servo.rest()
         shares.append(withheld_n / permitted_n if permitted_n > 0.0 else 0.0)
     return tuple(shares)
@@ -121,15 +121,15 @@ class _FailingScenes:
 
     def share(self, scene: Scene, task: str) -> float:
         """Return the fraction of a task's motions in which more force is withheld than the limit permits."""
-        if (known := self._known.get((scene, task))) is not None:
-            return known
+        if (cached := self._known.get((scene, task))) is not None:
+            return cached
         protocol, limit = self._protocol, self._protocol.limits.withheld_percent / 100
         shares = _withheld_shares(self._rig, scene, protocol.tasks[task], protocol.device.workspace_m)
         self._known[scene, task] = mean(share > limit for share in shares)
         return self._known[scene, task]
 
 
-def _lost_share(protocol: Protocol, block: Block, scenes: _FailingScenes) -> float:
+def _lost_fraction(protocol: Protocol, block: Block, scenes: _FailingScenes) -> float:
     """Return the probability that a trial of a block is missing or, without intervals, violates limits."""
 
     def failing(scene: Scene) -> float:
@@ -141,18 +141,19 @@ def _lost_share(protocol: Protocol, block: Block, scenes: _FailingScenes) -> flo
 
     def missing(standard: float, comparison: float) -> float:
         delivered = [
-            prod(1 - (comparison if held else standard) for held in arrangement) for arrangement in design.arrangements
+            prod(1 - (comparison if is_comparison else standard) for is_comparison in arrangement)
+            for arrangement in design.arrangements
         ]
         return mean((1 - share) ** attempts for share in delivered)
 
     if block.standard is None:
-        return mean(missing(0.0, failing(scene)) for scene in _scenes(protocol, block))
+        return mean(missing(0.0, failing(scene)) for scene in _extreme_scenes(protocol, block))
     standard = failing(protocol.scene_for(block.standard))
     others = (protocol.scene_for(name) for name in block.conditions if name != block.standard)
     return mean(missing(standard, failing(scene)) for scene in others)
 
 
-def _scenes(protocol: Protocol, block: Block) -> Iterator[Scene]:
+def _extreme_scenes(protocol: Protocol, block: Block) -> Iterator[Scene]:
     """Yield the scenes of the strongest and weakest level of each standard; for delays, that of the condition."""
     scenes = [scene for _, _, scene in extreme_levels(protocol, block)]
     yield from scenes or map(protocol.scene_for, protocol.conditions_in(block.id))

@@ -1,14 +1,14 @@
-"""Whole sessions with simulated participants, faster than real time, through everything a real one goes through.
+"""Whole sessions with simulated participants, faster than real time, with the same code as real sessions.
 
 The transitions, the runner, the servo's compiled loop, the store and the checks of every questionnaire are the same;
 only the device, the clock, the screen and the participant are simulated. Time is the servo's virtual clock, so that the
-same call into another folder gives the same tables but for wall-clock times. Every row says that it is simulated.
+same call with another folder gives the same tables except for wall-clock times. Every row is marked as simulated.
 
-What a participant does and answers in a trial is drawn from streams of that trial. A rehearsal that was killed and
-resumed answers as one that was not: from what is felt in the whole session, which is computed again for that. What each
-condition feels like is rehearsed in a few whole sessions that are kept nowhere: the force of an even motion could be
-had by arithmetic alone, but opinions rest on the wake's push, on how rough a force is and how late the picture was,
-too.
+The actions and answers of a participant in a trial are drawn from random streams of that trial. A rehearsal that was
+killed and resumed has the same answers as an uninterrupted one, because the percepts of the whole session are computed
+again. The percepts of each condition come from a few whole sessions that are not stored. A formula for the force of a
+steady motion would not suffice, since answers also depend on the push of the wake, the roughness of the force and the
+delay of the image.
 """
 
 import itertools
@@ -89,8 +89,8 @@ from study_app.store.tables import check_study
 from study_app.store.withdrawals import tombstones
 from study_app.workspace import workspace
 
-_LOOK_S = 0.05  # interval between polls of the device during a task [s]
-_IDLE_S = 0.5  # the same while reading and answering [s]
+_TASK_POLL_S = 0.05  # interval between polls of the device during a task [s]
+_IDLE_POLL_S = 0.5  # the same while reading and answering [s]
 _FRAME_S = 1 / 60
 _PAINT_S = (0.002, 0.006)  # time from reading the clock to the frame on the screen
 Where: TypeAlias = tuple[str, str]
@@ -103,9 +103,9 @@ REHEARSED_PEOPLE: Final = 4
 
 @dataclass(frozen=True, slots=True)
 class Question:
-    """The page of a question, and the features of each interval of its trial; empty for a separate form.
+    """The page of a question, and the features felt in each interval of its trial; empty for a separate form.
 
-    For an adjustment the page is its task, and the last features are those of the current level since the last steps.
+    For an adjustment it is the page of the task, and the last features are those felt since the last steps.
     """
 
     page: QuestionnairePage | DesignPage | TaskPage
@@ -113,9 +113,9 @@ class Question:
 
 
 Answer: TypeAlias = Callable[[Question], Value | Mapping[str, Value] | None]
-"""An observer: returns the answer, those by item id, or None for those of the simulated participant.
+"""An observer: return the answer, or the answers by item id, or None to let the simulated participant answer.
 
-Where a level is set, the answer is by how many steps, above 0 towards more; 0 confirms it.
+In an adjustment the answer is the number of steps, positive towards more; 0 confirms the level.
 """
 
 
@@ -129,18 +129,20 @@ def _plain_answer(value: Any) -> Any:
 class _HeldSignals:
     """Hold back signals that end the program, such as Ctrl+C, until `obey`, which a session calls between its writes.
 
-    An exception during a write could leave a line that the journal does not count. A second signal ends the program at
-    once. Only the main thread receives signals; in other threads this has no effect.
+    Without this, an exception during a write could leave a line that the journal does not count. A second signal ends
+    the program at once. Only the main thread receives signals, so this has no effect in other threads.
     """
 
     def __init__(self) -> None:
         self._before: dict[int, Any] = {}
-        self._came: int | None = None
+        self._pending: int | None = None
 
     def __enter__(self) -> Self:
         if threading.current_thread() is threading.main_thread():
             handlers = {number: signal.getsignal(number) for number in ENDING_SIGNALS}
-            self._before = {number: it for number, it in handlers.items() if it not in {signal.SIG_IGN, None}}
+            self._before = {
+                number: handler for number, handler in handlers.items() if handler not in {signal.SIG_IGN, None}
+            }
             for number in self._before:
                 signal.signal(number, self._hold)
         return self
@@ -152,16 +154,16 @@ class _HeldSignals:
 
     def obey(self) -> None:
         """Act on a signal that was held back."""
-        if self._came is None:
+        if self._pending is None:
             return
-        number, self._came = self._came, None
+        number, self._pending = self._pending, None
         handler = self._before[number]
         if callable(handler):
             handler(number, None)
         raise SystemExit(128 + number)
 
     def _hold(self, number: int, _frame: object) -> None:
-        self._came = number
+        self._pending = number
         self._restore()
 
     def _restore(self) -> None:
@@ -192,12 +194,12 @@ class _DiscardingStore:
         """Keep nothing."""
 
 
-def rehearsal_rig(study: Protocol, person: str, seed: int, device: str) -> Rig:
+def rehearsal_rig(study: Protocol, participant: str, seed: int, device: str) -> Rig:
     """Return a device with a simulated hand, and its servo on a virtual clock that only the servo advances."""
     if not descriptor_of(device).moves_by_itself:
-        alone = " or ".join(device.name for device in all_devices() if device.moves_by_itself)
-        raise SessionError(f"device '{device}' needs a person to move it: rehearse with {alone}")
-    settings = study_settings(study, stream(seed, f"rehearsal/{person}/hand"))
+        devices = " or ".join(device.name for device in all_devices() if device.moves_by_itself)
+        raise SessionError(f"device '{device}' needs a person to move it: rehearse with {devices}")
+    settings = study_settings(study, stream(seed, f"rehearsal/{participant}/hand"))
     rig = open_rig(device, settings, clock=VirtualClock())
     if hand_of(rig.device) is None:
         rig.stop()
@@ -240,14 +242,14 @@ class RehearsedSession(SimulatedParticipant):
         self._answer = answer
         self.signals = _HeldSignals()
         self._known = known or {}
-        self._tell_features = features
+        self._on_features = features
         self.rig = rig
         hand = hand_of(rig.device)
         assert hand is not None  # noqa: S101 - checked by `rehearsal_rig`
         self._hand = hand
         self._now_s = store.clock.seconds
         self._features_of: dict[int, tuple[TrialFeatures, ...]] = {}
-        self._touch = rig.servo.telemetry.reader()
+        self._reader = rig.servo.telemetry.reader()
         self._next_frame_ns = 0
         self._period_s = 1 / study.device.rate_hz if study.has_imperfect_link else None
         self._paint: Draw = self._stream("screen")
@@ -266,7 +268,7 @@ class RehearsedSession(SimulatedParticipant):
         self._end_if_stalled()
 
     def _end_if_stalled(self) -> None:
-        """Raise an error if the session stalled: a person would wait for the disk, a rehearsal ends."""
+        """Raise an error if the session stalled, since nobody waits for the disk in a rehearsal."""
         if self._runner.stalled is not None:
             raise StoreError(self._runner.stalled)
 
@@ -276,29 +278,29 @@ class RehearsedSession(SimulatedParticipant):
             pass
 
     def pages(self) -> Iterator[Page]:
-        """Yield each page when it is shown, and respond to it when the next page is requested."""
+        """Yield each page when it is shown; respond to it when the caller requests the next one."""
         self._post(Begin(self._now_s()))
         if isinstance(self.page, PausePage):  # before the first trial of a resumed session
             self._post(ResumeRequested(self._now_s(), "participant"))
-        told: Page | None = None
+        yielded: Page | None = None
         while not self._runner.finished:
-            if self.page is not None and self.page is not told:
-                told = self.page
-                yield told
+            if self.page is not None and self.page is not yielded:
+                yielded = self.page
+                yield yielded
             match self.page:
                 case TextPage() as page:
                     self._wait(reading_s(page))
                     if page is self.page:
                         self._post(Continue(self._now_s()))
                 case FeedbackPage() | TaskPage(interval=Interval(resting=True)):
-                    self._wait(_LOOK_S)
+                    self._wait(_TASK_POLL_S)
                 case TaskPage() as page:
                     self._perform_task(page)
                 case QuestionnairePage() | DesignPage() as page:
                     self._fill_in(page)
                 case _:
-                    why = self.rig.servo.fault or self._runner.cause or self._runner.stalled or self.page
-                    raise SessionError(f"the rehearsal failed: {why}")
+                    reason = self.rig.servo.fault or self._runner.cause or self._runner.stalled or self.page
+                    raise SessionError(f"the rehearsal failed: {reason}")
 
     def _present(self, page: Page) -> None:
         self.page = page
@@ -308,7 +310,7 @@ class RehearsedSession(SimulatedParticipant):
         end_s = self._now_s() + seconds
         page = self.page
         while self._now_s() < end_s and page is self.page:
-            self._advance(min(_IDLE_S, end_s - self._now_s()))
+            self._advance(min(_IDLE_POLL_S, end_s - self._now_s()))
             self._poll()
 
     def _advance(self, seconds: float) -> None:
@@ -321,31 +323,31 @@ class RehearsedSession(SimulatedParticipant):
     def _perform_task(self, page: TaskPage) -> None:
         """Perform a task until its page is left, observing every frame and every tick."""
         interval = page.interval
-        named = str(page.trial) if interval is None else f"{page.trial}/{interval.number}"
-        arm, draw = self._hand, self._stream(f"{named}/behaviour")
-        self._paint = self._stream(f"{named}/screen")
+        stream_name = str(page.trial) if interval is None else f"{page.trial}/{interval.number}"
+        hand, draw = self._hand, self._stream(f"{stream_name}/behaviour")
+        self._paint = self._stream(f"{stream_name}/screen")
         senses = SensedTrial(scale=self._study.scene.scale, period_s=self._period_s)
-        self._touch.read()
+        self._reader.read()
         self._next_frame_ns = self.rig.servo.now_ns()
-        hand = hand_behaviour(page.task, arm, draw, self._now_s())
+        behaviour = hand_behaviour(page.task, hand, draw, self._now_s())
         setting = _Setting(self._adjusting_observer(page.trial), self._study.scene.scale) if page.adjusts else None
         self.look(senses)  # the first frame, which begins the trial, is painted at once
         while page is self.page:
-            self._advance(_LOOK_S)
+            self._advance(_TASK_POLL_S)
             view = self.look(senses)
-            wants_to_go_on = view is not None and hand.act(self._now_s(), view)
-            samples = np.asarray(self._touch.read())
+            continues = view is not None and behaviour.act(self._now_s(), view)
+            samples = np.asarray(self._reader.read())
             senses.feel(samples)
             self._poll()
             if setting is not None and view is not None and page is self.page:
                 self._adjust_level(page, setting, view, samples)
-            if wants_to_go_on and page is self.page:
+            if continues and page is self.page:
                 self._post(Continue(self._now_s()))
-        rest_hand(page.task, arm)
+        rest_hand(page.task, hand)
         earlier = () if interval is None or interval.number == 1 else self._features_of.get(page.trial, ())
         self._features_of[page.trial] = (*earlier, senses.features())
-        if self._tell_features is not None:
-            self._tell_features(page.trial, self._features_of[page.trial])
+        if self._on_features is not None:
+            self._on_features(page.trial, self._features_of[page.trial])
 
     def _adjust_level(self, page: TaskPage, setting: _Setting, view: TankView, samples: Any) -> None:
         """Make the next steps of a setting from the magnitudes sensed since the last ones, or confirm it."""
@@ -365,18 +367,18 @@ class RehearsedSession(SimulatedParticipant):
             self._post(Submitted(self._now_s()))
 
     def _steps(self, page: TaskPage, setting: _Setting) -> int:
-        """Return the next steps of a setting, 0 if it is done."""
-        now = setting.senses.features()
+        """Return the next steps of a setting, or 0 if it is done."""
+        current = setting.senses.features()
         earlier = self._features_of.get(page.trial, ()) if page.interval and page.interval.number > 1 else ()
-        given = None if self._answer is None else self._answer(Question(page, (*earlier, now)))
-        if given is None:
-            sensed = self._comparison_of(page.trial).sensed(now)
+        answer = None if self._answer is None else self._answer(Question(page, (*earlier, current)))
+        if answer is None:
+            sensed = self._comparison_of(page.trial).sensed(current)
             return setting.observer.steps(sensed, self._reference_magnitude(page.trial, sensed))
         try:
-            return operator.index(given)  # type: ignore[arg-type]  # of numpy, too
+            return operator.index(answer)  # type: ignore[arg-type]  # also for numpy integers
         except TypeError:
             raise SessionError(
-                f"{given!r} is not a valid number of steps: specify a whole number, or 0 to leave the level unchanged"
+                f"{answer!r} is not a valid number of steps: specify a whole number, or 0 to leave the level unchanged"
             ) from None
 
     def look(self, senses: SensedTrial) -> TankView | None:
@@ -394,11 +396,11 @@ class RehearsedSession(SimulatedParticipant):
 
     def _answers_to(self, page: QuestionnairePage | DesignPage) -> list[Choice]:
         felt = () if page.trial is None else {**self._known, **self._features_of}[page.trial]
-        given = None if self._answer is None else self._answer(Question(page, felt))
-        if given is None:
+        answer = None if self._answer is None else self._answer(Question(page, felt))
+        if answer is None:
             return super()._answers_to(page)
-        named = given if isinstance(given, Mapping) else {page.items[0].id: given}
-        answers = {item: _plain_answer(value) for item, value in named.items()}
+        answer_by_item = answer if isinstance(answer, Mapping) else {page.items[0].id: answer}
+        answers = {item: _plain_answer(value) for item, value in answer_by_item.items()}
         if unknown := answers.keys() - {item.id for item in page.items}:
             possible = ", ".join(item.id for item in page.items)
             raise SessionError(
@@ -414,10 +416,10 @@ class RehearsedSession(SimulatedParticipant):
 
     def _sensed_magnitudes(self, block: Block) -> Mapping[int, Sequence[float]]:
         sensed = Comparison.of(self._study, block, self.observer).sensed
-        of_trials = {**self._features_of, **self._known}
+        features_by_trial = {**self._features_of, **self._known}
         return {
             number: [*map(sensed, features)]
-            for number, features in of_trials.items()
+            for number, features in features_by_trial.items()
             if self._trials[number].block == block.id
         }
 
@@ -438,18 +440,18 @@ def condition_features(
     key = LevelKey(codes, b"what each condition feels like")
     by_condition: dict[Where, list[TrialFeatures]] = {}
     for number in range(1, people + 1):
-        person = f"P{number:03d}"
-        schedule = build_schedule(protocol, person, seed)
-        places = {trial.number: _presented_conditions(protocol, key, schedule, trial) for trial in schedule.trials}
+        participant = f"P{number:03d}"
+        schedule = build_schedule(protocol, participant, seed)
+        presented = {trial.number: _presented_conditions(protocol, key, schedule, trial) for trial in schedule.trials}
 
-        def feel(
-            trial: int, features: tuple[TrialFeatures, ...], places: Mapping[int, tuple[Where, ...]] = places
+        def add_features(
+            trial: int, features: tuple[TrialFeatures, ...], presented: Mapping[int, tuple[Where, ...]] = presented
         ) -> None:
-            by_condition.setdefault(places[trial][len(features) - 1], []).append(features[-1])
+            by_condition.setdefault(presented[trial][len(features) - 1], []).append(features[-1])
 
-        with rehearsal_rig(protocol, person, seed, "scripted") as machine:
+        with rehearsal_rig(protocol, participant, seed, "scripted") as rig:
             RehearsedSession(
-                protocol, schedule, machine, _DiscardingStore(machine.servo.now_ns, codes, key.secret), features=feel
+                protocol, schedule, rig, _DiscardingStore(rig.servo.now_ns, codes, key.secret), features=add_features
             ).run()
         if progress is not None:
             progress(f"{number} of {people} sessions simulated")
@@ -517,29 +519,29 @@ def rehearse(
     study = parse(source, str(protocol))
     folder = rehearsal_folder(workspace().results, study.study.name) if results is None else Path(results)
     check_study(StudyFolder(folder), study.study.name)
-    people = [f"P{number:03d}" for number in range(1, participants + 1)]
-    used = used_ids(StudyFolder(folder))
-    for person in people:
-        used.check_unused(person, 1)
-    for person, own_group in simulated_groups(StudyFolder(folder), study, people, group).items():
-        label = person if own_group is None else f"{person} (group {own_group})"
+    participant_ids = [f"P{number:03d}" for number in range(1, participants + 1)]
+    ids_in_use = used_ids(StudyFolder(folder))
+    for participant in participant_ids:
+        ids_in_use.check_unused(participant, 1)
+    for participant, participant_group in simulated_groups(StudyFolder(folder), study, participant_ids, group).items():
+        label = participant if participant_group is None else f"{participant} (group {participant_group})"
         lines: list[str] = []
         for session in itertools.count(1):
-            opening = open_session(
+            session_context = open_session(
                 study,
                 source,
-                person,
+                participant,
                 session=session,
                 seed=seed,
                 device=device,
                 results=folder,
                 recordings=recordings,
-                group=own_group,
+                group=participant_group,
                 observer=observer,
             )
-            store = _run_to_end(label if session == 1 else f"{label}, session {session}", opening, lines.append)
-            last = planned_sessions(StudyFolder(folder), study, person)
-            if session == last or progress_of(store.lines).ended != "completed":
+            store = _run_to_end(label if session == 1 else f"{label}, session {session}", session_context, lines.append)
+            session_count = planned_sessions(StudyFolder(folder), study, participant)
+            if session == session_count or progress_of(store.lines).ended != "completed":
                 break
         if progress is not None:
             progress("\n".join(lines))
@@ -588,8 +590,8 @@ def finish_session(
     if not is_there(session.path) or is_never_begun(session.path):
         source = source_bytes(protocol)
         study = parse(source, str(protocol))
-        opening = open_session(study, source, participant, seed=seed, device=device, results=results)
-        _run_to_end(participant, opening, progress)
+        session_context = open_session(study, source, participant, seed=seed, device=device, results=results)
+        _run_to_end(participant, session_context, progress)
     elif progress_of(journal.read(session.journal)).ended is None:
         _run_to_end(participant, reopen_session(session.path, protocol=protocol), progress)
     else:  # the program was killed between the session's last line and its proofs
@@ -600,23 +602,23 @@ def finish_session(
 
 def _run_to_end(
     participant: str,
-    opening: AbstractContextManager[tuple[RehearsedSession, SessionStore]],
+    session_context: AbstractContextManager[tuple[RehearsedSession, SessionStore]],
     progress: Callable[[str], object] | None,
 ) -> SessionStore:
-    """Run an opened session to its last page; ``progress`` gets a line with its responses and what is missing."""
+    """Run an open session to its last page; ``progress`` gets a line with its responses and missing trials."""
     began = time.perf_counter()
-    with _HeldSignals() as signals, opening as (rehearsal, store):
+    with _HeldSignals() as signals, session_context as (rehearsal, store):
         rehearsal.signals = signals
         rehearsal.run()
     if progress is not None:
         took_s = time.perf_counter() - began
-        held = f"{store.clock.seconds() / 60:.1f} min of session time simulated in {took_s:.1f} s"
+        duration = f"{store.clock.seconds() / 60:.1f} min of session time simulated in {took_s:.1f} s"
         missing = f"; {store.missing_trials}" if store.missing_trials.count else ""
         lost = [line.reason for line in store.lines if isinstance(line, journal_events.RecordingLost)]
         if lost:
             missing += f"; {counted(len(lost), 'recording')} could not be stored: {', '.join(dict.fromkeys(lost))}"
         answers = sum(progress_of(store.lines).answered.values())
-        progress(f"{participant}: {answers} responses, {held}, fingerprint {store.fingerprint}{missing}")
+        progress(f"{participant}: {answers} responses, {duration}, fingerprint {store.fingerprint}{missing}")
     return store
 
 
@@ -685,10 +687,12 @@ def open_session(
             group=group,
         )
         store = begin_session(results, study, source, start, clock=SessionClock(rig.servo.now_ns))
-        own = session_protocol(StudyFolder(results), store.as_recorded(study), participant, session)
+        protocol = session_protocol(StudyFolder(results), store.as_recorded(study), participant, session)
         with store:
-            schedule = begun_schedule(own, journal_events.start_of(store.lines), store.key)
-            rehearsed = RehearsedSession(own, schedule, rig, store, observer=observer, answer=answer, session=session)
+            schedule = begun_schedule(protocol, journal_events.start_of(store.lines), store.key)
+            rehearsed = RehearsedSession(
+                protocol, schedule, rig, store, observer=observer, answer=answer, session=session
+            )
             with _updated_tables(store):
                 yield rehearsed, store
 
@@ -700,7 +704,7 @@ def _updated_tables(store: SessionStore) -> Iterator[None]:
         yield
     finally:
         if not store.fingerprint:
-            with suppress(StoreError):  # they are written again when it is resumed
+            with suppress(StoreError):  # resuming writes them again
                 store.write_tables()
 
 
@@ -733,18 +737,18 @@ def reopen_session(
         No available protocol is the session's, or the session broke; earlier data are safe.
     """
     lines = journal.read(locate_session(session_folder)[1].journal)
-    begun = journal_events.start_of(lines)
+    session_started = journal_events.start_of(lines)
     if not is_rehearsal(receipt.read(locate_session(session_folder)[1].receipt)):
         raise SessionError(
             f"{session_folder} is a participant's session, not a simulated one: resume it in the program's session "
             "window"
         )
     read = partial(source_to_resume, session_folder)
-    name = find_protocol(begun, read=read) if protocol is None else str(protocol)
+    name = find_protocol(session_started, read=read) if protocol is None else str(protocol)
     source = read(name)
     study = parse(source, name)
-    person, seed = begun.participant, begun.seed
-    with rehearsal_rig(study, person, seed, begun.device or "") as rig:
+    participant, seed = session_started.participant, session_started.seed
+    with rehearsal_rig(study, participant, seed, session_started.device or "") as rig:
         store = reopen_store(
             session_folder,
             study,
@@ -755,16 +759,30 @@ def reopen_session(
             now_ns=rig.servo.now_ns,
             now=max(datetime.now().astimezone(), datetime.fromisoformat(lines[-1].at)),
         )
-        own = session_protocol(locate_session(session_folder)[0], store.as_recorded(study), person, begun.session)
-        schedule = begun_schedule(own, begun, store.key)
+        own_protocol = session_protocol(
+            locate_session(session_folder)[0], store.as_recorded(study), participant, session_started.session
+        )
+        schedule = begun_schedule(own_protocol, session_started, store.key)
         with store:
-            start = resume_at(own, schedule, lines, store.key)
+            start = resume_at(own_protocol, schedule, lines, store.key)
             known = _features_of_whole_session(
-                own, schedule, rig.device.name, store.key.codes, store.key.nonce, session=begun.session
+                own_protocol,
+                schedule,
+                rig.device.name,
+                store.key.codes,
+                store.key.nonce,
+                session=session_started.session,
             )
             with _updated_tables(store):
                 rehearsed = RehearsedSession(
-                    own, schedule, rig, store, start, known=known, answer=answer, session=begun.session
+                    own_protocol,
+                    schedule,
+                    rig,
+                    store,
+                    start,
+                    known=known,
+                    answer=answer,
+                    session=session_started.session,
                 )
                 yield rehearsed, store
 
@@ -772,7 +790,7 @@ def reopen_session(
 def _features_of_whole_session(
     study: Protocol, schedule: Schedule, device: str, codes: dict[str, dict[str, str]], secret: bytes, *, session: int
 ) -> dict[int, tuple[TrialFeatures, ...]]:
-    """Return the features of each trial (by number) of an uninterrupted session."""
+    """Run the session without interruption and return the features felt in each trial, by its number."""
     features: dict[int, tuple[TrialFeatures, ...]] = {}
     with rehearsal_rig(study, schedule.participant, schedule.seed, device) as rig:
         RehearsedSession(

@@ -21,7 +21,7 @@ class RehearsalOrder:
 
 
 RehearsalClient: TypeAlias = WorkerClient[RehearsalOrder, float | str | Path]
-"""The client; its answers are the fraction of compiled functions, a line per participant, then the study folder."""
+"""The client, which receives the fraction of compiled functions, a line per participant, then the study folder."""
 
 
 def carry_out(order: RehearsalOrder, send: Send, _stop: Stop) -> Path:

@@ -152,7 +152,7 @@ def test_ended_by_the_user_it_leaves_whole_sessions_and_their_table(
         if line.startswith("P003"):
             raise KeyboardInterrupt
 
-    monkeypatch.setattr(answers_only, "SAY_EVERY_S", 0.0)
+    monkeypatch.setattr(answers_only, "REPORT_INTERVAL_S", 0.0)
     folder = tmp_path / "rek2024"
     with pytest.raises(KeyboardInterrupt):
         rehearse_answers("rek2024", participants=9, seed=1, results=folder, features=FELT, progress=enough)

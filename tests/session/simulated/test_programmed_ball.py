@@ -69,12 +69,12 @@ def test_a_stroke_goes_straight_from_rest_to_rest_at_its_mean_pace() -> None:
     assert steps == pytest.approx(steps[::-1], abs=1e-12)
     assert steps.max() * len(steps) == pytest.approx(1.875, rel=0.01)
     assert steps[0] * len(steps) < 0.01
-    assert len(steps) == observers._rows(0.05 / pace_mps)
+    assert len(steps) == observers._row_count(0.05 / pace_mps)
 
 
 def test_the_assumed_hand_moves_smoothly_to_each_target_and_stays() -> None:
     each_s = observers._MOVE_S + REACH.dwell_s + observers._STAY_S
-    times_s, positions_m = observers._reaches(REACH, 2 * each_s)
+    times_s, positions_m = observers._reaching_path(REACH, 2 * each_s)
     left, right = np.array(REACH.targets_m)
     for after_s, place_m in (
         (0.0, 0 * left), (observers._MOVE_S / 2, left / 2), (observers._MOVE_S, left), (each_s, left),
