@@ -7,17 +7,17 @@ from study_app.workers.client import WorkerClient
 from study_app.workers.server import Send, Stop
 
 DEVICES: Final = ("scripted", "falcon-emulated")
-_FILLED: Final = "filled"
-"""The file of a cache that holds all code of these devices."""
+_COMPLETE_MARKER: Final = "filled"
+"""The file that marks a cache as holding all compiled code for `DEVICES`."""
 
 CompilationClient: TypeAlias = WorkerClient[tuple[str, ...], float | None]
-"""The client of the worker; its answers are the fraction of compiled functions, then None."""
+"""The client of the worker, which receives the fraction of compiled functions, and None at the end."""
 
 
 def start_compilation(devices: tuple[str, ...] = DEVICES) -> CompilationClient | None:
-    """Start a worker process that compiles what sessions with these devices need.
+    """Start a worker process that compiles the code for sessions with these devices.
 
-    Returns None if that was compiled before, or cannot be stored.
+    Return None if the code is compiled already, or cannot be cached.
 
     Raises
     ------
@@ -26,7 +26,7 @@ def start_compilation(devices: tuple[str, ...] = DEVICES) -> CompilationClient |
     """
     from study_app.haptics.kernels import CACHE  # noqa: PLC0415 - the compiler
 
-    if CACHE is None or (CACHE / _FILLED).exists():
+    if CACHE is None or (CACHE / _COMPLETE_MARKER).exists():
         return None
     client: CompilationClient = WorkerClient("study_app.session.compile_worker:carry_out", name="compilation")
     client.order(devices)
@@ -34,7 +34,7 @@ def start_compilation(devices: tuple[str, ...] = DEVICES) -> CompilationClient |
 
 
 def carry_out(devices: tuple[str, ...], send: Send, _stop: Stop) -> None:
-    """Open each device with a servo, at zero force."""
+    """Compile the code for ``devices`` by opening each with a servo at zero force."""
     from study_app.devices.rig import open_rig, study_settings  # noqa: PLC0415 - the compiler: only in that process
     from study_app.haptics.kernels import CACHE, following_compilation  # noqa: PLC0415
     from study_app.protocol.load import load  # noqa: PLC0415
@@ -43,4 +43,4 @@ def carry_out(devices: tuple[str, ...], send: Send, _stop: Stop) -> None:
         for name in devices:
             open_rig(name, study_settings(load("demo"), Random(1))).stop()  # noqa: S311 - a simulated tremor
     if CACHE is not None:
-        (CACHE / _FILLED).touch()
+        (CACHE / _COMPLETE_MARKER).touch()

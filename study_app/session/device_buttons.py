@@ -11,7 +11,7 @@ from study_app.session.transitions.state import Phase, SessionState
 
 CONTINUE: Final = 1 << 0
 ANSWERS: Final = (1 << 1, 1 << 2)
-"""Bits of the device's second button (first of two answers, or "less") and third (second answer, or "more")."""
+"""Bits of the device's second button (first answer, or "less") and third button (second answer, or "more")."""
 
 
 class DeviceButtons:
@@ -22,12 +22,12 @@ class DeviceButtons:
         self._next_ns: dict[int, int] = {}  # time of the next step by button [ns]
 
     def events(
-        self, samples: Any, since_ns: int, now_s: float, where: Callable[[], tuple[SessionState, bool]]
+        self, samples: Any, since_ns: int, now_s: float, read_state: Callable[[], tuple[SessionState, bool]]
     ) -> Iterator[Event]:
         """Yield the events for the buttons pressed in ``samples`` (n,) of telemetry.
 
-        A press before ``since_ns``, when the current page was presented, is not an answer to it. ``where`` returns the
-        session's state after each event that was yielded, and whether an interval can be adjusted.
+        Presses before ``since_ns``, when the current page was presented, are ignored. ``read_state`` returns the
+        session's current state, which each yielded event may change, and whether an interval can be adjusted.
         """
         down = np.concatenate(([self._down], samples["buttons"]))
         self._down = int(down[-1])
@@ -35,29 +35,33 @@ class DeviceButtons:
         if (pressed & BUTTON_STOP).any():
             yield ForceStopped(now_s, "device")
         pressed = pressed[samples["time_ns"] >= since_ns]
-        continues = bool((pressed & CONTINUE).any())
-        if where()[1]:
-            if steps := self._steps(pressed, int(samples["time_ns"][-1])):
+        continue_pressed = bool((pressed & CONTINUE).any())
+        if read_state()[1]:
+            if steps := self._due_steps(pressed, int(samples["time_ns"][-1])):
                 yield Stepped(now_s, steps)
-            if continues:
+            if continue_pressed:
                 yield Submitted(now_s)
             return
         self._next_ns.clear()
-        state = where()[0]
+        state = read_state()[0]
         # a press leaves a text page, but does not give consent
-        if continues and state.phase is Phase.READING and state.plan.protocol.pages[state.page_id].kind != "consent":
+        if (
+            continue_pressed
+            and state.phase is Phase.READING
+            and state.plan.protocol.pages[state.page_id].kind != "consent"
+        ):
             yield Continue(now_s)
-        yield from _answers(where()[0], pressed, now_s)
+        yield from _answers(read_state()[0], pressed, now_s)
 
-    def _steps(self, pressed: Any, now_ns: int) -> int:
-        """Return the steps that are due: one for each press, and one every `STEP_S` while a button is held."""
+    def _due_steps(self, pressed: Any, now_ns: int) -> int:
+        """Return the sum of the due steps: one for each press, and one every `STEP_S` while a button is held."""
         steps = 0
-        for bit, way in zip(ANSWERS, (-1, 1), strict=True):
+        for bit, direction in zip(ANSWERS, (-1, 1), strict=True):
             if (pressed & bit).any():
                 self._next_ns[bit] = now_ns
             if now_ns >= self._next_ns.get(bit, now_ns + 1):
                 self._next_ns[bit] += round(STEP_S * 1e9)
-                steps += way
+                steps += direction
             if not self._down & bit:
                 self._next_ns.pop(bit, None)
         return steps
@@ -68,7 +72,7 @@ def _answers(state: SessionState, pressed: Any, now_s: float) -> Iterator[Event]
     if state.phase is not Phase.ANSWERING or state.due is None or state.design is None:
         return
     answers = state.design.answers
-    down = [place for place, bit in enumerate(ANSWERS) if (pressed & bit).any()]
-    if len(answers) == len(ANSWERS) and len(down) == 1:
-        yield Chosen(now_s, state.design.name, answers[down[0]])
+    pressed_answers = [index for index, bit in enumerate(ANSWERS) if (pressed & bit).any()]
+    if len(answers) == len(ANSWERS) and len(pressed_answers) == 1:
+        yield Chosen(now_s, state.design.name, answers[pressed_answers[0]])
         yield Submitted(now_s)

@@ -52,7 +52,7 @@ class RecorderPort(Protocol):
 
 
 class KeptSession(JournalPort, Protocol):
-    """The interface of the store of a rehearsed session (``store.sessions.open_session.SessionStore``)."""
+    """The interface of the store that a rehearsed session requires (``store.sessions.open_session.SessionStore``)."""
 
     clock: SessionClock
     recorder: Any

@@ -1,6 +1,7 @@
-"""The pre-flight: checks whether a session may begin, from measurements and the masking of the motors.
+"""The pre-flight checks that decide from measurements whether a session may begin.
 
-A failure prevents the session; a warning is about something that would make trials invalid or should be known.
+A failure prevents the session. A warning reports a problem that would make trials invalid, or that the operator should
+know.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ from study_app.store.session_progress import limit_reason
 from study_app.video.sources import VideosFound
 
 if TYPE_CHECKING:
-    from study_app.haptics.runtime.telemetry import Timing  # loads the compiler, as measuring has done
+    from study_app.haptics.runtime.telemetry import Timing  # loads the compiler
 
 _Means: TypeAlias = Literal["no", "headphones", "noise"]
 MEANS: Final[dict[_Means, str]] = {"no": "No", "headphones": "Headphones", "noise": "Noise"}
@@ -38,15 +39,15 @@ MEANS: Final[dict[_Means, str]] = {"no": "No", "headphones": "Headphones", "nois
 QUIETEST_DB, LOUDEST_DB, USUAL_DB = 30, 85, 60
 """Sound pressure levels of masking noise [dB]; above 85 dB hearing is at risk (Directive 2003/10/EC)."""
 _Verdict: TypeAlias = Literal["ok", "warning", "failure"]
-_LEAST_FRESH = 0.5  # share of ticks in which the device had a new sample
+_MIN_FRESH_SHARE = 0.5  # share of ticks in which the device had a new sample
 RATE_WARNING, RATE_FAILURE = 0.02, 0.5  # relative error of the servo's rate
-_LEAST_REFRESH_HZ = 50.0
+_MIN_REFRESH_HZ = 50.0
 _SLOW_PROBE_S = 0.1
 _TABLES_BYTES = 20_000_000
-_MOST_OF_A_TICK = 0.2  # share of a tick that the force model may take
-_SAME = 1.1  # greatest ratio of two errors that count as equal
-_UNKNOWN = {"delay_s": "delay", "count_m": "encoder count", "mass_kg": "mass"}
-_SPARE = 3  # required free space as a multiple of a session of the expected length
+_MAX_TICK_SHARE = 0.2  # share of a tick that the force model may take
+_EQUAL_ERROR_RATIO = 1.1  # greatest ratio of two errors that count as equal
+_PROPERTY_NAMES = {"delay_s": "delay", "count_m": "encoder count", "mass_kg": "mass"}
+_SPACE_FACTOR = 3  # required free space as a multiple of a session of the expected length
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,8 +74,8 @@ class Screen:
 class PredictedDelivery:
     """The predicted loss of main trials because the safety layer withholds too much force.
 
-    ``missing`` of the ``asked`` trials of intervals would not be delivered, ``out`` of the ``judged`` other trials
-    would violate limits. The limit on the force withheld is ``limit_percent`` [%].
+    ``missing`` of the ``asked`` trials of intervals would not be delivered, and ``out`` of the ``judged`` other trials
+    would violate limits. ``limit_percent`` is the limit on the withheld share of the force [%].
     """
 
     missing: int
@@ -86,10 +87,10 @@ class PredictedDelivery:
     @property
     def sentences(self) -> tuple[str, ...]:
         """The predicted loss as sentences without full stops: "26 of 40 trials would not be delivered: …"."""
-        why = limit_reason("withheld_percent", {"withheld_percent": self.limit_percent})
-        missing = f"{self.missing} of {counted(self.asked, 'trial')} would not be delivered: {why}"
-        out = f"{self.out} of {counted(self.judged, 'trial')} would exceed the limits: {why}"
-        return (*([missing] if self.missing else []), *([out] if self.out else []))
+        reason = limit_reason("withheld_percent", {"withheld_percent": self.limit_percent})
+        missing = f"{self.missing} of {counted(self.asked, 'trial')} would not be delivered: {reason}"
+        violating = f"{self.out} of {counted(self.judged, 'trial')} would exceed the limits: {reason}"
+        return (*([missing] if self.missing else []), *([violating] if self.out else []))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -99,17 +100,18 @@ class Measurements:
     ``fresh_share`` is the share of the servo's ticks in which the device had a new sample, ``sample_age_s`` the age of
     the newest sample when read (95th percentile). ``probe_s`` is the time to write a file to the disk of the results,
     None if that failed for the reason ``probe_fault``; ``free_bytes`` is None if unknown. ``tick_s`` is the time of a
-    tick with the most expensive scene of the study, None if not measured; ``key_hash`` that of the study's sealed key,
-    None before its first session. ``lateness_ns`` (n,) is the lateness of every tick [ns], ``grant`` the priority that
-    the system grants the servo's thread. ``dynamics`` are the device's, with its measured delay, ``delay_ticks`` is the
-    delay that the servo uses now. ``withheld`` is the share of the force that limits and passivity controller are
-    expected to withhold in the fastest stroke of a task, by liquid; None if it was not computed. ``delivery`` is the
-    predicted loss of a simulated participant, None if it was not computed. ``velocity_errors`` are the relative error
-    of the velocity and its value for fully known device dynamics; None if all are known. ``outlets`` are the streams
-    and ports to other programs; ``video`` is the state of the study's videos, None without any. ``ran_otherwise`` is a
-    participant whose session used the same version of the study from a different file; ``untranslated`` are texts of
-    the pages that are still in another language. ``late_device`` says when the device answered later than the servo
-    assumes, as far as the bench test or the last session showed it.
+    tick with the most expensive scene of the study, None if not measured; ``key_hash`` is the hash of the study's
+    sealed key, None before its first session. ``lateness_ns`` (n,) is the lateness of every tick [ns], ``grant`` the
+    priority that the system grants the servo's thread. ``dynamics`` are the device's, with its measured delay,
+    ``delay_ticks`` is the delay that the servo uses now. ``withheld`` is the share of the force that limits and
+    passivity controller are expected to withhold in the fastest stroke of a task, by liquid; None if it was not
+    computed. ``delivery`` is the predicted loss of a simulated participant, None if it was not computed.
+    ``velocity_errors`` are the relative error of the velocity, and the error that it would have if all device dynamics
+    were known; None if all are known. ``outlets`` are the streams and ports to other programs; ``video`` is the state
+    of the study's videos, None without any. ``ran_otherwise`` is a participant whose session used the same version of
+    the study from a different file; ``untranslated`` are texts of the pages that are still in another language.
+    ``late_device`` is a sentence if the bench test or the last session showed that the device answers later than the
+    servo assumes, else "".
     """
 
     device: str
@@ -168,10 +170,10 @@ class Check:
 
 
 def preflight_checks(facts: Measurements, protocol: Protocol) -> tuple[Check, ...]:
-    """Return the results of the pre-flight for a session of ``protocol`` with the measured ``facts``."""
+    """Return the results of the pre-flight for a session of ``protocol`` with the measurements ``facts``."""
     return tuple(
         check
-        for of in (
+        for checks in (
             _servo_checks,
             _delayed_force_check,
             _level_check,
@@ -179,7 +181,7 @@ def preflight_checks(facts: Measurements, protocol: Protocol) -> tuple[Check, ..
             _outlet_checks,
             _cost_checks,
         )
-        for check in of(facts, protocol)
+        for check in checks(facts, protocol)
     )
 
 
@@ -188,16 +190,18 @@ def refusal_reasons(checks: Iterable[Check]) -> str:
     return "; ".join(f"{check.name.lower()}: {check.advice}" for check in checks if check.verdict == "failure")
 
 
-def _warning_unless(name: str, value: str, about: str, advice: str, *, well: bool, share: float | None = None) -> Check:
-    """Return a check whose verdict is "ok" if ``well``, else a warning with advice."""
-    return Check(name, "ok" if well else "warning", value, about=about, advice="" if well else advice, share=share)
+def _warning_unless(
+    name: str, value: str, about: str, advice: str, *, passed: bool, share: float | None = None
+) -> Check:
+    """Return a check whose verdict is "ok" if ``passed``, else a warning with advice."""
+    return Check(name, "ok" if passed else "warning", value, about=about, advice="" if passed else advice, share=share)
 
 
 def _servo_checks(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
     """Yield the checks of the device's response, its force delay and the servo's rate."""
     share = f"{100 * facts.fresh_share:.0f} %"
     about = f"{facts.device} sends a new sample in {share} of the ticks"
-    if facts.timing.ticks == 0 or facts.fresh_share < _LEAST_FRESH:
+    if facts.timing.ticks == 0 or facts.fresh_share < _MIN_FRESH_SHARE:
         advice = f"{facts.device} sends a new sample in only {share} of the ticks: check its cable and power"
         yield Check("Device", "failure", "not responding", about=about, advice=advice)
     else:
@@ -208,12 +212,12 @@ def _servo_checks(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
         about = f"a force takes effect after {1e3 * facts.dynamics.delay_s:.2f} ms, as measured by the device"
         if facts.delay_ticks > facts.dynamics.delay_ticks(requested_hz):
             about += " when it was opened; it has measured a longer delay since"
-    well = (facts.dynamics.delay_s is None or facts.delay_ticks <= ASSUMED_TICKS) and not facts.late_device
+    passed = (facts.dynamics.delay_s is None or facts.delay_ticks <= ASSUMED_TICKS) and not facts.late_device
     advice = "The force limits are stricter because of this delay; connect the device without a hub."
     if facts.late_device:
         remedy = f"connect the device without a hub, then measure it: liquid-study devices bench {facts.device}"
         advice = f"{facts.late_device}; {remedy}."
-    yield _warning_unless("Loop delay", counted(facts.delay_ticks, "tick"), about, advice, well=well)
+    yield _warning_unless("Loop delay", counted(facts.delay_ticks, "tick"), about, advice, passed=passed)
 
     value, about = f"{facts.timing.rate_hz:.1f} Hz", f"requested: {requested_hz:g} Hz"
     error = abs(facts.timing.rate_hz / requested_hz - 1)
@@ -223,7 +227,7 @@ def _servo_checks(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
     if refusal is not None:
         yield Check("Servo rate", "failure", value, about=about, advice=refusal)
     else:
-        yield _warning_unless("Servo rate", value, about, "Close other programs.", well=error <= RATE_WARNING)
+        yield _warning_unless("Servo rate", value, about, "Close other programs.", passed=error <= RATE_WARNING)
 
     limits = protocol.limits
     late_ms, gap_ms = facts.timing.lateness_p99_s * 1e3, facts.timing.worst_gap_s * 1e3
@@ -233,11 +237,11 @@ def _servo_checks(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
         f"{limits.worst_gap_ms:g} ms); {counted(facts.timing.overruns, 'overrun')}"
     )
     advice = "Trials would be invalid: close other programs."
-    yield _warning_unless("Servo lateness", f"{late_ms:.2f} ms", about, advice, well=worst <= 1, share=worst)
+    yield _warning_unless("Servo lateness", f"{late_ms:.2f} ms", about, advice, passed=worst <= 1, share=worst)
 
     grant = facts.grant  # other processes delay a thread of normal priority
     memory = {None: "", True: ", memory locked", False: ", memory not locked"}[grant.locked]
-    advice = "; ".join(f"{it[0].upper()}{it[1:]}" for it in grant.advice)
+    advice = "; ".join(f"{sentence[0].upper()}{sentence[1:]}" for sentence in grant.advice)
     verdict: _Verdict = "ok" if grant.level in {"real-time", "none"} else "warning"
     yield Check("Priority", verdict, grant.level, about=f"{grant.how}{memory}", advice=f"{advice}." if advice else "")
 
@@ -260,38 +264,41 @@ def _level_check(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
     if highest_nspm == 0:
         return
     value, about = f"up to {highest_nspm:g} N·s/m", f"with a delay of {counted(facts.delay_ticks, 'tick')}"
-    problems = (slope_limit_fault(protocol, alike, facts.delay_ticks) for alike in blocks_by_stimulus(protocol))
-    beyond = next(filter(None, problems), None)
-    advice = "" if beyond is None else f"{beyond.message}: {beyond.hint}"
-    yield Check("Levels", "ok" if beyond is None else "failure", value, about=about, advice=advice)
+    problems = (
+        slope_limit_fault(protocol, similar_blocks, facts.delay_ticks)
+        for similar_blocks in blocks_by_stimulus(protocol)
+    )
+    problem = next(filter(None, problems), None)
+    advice = "" if problem is None else f"{problem.message}: {problem.hint}"
+    yield Check("Levels", "ok" if problem is None else "failure", value, about=about, advice=advice)
 
 
 def _screen_and_disk_checks(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
     """Yield the checks of screen, disk, key and videos."""
     limit_ms, screen = protocol.limits.delay_error_ms, facts.screen
-    seen_ms = (facts.sample_age_s + 1 / max(screen.refresh_hz, 1.0)) * 1e3  # the age of a sample plus one frame
-    about, share = f"in addition to the requested delay (limit: {limit_ms:g} ms)", seen_ms / limit_ms
+    delay_ms = (facts.sample_age_s + 1 / max(screen.refresh_hz, 1.0)) * 1e3  # the age of a sample plus one frame
+    about, share = f"in addition to the requested delay (limit: {limit_ms:g} ms)", delay_ms / limit_ms
     advice = "Trials would be invalid: use a screen with a higher refresh rate."
     yield _warning_unless(
-        "Visual delay", f"up to {seen_ms:.1f} ms", about, advice, well=seen_ms <= limit_ms, share=share
+        "Visual delay", f"up to {delay_ms:.1f} ms", about, advice, passed=delay_ms <= limit_ms, share=share
     )
 
     value, about = f"{screen.refresh_hz:.1f} Hz, {100 * screen.scaling:.0f} %", "refresh rate and scaling of the "
     advice = "Set the participant's screen to 100 % scaling and at least 50 Hz."
-    well = screen.refresh_hz >= _LEAST_REFRESH_HZ and screen.scaling == 1
-    yield _warning_unless("Screen", value, f"{about}participant's screen", advice, well=well)
+    passed = screen.refresh_hz >= _MIN_REFRESH_HZ and screen.scaling == 1
+    yield _warning_unless("Screen", value, f"{about}participant's screen", advice, passed=passed)
 
     if facts.probe_s is None:
         yield Check(
             "Results folder", "failure", "not usable", about="no file could be written", advice=facts.probe_fault
         )
     else:
-        value, well = f"{facts.probe_s * 1e3:.1f} ms", facts.probe_s <= _SLOW_PROBE_S
-        yield _warning_unless("Results folder", value, "time to write a file", "Use a local disk.", well=well)
+        value, passed = f"{facts.probe_s * 1e3:.1f} ms", facts.probe_s <= _SLOW_PROBE_S
+        yield _warning_unless("Results folder", value, "time to write a file", "Use a local disk.", passed=passed)
 
     planned = recordings_of(protocol) if facts.recordings else ()
-    recorded = sum(count * recording_bytes(each_s, protocol.device.rate_hz) for count, each_s in planned)
-    needed = _SPARE * (_TABLES_BYTES + recorded)
+    recorded = sum(count * recording_bytes(duration_s, protocol.device.rate_hz) for count, duration_s in planned)
+    needed = _SPACE_FACTOR * (_TABLES_BYTES + recorded)
     about = f"a session needs about {_megabytes(needed)} MB"
     if facts.free_bytes is None:
         yield Check(
@@ -302,9 +309,9 @@ def _screen_and_disk_checks(facts: Measurements, protocol: Protocol) -> Iterator
             advice="The operating system does not report the free space.",
         )
     else:
-        value, well = f"{_megabytes(facts.free_bytes)} MB free", facts.free_bytes >= needed
-        advice = "" if well else f"{value}, {about}: free up some disk space"
-        yield Check("Free space", "ok" if well else "failure", value, about=about, advice=advice)
+        value, passed = f"{_megabytes(facts.free_bytes)} MB free", facts.free_bytes >= needed
+        advice = "" if passed else f"{value}, {about}: free up some disk space"
+        yield Check("Free space", "ok" if passed else "failure", value, about=about, advice=advice)
 
     about = "the key is generated and sealed when the first session begins"
     if facts.key_hash is not None:
@@ -318,7 +325,7 @@ def _screen_and_disk_checks(facts: Measurements, protocol: Protocol) -> Iterator
 
 
 def _outlet_checks(facts: Measurements, _protocol: Protocol) -> Iterator[Check]:
-    """Yield the check of each outlet: its listeners, its failure, or that a double-blind study disables it."""
+    """Yield the check of each outlet: whether it has listeners, has failed, or is disabled by a double-blind study."""
     for outlet in facts.outlets:
         if outlet.withheld:
             yield Check(
@@ -333,8 +340,8 @@ def _outlet_checks(facts: Measurements, _protocol: Protocol) -> Iterator[Check]:
             )
         elif outlet.shows_force:
             advice = "Do not show the stream to anyone, because the force reveals the liquid."
-            who = "listener" if outlet.listens else "no listener"
-            yield Check(outlet.title, "warning", who, about="the study is double-blind", advice=advice)
+            value = "listener" if outlet.listens else "no listener"
+            yield Check(outlet.title, "warning", value, about="the study is double-blind", advice=advice)
         elif outlet.listens is False:
             advice = "Start the program that records it, such as LabRecorder, and select this stream."
             yield Check(outlet.title, "warning", "no listener", about="the stream is not being received", advice=advice)
@@ -351,34 +358,38 @@ def _cost_checks(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
             f"{facts.tick_s * 1e9:.0f} ns per tick",
             f"the most demanding scene uses {100 * share:.2g} % of each tick",
         )
-        advice, well = "Remove an effect from the scene.", share <= _MOST_OF_A_TICK
-        yield _warning_unless("Scene cost", value, about, advice, well=well, share=share)
+        advice, passed = "Remove an effect from the scene.", share <= _MAX_TICK_SHARE
+        yield _warning_unless("Scene cost", value, about, advice, passed=passed, share=share)
 
     if facts.velocity_errors and facts.dynamics.unknown and descriptor_of(facts.device).kind == "felt":
-        now, known = (100 * error for error in facts.velocity_errors)
-        missing = [_UNKNOWN[name] for name in facts.dynamics.unknown]
-        listed = " and ".join(filter(None, (", ".join(missing[:-1]), missing[-1])))
-        well = now <= _SAME * known
-        why = f"{'although' if well else 'because'} the device's {listed} {'are' if len(missing) > 1 else 'is'} unknown"
-        value = f"{now:.2g} %" if well else f"{now:.2g} % instead of {known:.2g} %"
+        current_percent, known_percent = (100 * error for error in facts.velocity_errors)
+        missing = [_PROPERTY_NAMES[name] for name in facts.dynamics.unknown]
+        names = " and ".join(filter(None, (", ".join(missing[:-1]), missing[-1])))
+        passed = current_percent <= _EQUAL_ERROR_RATIO * known_percent
+        reason = (
+            f"{'although' if passed else 'because'} the device's {names} {'are' if len(missing) > 1 else 'is'} unknown"
+        )
+        value = f"{current_percent:.2g} %" if passed else f"{current_percent:.2g} % instead of {known_percent:.2g} %"
         advice = f"Measure the device: liquid-study devices bench {facts.device}."
-        yield _warning_unless("Velocity", value, f"error at 2 Hz, {why}", advice, well=well)
+        yield _warning_unless("Velocity", value, f"error at 2 Hz, {reason}", advice, passed=passed)
 
     if facts.withheld:
         limit_percent, most_percent = protocol.limits.withheld_percent, 100 * max(facts.withheld.values())
         about = f"in the fastest stroke of a task (limit: {limit_percent:g} %)"
         if protocol.study.blinding == "single":  # the operator may know liquids
-            about += ": " + ", ".join(f"{name} {100 * of:.1f} %" for name, of in sorted(facts.withheld.items()))
+            about += ": " + ", ".join(
+                f"{name} {100 * share_withheld:.1f} %" for name, share_withheld in sorted(facts.withheld.items())
+            )
         share, value = most_percent / limit_percent, f"at most {most_percent:.1f} %"
         advice = "Trials with such strokes would be invalid."
-        yield _warning_unless("Force withheld", value, about, advice, well=most_percent <= limit_percent, share=share)
+        yield _warning_unless("Force withheld", value, about, advice, passed=most_percent <= limit_percent, share=share)
 
     if facts.delivery is not None and facts.delivery.asked + facts.delivery.judged:
         lost = facts.delivery.missing + facts.delivery.out
         value = f"{lost} of {counted(facts.delivery.asked + facts.delivery.judged, 'trial')} beyond the limit"
         about = f"predicted for a delay of {counted(facts.delay_ticks, 'tick')}"
         advice = "; ".join(facts.delivery.sentences)
-        yield _warning_unless("Trials delivered", value if lost else "all", about, f"{advice}.", well=not lost)
+        yield _warning_unless("Trials delivered", value if lost else "all", about, f"{advice}.", passed=not lost)
 
     if facts.ran_otherwise:
         about = (

@@ -18,7 +18,7 @@ from study_app.session.preflight import Measurements, Screen
 from study_app.store.blinded import sealed_hash
 from study_app.store.files import probe_free_bytes
 
-_LOOK_S = 1 / 60
+_POLL_S = 1 / 60
 
 
 class MeasuredServo(ServoPort, Protocol):
@@ -44,11 +44,13 @@ def measure_servo_and_disk(
     sleep: Callable[[float], object] = time.sleep,
 ) -> Measurements:
     """Measure a running servo for ``lasts_s`` and the disk of the study folder ``results``; leave no files."""
-    law_along(Scene(), np.zeros(1), np.zeros((1, 3)), np.zeros((1, 3)))  # compiled here, not at the end of a trial
+    law_along(
+        Scene(), np.zeros(1), np.zeros((1, 3)), np.zeros((1, 3))
+    )  # compile it now instead of at the end of a trial
     reader = servo.telemetry.reader()
     ages_s: list[float] = []
-    for _ in range(max(1, round(lasts_s / _LOOK_S))):
-        sleep(_LOOK_S)
+    for _ in range(max(1, round(lasts_s / _POLL_S))):
+        sleep(_POLL_S)
         newest = servo.telemetry.latest()
         if newest is not None:
             ages_s.append((servo.now_ns() - int(newest["time_ns"])) * 1e-9)

@@ -1,15 +1,14 @@
-"""Intervals in recordings: the scenes presented, and the delivered levels, compared with the journal.
+"""Replay of a session: recompute every recorded force and delivered value, and compare them with the recorded ones.
 
-Recomputes every force of a session from the recorded times and places, by the tick that sent them.
+Forces are recomputed from the recorded times and positions with the same code as in the session. Recordings contain the
+CRC-32 of each second of exact forces. With the version of the force rules in the receipt, the same kind of processor
+gives the same bits; seconds that differ are listed. The delivered values of each interval are compared with the
+journal.
 
-The recordings contain the CRC-32 of each second of exact forces; here the forces are recomputed and compared with it.
-The same kind of processor gives the same bits, by the version of the force rules that the receipt states; seconds that
-differ are named. The delivered values of each interval are also recomputed and compared with the journal.
+The key is opened only in memory and not printed, so that the user who replays a session stays blind.
 
-The key is opened only in memory, and not printed: the user who replays a session stays blind.
-
-A recording begins shortly before its trial, so that the force it begins with is known; one that follows another without
-a pause continues from its end. Parts that cannot be recomputed are listed, since they are not proved.
+A recording begins shortly before its trial, so that its initial force is known, or continues the previous recording if
+there was no pause between them. Parts that cannot be recomputed are listed, since they are not verified.
 """
 
 import time
@@ -67,41 +66,41 @@ class Step:
 def _steps_of(
     protocol: Protocol, key: Key, started: events.TrialStarted, interval: int | None, lines: Sequence[events.Event]
 ) -> tuple[Step, ...]:
-    """Return the steps of an interval that change a force, in order; empty if no level was set.
+    """Return the steps of an adjusted interval that change a force, in order; empty for other intervals.
 
-    ``started`` is the opened line on the trial's beginning; ``interval`` is None in a trial without intervals;
-    ``lines`` is the session's journal.
+    ``started`` is the opened line of the trial's start, ``interval`` is None in a trial without intervals, and
+    ``lines`` are those of the session's journal.
     """
     if interval is None or started.level is None or interval != len(started.arrangement or ""):
         return ()
     presented = recorded_presentation(protocol, key.codes, started.fields()).intervals[interval - 1]
-    made = [line for line in lines if isinstance(line, events.Stepped) and line.which == started.which]
+    line_steps = [line for line in lines if isinstance(line, events.Stepped) and line.which == started.which]
     setting = protocol.adjusting(protocol.blocks[started.block], started.standard, started.level)
     if setting is None:
         return ()
-    place, steps = 0, []
-    for line in made:
-        place = setting.moved(place, line.steps)
+    level_index, steps = 0, []
+    for line in line_steps:
+        level_index = setting.moved(level_index, line.steps)
         if line.scene is not None:
             steps.append(
-                Step(line.scene, protocol.presented_scene(replace(presented, value=setting.comparison(place))))
+                Step(line.scene, protocol.presented_scene(replace(presented, value=setting.comparison(level_index))))
             )
     return tuple(steps)
 
 
 def _with_last_scene_number(samples: Any, steps: Sequence[Step]) -> Any:
-    """Return the samples (n,) with the number of an interval's last scene in place of its earlier scenes' numbers."""
+    """Return the samples (n,) with all scene numbers of an adjusted interval replaced by the last one."""
     if not steps or len(samples) == 0:
         return samples
-    out = samples.copy()
-    out.scene[samples.scene >= steps[0].serial - 1] = samples.scene[-1]
-    return out
+    renumbered = samples.copy()
+    renumbered.scene[samples.scene >= steps[0].serial - 1] = samples.scene[-1]
+    return renumbered
 
 
 def _step_starts(samples: Any, steps: Sequence[Step]) -> list[tuple[int, Scene]]:
-    """Return the index of the first sample (n,) of each step with its scene, without steps that have no sample."""
-    begins = ((np.flatnonzero(samples.scene >= step.serial), step.scene) for step in steps)
-    return [(int(at[0]), scene) for at, scene in begins if at.size]
+    """Return the index of the first sample and the scene of each step, without steps that have no sample."""
+    starts = ((np.flatnonzero(samples.scene >= step.serial), step.scene) for step in steps)
+    return [(int(indices[0]), scene) for indices, scene in starts if indices.size]
 
 
 def _interval_samples(samples: Any, duration_s: float) -> Any:
@@ -109,10 +108,10 @@ def _interval_samples(samples: Any, duration_s: float) -> Any:
 
     ``duration_s`` is the duration of the task in the journal.
     """
-    own = samples[samples["scene"] == samples["scene"][-1]]
-    believed = own[own["limiters"] & LIMITER_GLITCH == 0]
-    until_ns = believed["time_ns"][:1] + round(duration_s * 1e9)
-    return own[own["time_ns"] <= until_ns]
+    task_samples = samples[samples["scene"] == samples["scene"][-1]]
+    valid = task_samples[task_samples["limiters"] & LIMITER_GLITCH == 0]
+    until_ns = valid["time_ns"][:1] + round(duration_s * 1e9)
+    return task_samples[task_samples["time_ns"] <= until_ns]
 
 
 def _recompute_delivered(
@@ -125,34 +124,35 @@ def _recompute_delivered(
 ) -> Delivered:
     """Recompute the delivered values of an interval from the samples of its recording.
 
-    ``started`` is the opened line on the beginning of the trial, ``measured`` the measures on the interval's end.
+    ``started`` is the opened line of the trial's start, ``measured`` holds the measures in the line of the interval's
+    end.
     """
     block = protocol.blocks[started.block]
     adjusted = protocol.design_of(block).adjusts and interval == len(started.arrangement or "")
-    own = judged_fields(_interval_samples(samples, measured["duration_s"]))
-    return delivered_values(protocol, presented, protocol.tasks[block.task], own, adjusted=adjusted)
+    task_samples = judged_fields(_interval_samples(samples, measured["duration_s"]))
+    return delivered_values(protocol, presented, protocol.tasks[block.task], task_samples, adjusted=adjusted)
 
 
 def recompute_force_error(scene: Scene, rate_hz: float, samples: Any, ended: Mapping[str, Any]) -> float | None:
-    """Recompute the force error of a trial or interval from its recording and the opened line on its end."""
-    own = judged_fields(_interval_samples(samples, ended["duration_s"]))
-    return delivered_error(own, rate_hz, scene.fade_s, partial(law_along, scene))
+    """Recompute the force error of a trial or interval from its recording and the opened line of its end."""
+    task_samples = judged_fields(_interval_samples(samples, ended["duration_s"]))
+    return delivered_error(task_samples, rate_hz, scene.fade_s, partial(law_along, scene))
 
 
 def differing_columns(recomputed: Mapping[str, float | None], ended: Mapping[str, Any]) -> Iterator[str]:
-    """Yield the columns in which the journal differs from the recomputed values; none if it lacks them."""
+    """Yield the columns that the journal has with other values than the recomputed ones."""
     for name, value in recomputed.items():
-        if name in ended and not _is_same(value, ended[name]):
+        if name in ended and not _is_close(value, ended[name]):
             yield name
 
 
-def _is_same(value: float | None, other: float | None) -> bool:
+def _is_close(value: float | None, other: float | None) -> bool:
     if value is None or other is None:
         return value is other
     return bool(np.isclose(value, other, rtol=_TOLERANCE, atol=_TOLERANCE))
 
 
-_NAMED_SECONDS = 8
+_MAX_LISTED_SECONDS = 8
 _FORCES = ("force_n", "command_n", "device_force_n")
 _ROUNDING = 1e-9
 _FLOAT32 = 2.0**-23  # relative precision of recorded float32 values
@@ -162,10 +162,10 @@ _FLOAT32 = 2.0**-23  # relative precision of recorded float32 values
 class Replayed:
     """The result of a replay.
 
-    ``recordings`` were recomputed, ``seconds`` of them compared. ``differences`` has a sentence for each recording with
-    different forces, ``missing`` one for each missing recording of the journal, ``uncompared`` one for each that could
-    not be recomputed, or not to its end. ``lasted_s`` is the duration of the motion, ``computed_s`` that of the
-    recomputation; ``took_s`` includes reading the files and loading the code.
+    ``recordings`` and ``seconds`` count what was compared. ``differences`` has a sentence for each recording with
+    different forces, ``missing`` one for each recording in the journal whose file is missing, ``uncompared`` one for
+    each that could not be recomputed completely. ``lasted_s`` is the duration of the recorded motion, ``computed_s``
+    that of the recomputation; ``took_s`` includes reading the files and loading the code.
     """
 
     recordings: int = 0
@@ -184,7 +184,7 @@ class Replayed:
 
 
 def replay(session_folder: Path) -> Replayed:
-    """Recompute every recorded force of a session, and compare.
+    """Recompute every recorded force of a session and compare it with the recorded one.
 
     Raises
     ------
@@ -196,34 +196,34 @@ def replay(session_folder: Path) -> Replayed:
     >>> from tempfile import mkdtemp
     >>> from study_app.session.simulated.rehearsal import rehearse
     >>> study = rehearse("demo", participants=1, seed=1, results=Path(mkdtemp(), "demo"))
-    >>> found = replay(study / "data" / "sub-P001" / "ses-01")
-    >>> found.recordings, found.differences, found.proved
+    >>> result = replay(study / "data" / "sub-P001" / "ses-01")
+    >>> result.recordings, result.differences, result.proved
     (4, (), True)
     """
     began = time.perf_counter()
     study, session = locate_session(session_folder)
-    kept = receipt.read(session.receipt)
+    session_receipt = receipt.read(session.receipt)
     key = read_key(study.path)
-    if key.hash != kept["key_hash"]:
+    if key.hash != session_receipt["key_hash"]:
         raise StoreError(f"{study.key} is not the key for session {session.path}: restore it from a backup")
     lines = open_events(journal.read(session.journal), key)
-    protocol, devices, (drawn_from, participant) = _recorded_setup(session.receipt, kept, key, lines)
+    protocol, devices, (drawn_from, participant) = _recorded_setup(session.receipt, session_receipt, key, lines)
     _recompute_forces(records(SAMPLE, 0), Scene(), devices[None], None)  # loads the compiled code before the timing
     replayed = Replayed()
     ends = {line.which: line for line in lines if isinstance(line, events.TrialEnded | events.IntervalEnded)}
-    before: _Before | None = None
+    previous: _Recomputed | None = None
     resumed_at: str | None = None
     for started, which, line, resumed in _recorded_presentations(lines):
         if resumed != resumed_at:  # the servo was restarted: nothing continues from the previous recording
-            before, resumed_at = None, resumed
+            previous, resumed_at = None, resumed
         if resumed not in devices:
             raise StoreError(
                 f"{session.receipt} does not state which device has been used since {resumed}: restore it from a backup"
             )
         name = attempt_name(*which)
         if not isinstance(line, events.Recorded):
-            why = "the journal does not say why" if line is None else line.reason
-            replayed.uncompared += (f"{name}: the recording is missing ({why})",)
+            reason = "the journal does not say why" if line is None else line.reason
+            replayed.uncompared += (f"{name}: the recording is missing ({reason})",)
             continue
         path = session.path / line.recording
         if not is_there(path):
@@ -234,27 +234,27 @@ def replay(session_folder: Path) -> Replayed:
         scene = _scene_presented(protocol, key, started, interval, seed)
         steps = _steps_of(protocol, key, started, interval, lines)
         recorded, checks = recordings.read_samples(path, key.nonce), recordings.read_checks(path, key.nonce)
-        start = time.perf_counter()
+        compute_start = time.perf_counter()
         samples = _with_last_scene_number(recorded, steps)
         try:
-            before = _recompute_forces(samples, scene, devices[resumed], before, _step_starts(recorded, steps))
-        except StudyError as refused:
-            before = None
-            replayed.uncompared += (f"{name}: not recomputable: {refused}",)
+            previous = _recompute_forces(samples, scene, devices[resumed], previous, _step_starts(recorded, steps))
+        except StudyError as error:
+            previous = None
+            replayed.uncompared += (f"{name}: not recomputable: {error}",)
             continue
-        _compare_recording(replayed, name, samples, before, checks)
+        _compare_recording(replayed, name, samples, previous, checks)
         if (ended := ends.get(which)) is not None and _samples_before_gap(samples.tick) == len(samples):
-            again: dict[str, float | None] = {}
+            recomputed: dict[str, float | None] = {}
             measured = ended.others
             if interval is not None:
                 presented = recorded_presentation(protocol, key.codes, started.fields()).intervals[interval - 1]
-                again |= _recompute_delivered(protocol, presented, started, interval, samples, measured).columns
+                recomputed |= _recompute_delivered(protocol, presented, started, interval, samples, measured).columns
             if measured.get("delivered_error") is not None and ended.outcome != "interrupted":
-                again["delivered_error"] = recompute_force_error(scene, protocol.device.rate_hz, samples, measured)
+                recomputed["delivered_error"] = recompute_force_error(scene, protocol.device.rate_hz, samples, measured)
             replayed.differences += tuple(
-                f"{name}: the column {column} differs" for column in differing_columns(again, measured)
+                f"{name}: the column {column} differs" for column in differing_columns(recomputed, measured)
             )
-        replayed.computed_s += time.perf_counter() - start
+        replayed.computed_s += time.perf_counter() - compute_start
     replayed.took_s = time.perf_counter() - began
     return replayed
 
@@ -268,10 +268,10 @@ class _Device(NamedTuple):
 
 
 @dataclass(slots=True, kw_only=True)
-class _Before:
+class _Recomputed:
     """A recomputed recording and the final state of its models, from which the next recording may continue.
 
-    ``knows_its_start``: it began without a force, or continues a recording of which that is true.
+    ``knows_its_start`` is True if the recording began without a force, or continues one for which it is True.
     """
 
     serial: int
@@ -282,135 +282,155 @@ class _Before:
 
 
 def _recompute_forces(
-    samples: Any, scene: Scene, device: _Device, before: _Before | None, steps: Sequence[tuple[int, Scene]] = ()
-) -> _Before:
-    """Recompute the forces of ``samples`` in a copy; their own scene is that of the last sample.
+    samples: Any, scene: Scene, device: _Device, previous: _Recomputed | None, steps: Sequence[tuple[int, Scene]] = ()
+) -> _Recomputed:
+    """Recompute the forces in a copy of ``samples``, whose trial has the scene number of the last sample.
 
-    From the samples named in ``steps`` on it has other numbers.
+    ``steps`` are the samples from which the scene has other parameters, with the changed scene.
     """
-    out = samples.copy()
-    serial = int(out.scene[-1]) if len(out) else 0
+    recomputed = samples.copy()
+    serial = int(recomputed.scene[-1]) if len(recomputed) else 0
     limit_n, dynamics, rules = device
-    rest = pack(scene.model_copy(update={"liquids": (), "fade_s": FADE_S}), dynamics=dynamics, rules=rules)
+    at_rest = pack(scene.model_copy(update={"liquids": (), "fade_s": FADE_S}), dynamics=dynamics, rules=rules)
     model = pack(scene, dynamics=dynamics, rules=rules)
     first = 0
-    shared = _shared_samples(before, out)
-    if before is not None and shared is not None:
-        first = shared
-        _copy_forces(before.samples[len(before.samples) - first :], out[:first])
-        _run_steps((rest, before.model, model), (before.serial, serial), before.safety[0], out, first, steps, device)
-        return _Before(
-            serial=serial, model=model, safety=before.safety, samples=out, knows_its_start=before.knows_its_start
+    shared_rows = _shared_samples(previous, recomputed)
+    if previous is not None and shared_rows is not None:
+        first = shared_rows
+        _copy_forces(previous.samples[len(previous.samples) - first :], recomputed[:first])
+        _run_steps(
+            (at_rest, previous.model, model),
+            (previous.serial, serial),
+            previous.safety[0],
+            recomputed,
+            first,
+            steps,
+            device,
+        )
+        return _Recomputed(
+            serial=serial,
+            model=model,
+            safety=previous.safety,
+            samples=recomputed,
+            knows_its_start=previous.knows_its_start,
         )
     safety = new_safety(limit_n)
-    if len(out) and out.tick[0] != 0:
-        _set_safety_state(safety[0], out)
+    if len(recomputed) and recomputed.tick[0] != 0:
+        _set_safety_state(safety[0], recomputed)
         first = 1
-    knows_its_start = not out.force_n[out.scene != serial].any()
-    _run_steps((rest, rest, model), (0, serial), safety[0], out, first, steps, device)
-    return _Before(serial=serial, model=model, safety=safety, samples=out, knows_its_start=knows_its_start)
+    knows_its_start = not recomputed.force_n[recomputed.scene != serial].any()
+    _run_steps((at_rest, at_rest, model), (0, serial), safety[0], recomputed, first, steps, device)
+    return _Recomputed(serial=serial, model=model, safety=safety, samples=recomputed, knows_its_start=knows_its_start)
 
 
-def _shared_samples(before: _Before | None, out: Any) -> int | None:
+def _shared_samples(previous: _Recomputed | None, samples: Any) -> int | None:
     """Return the number of samples shared with the previous recording; None if this one does not continue it."""
-    if before is None or len(out) == 0 or len(before.samples) == 0:
+    if previous is None or len(samples) == 0 or len(previous.samples) == 0:
         return None
-    shared = int(before.samples.tick[-1] + 1 - out.tick[0])
-    return shared if 0 <= shared <= min(len(out), len(before.samples)) else None
+    shared_rows = int(previous.samples.tick[-1] + 1 - samples.tick[0])
+    return shared_rows if 0 <= shared_rows <= min(len(samples), len(previous.samples)) else None
 
 
-def _copy_forces(known: Any, out: Any) -> None:
+def _copy_forces(source: Any, samples: Any) -> None:
     for name in ("velocity_mps", "wake_mps", "force_n", "command_n", "device_force_n", "limiters", "status"):
-        out[name] = known[name]
+        samples[name] = source[name]
 
 
-def _set_safety_state(safety: Any, out: Any) -> None:
-    """Set the state of the safety layer to the first of the samples ``out``, which is recorded exactly.
+def _set_safety_state(safety: Any, samples: Any) -> None:
+    """Set the state of the safety layer to that of the first sample, which is recorded exactly.
 
-    Only the length of a running fade matters, since no force is felt before the trial's own scene, which restarts the
-    fade. The start's fade has ended if a later sample before the next scene shows no fade.
+    Only the duration of a running fade matters, because the trial's own scene restarts the fade, and no force is felt
+    before it. The fade of the session's start is over if a sample before the next scene shows no fade.
     """
-    other = np.flatnonzero(out.scene != out.scene[0])
-    lead = out[: other[0]] if other.size else out[:1]
+    later = np.flatnonzero(samples.scene != samples.scene[0])
+    lead = samples[: later[0]] if later.size else samples[:1]
     fades = bool((lead.limiters & LIMITER_FADE).all())
     safety.started = 1
-    safety.tick_ns = safety.usable_ns = out.time_ns[0]
+    safety.tick_ns = safety.usable_ns = samples.time_ns[0]
     safety.fade = 0.0 if fades else 1.0
     safety.fade_s = START_FADE_S if fades else 0.0
-    safety.slewed_n[:] = out.command_n[0]
+    safety.slewed_n[:] = samples.command_n[0]
 
 
 def _run_steps(
     models: tuple[Any, Any, Any],
     serials: tuple[int, int],
     safety: Any,
-    out: Any,
+    samples: Any,
     first: int,
     steps: Sequence[tuple[int, Scene]],
     device: _Device,
 ) -> None:
-    """Run the models over ``out`` from ``first`` onwards, changing the scene's parameters at each step."""
-    for place, scene in steps:
-        recompute_scenes(*models, *serials, safety, out[:place], first)
+    """Run the models over ``samples`` from ``first`` onwards, changing the scene's parameters at each step."""
+    for step_row, scene in steps:
+        recompute_scenes(*models, *serials, safety, samples[:step_row], first)
         adjust_into(models[-1], scene, dynamics=device.dynamics, rules=device.rules)
-        first = max(first, place)
-    recompute_scenes(*models, *serials, safety, out, first)
+        first = max(first, step_row)
+    recompute_scenes(*models, *serials, safety, samples, first)
 
 
-def _compare_recording(replayed: Replayed, name: str, samples: Any, again: _Before, checks: recordings.Checks) -> None:
+def _compare_recording(
+    replayed: Replayed, name: str, samples: Any, recomputed: _Recomputed, checks: recordings.Checks
+) -> None:
     """Compare one recording's checks with those of the recomputed forces."""
     if len(samples) == 0:
         replayed.uncompared += (f"{name}: the recording is empty",)
         return
-    if not again.knows_its_start:
+    if not recomputed.knows_its_start:
         replayed.uncompared += (f"{name}: the recording continues an earlier one, which is missing or has a gap",)
         return
     replayed.recordings += 1
     replayed.lasted_s += float(samples.time_ns[-1] - samples.time_ns[0]) * 1e-9
-    whole = _samples_before_gap(samples.tick)
-    if whole < len(samples):
-        lost_s = whole / checks.rows
+    complete_rows = _samples_before_gap(samples.tick)
+    if complete_rows < len(samples):
+        lost_s = complete_rows / checks.rows
         replayed.uncompared += (f"{name}: samples are missing after {lost_s:.1f} s; the rest was not compared",)
     replayed.seconds += sum(
-        min((second + 1) * checks.rows, len(samples)) <= whole for second in range(len(checks.device_force))
+        min((second + 1) * checks.rows, len(samples)) <= complete_rows for second in range(len(checks.device_force))
     )
-    differing = _differing_sums(checks, again.samples) | _differing_columns(checks, samples, again.samples)
-    for what, differ in differing.items():
-        seconds = [second for second in differ if min((second + 1) * checks.rows, len(samples)) <= whole]
+    differing = _seconds_with_other_crcs(checks, recomputed.samples) | _seconds_with_other_values(
+        checks, samples, recomputed.samples
+    )
+    for quantity, differ in differing.items():
+        seconds = [second for second in differ if min((second + 1) * checks.rows, len(samples)) <= complete_rows]
         if seconds:
-            lasted = len(checks.device_force)
-            replayed.differences += (f"{name}: the {what} differs in {_list_seconds(seconds)} of {lasted} seconds",)
+            second_count = len(checks.device_force)
+            replayed.differences += (
+                f"{name}: the {quantity} differs in {_list_seconds(seconds)} of {second_count} seconds",
+            )
 
 
-def _differing_sums(checks: recordings.Checks, again: Any) -> dict[str, list[int]]:
-    """Return, for each kind of force, the seconds whose exact forces have another CRC."""
+def _seconds_with_other_crcs(checks: recordings.Checks, recomputed: Any) -> dict[str, list[int]]:
+    """Return, by kind of force, the seconds in which the CRC of the recomputed forces differs."""
     seconds_of = {}
-    for what, kept, forces in (
-        ("force on the hand", checks.device_force, again.device_force_n),
-        ("force of the liquids", checks.effect_force, again.force_n),
+    for force_name, recorded_crcs, forces in (
+        ("force on the hand", checks.device_force, recomputed.device_force_n),
+        ("force of the liquids", checks.effect_force, recomputed.force_n),
     ):
-        sums = recordings.crcs(forces, checks.rows)
-        seconds_of[what] = [
-            second for second, (recorded, other) in enumerate(zip(kept, sums, strict=True)) if recorded != other
+        crcs = recordings.crcs(forces, checks.rows)
+        seconds_of[force_name] = [
+            second
+            for second, (recorded, computed) in enumerate(zip(recorded_crcs, crcs, strict=True))
+            if recorded != computed
         ]
     return seconds_of
 
 
-def _differing_columns(checks: recordings.Checks, samples: Any, again: Any) -> dict[str, list[int]]:
-    """Return, for each column, the seconds in which recorded and recomputed values differ by more than rounding.
+def _seconds_with_other_values(checks: recordings.Checks, samples: Any, recomputed: Any) -> dict[str, list[int]]:
+    """Return, by column, the seconds in which recorded and recomputed values differ by more than rounding.
 
-    For the samples before the trial's own scene only the forces are known.
+    Before the trial's own scene only forces are compared.
     """
     seconds_of = {}
-    own = samples.scene == samples.scene[-1]
+    in_scene = samples.scene == samples.scene[-1]
     for name, step in recordings.ROUNDED_TO.items():
-        recorded, computed = (np.nan_to_num(it[name].reshape(len(samples), -1)) for it in (samples, again))
+        recorded, computed = (np.nan_to_num(source[name].reshape(len(samples), -1)) for source in (samples, recomputed))
         permitted = step * (0.5 + _ROUNDING) + np.abs(computed) * _FLOAT32
-        known = True if name in _FORCES else own
-        rows = np.flatnonzero((np.abs(recorded - computed) > permitted).any(axis=1) & known)
+        is_known = True if name in _FORCES else in_scene
+        rows = np.flatnonzero((np.abs(recorded - computed) > permitted).any(axis=1) & is_known)
         seconds_of[f"column {name}"] = np.unique(rows // checks.rows).tolist()
     for name in ("limiters", "status"):
-        rows = np.flatnonzero((samples[name] != again[name]) & own)
+        rows = np.flatnonzero((samples[name] != recomputed[name]) & in_scene)
         seconds_of[f"column {name}"] = np.unique(rows // checks.rows).tolist()
     return seconds_of
 
@@ -422,18 +442,18 @@ def _samples_before_gap(ticks: NDArray[np.int64]) -> int:
 
 
 def _list_seconds(seconds: list[int]) -> str:
-    shown = ", ".join(map(str, seconds[:_NAMED_SECONDS]))
-    more = f" … ({len(seconds)} in all)" if len(seconds) > _NAMED_SECONDS else ""
-    return f"second {shown}{more}"
+    shown = ", ".join(map(str, seconds[:_MAX_LISTED_SECONDS]))
+    rest = f" … ({len(seconds)} in all)" if len(seconds) > _MAX_LISTED_SECONDS else ""
+    return f"second {shown}{rest}"
 
 
 def _recorded_presentations(
     lines: Sequence[events.Event],
 ) -> Iterator[tuple[events.TrialStarted, events.Which, events.Recorded | events.RecordingLost | None, str | None]]:
-    """Yield the start of each trial or interval with an expected recording, its numbers, and the recording's event.
+    """Yield each trial or interval with an expected recording, in order of presentation.
 
-    They are in order of presentation, each with the time at which the session was last resumed or its device
-    reconnected; None before that.
+    Each has the line of the trial's start, its numbers, the event of the recording, and the time at which the session
+    was last resumed or its device last reconnected; None before that.
     """
     ends = {line.which: line for line in lines if isinstance(line, events.Recorded | events.RecordingLost)}
     if not lines or not events.start_of(lines).recordings:
@@ -452,18 +472,24 @@ def _recorded_presentations(
 
 
 def _recorded_setup(
-    path: Path, kept: Mapping[str, Any], key: Key, lines: Sequence[events.Event]
+    path: Path, session_receipt: Mapping[str, Any], key: Key, lines: Sequence[events.Event]
 ) -> tuple[Protocol, dict[str | None, _Device], tuple[int, str]]:
-    """Return protocol, devices, and seed with participant of a session from its receipt ``kept`` at ``path``.
+    """Return protocol, devices, and (seed, participant) of a session from its receipt at ``path``.
 
-    Devices are by the time at which they were opened again; that of the session's beginning is under None.
+    Devices have the time at which they were opened again as keys; the first one has the key None.
     """
     with protocol_errors(path):
-        described = {None: kept["device"]} | {entry["at"]: entry["device"] for entry in kept.get("resumed", ())}
+        described = {None: session_receipt["device"]} | {
+            entry["at"]: entry["device"] for entry in session_receipt.get("resumed", ())
+        }
         described |= {line.at: line.described for line in lines if isinstance(line, events.DeviceReconnected)}
         devices = {
-            at: _Device(float(device.get("force_limit_n", np.inf)), dynamics_from(device), rules_from(device))
-            for at, device in described.items()
+            opened_at: _Device(float(device.get("force_limit_n", np.inf)), dynamics_from(device), rules_from(device))
+            for opened_at, device in described.items()
         }
-        whose = kept["seed"], kept["participant"]
-        return recorded_protocol(complete_protocol(kept["protocol"], key), kept, key), devices, whose
+        seed_and_participant = session_receipt["seed"], session_receipt["participant"]
+        return (
+            recorded_protocol(complete_protocol(session_receipt["protocol"], key), session_receipt, key),
+            devices,
+            seed_and_participant,
+        )

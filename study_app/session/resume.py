@@ -24,10 +24,10 @@ REHEARSED_SCREENS: dict[str, Any] = {"participant": "simulated", "refresh_hz": 6
 
 @dataclass(frozen=True, slots=True)
 class Start:
-    """The start of a session: its first step's index, earlier presentations of trials, and counted answers.
+    """The point at which a session starts or resumes: the index of its first step, and the state of earlier trials.
 
-    ``presented`` is by trial number; ``heard`` are the answered trials of designs that still count. ``invalid`` counts
-    the attempts at the first step's trial that were not delivered as requested.
+    ``presented`` maps trial numbers to earlier presentations; ``heard`` are the answered trials of designs that still
+    count. ``invalid`` counts the attempts at the first step's trial that were not delivered as requested.
     """
 
     step: int = 0
@@ -42,30 +42,30 @@ FIRST = Start()
 def resume_at(
     protocol: Protocol, schedule: Schedule, lines: Iterable[Event], key: Key | None = None, *, exactly: bool = False
 ) -> Start:
-    """Return the start from which the session with these journal lines continues.
+    """Return the point from which the session with these journal lines continues.
 
     The levels of answered trials are those of the journal, opened with the study's ``key``; without it `Start.heard` is
     empty.
 
     A trial with unconfirmed answers is presented again as its next attempt, so that no answer refers to a percept
-    before the gap; a completed trial without questions is over. With ``resume = "block"`` the whole block is presented
-    again, unless the session continues ``exactly`` at the interrupted step. SessionError is raised if the journal does
-    not fit this schedule.
+    before the gap; a completed trial without questions is over. With ``resume = "block"`` in the study the whole block
+    is presented again, unless the session continues ``exactly`` at the interrupted step. Raise SessionError if the
+    journal does not fit this schedule.
     """
     lines = list(lines)
     progress = progress_of(lines)
     step = reached = _next_step(protocol, schedule, progress)
     heard = () if key is None else trial_results(protocol, open_events(lines, key))
     if protocol.study.resume == "block" and not exactly:
-        within = _trial_around(schedule.steps, step)
-        if within is not None:  # back to the first trial of its block
+        trial = _trial_around(schedule.steps, step)
+        if trial is not None:  # back to the first trial of its block
             step = next(
                 index
                 for index, other in enumerate(schedule.steps)
-                if isinstance(other, Trial) and other.block == within.block
+                if isinstance(other, Trial) and other.block == trial.block
             )
-        before = {trial.number for trial in schedule.steps[:step] if isinstance(trial, Trial)}
-        heard = tuple(result for result in heard if result.trial in before)
+        earlier_trials = {trial.number for trial in schedule.steps[:step] if isinstance(trial, Trial)}
+        heard = tuple(result for result in heard if result.trial in earlier_trials)
     return Start(step, progress.presented, heard, progress.invalid if step == progress.step == reached else 0)
 
 
@@ -89,8 +89,8 @@ def find_protocol(
 ) -> str:
     """Return the file or name of the protocol of a session, from its journal's first line.
 
-    It is searched for among ``candidates``, by default the protocols in the workspace, shipped ones, and recent ones;
-    ``read`` returns the content of one. SessionError is raised if none of them belongs to that study.
+    It is searched for among ``candidates``, by default the protocols in the workspace, the shipped ones and the recent
+    ones; ``read`` returns the source of one. Raise SessionError if none of them belongs to that study.
     """
     names = dict.fromkeys((*known_protocols(), *recent_protocols()) if candidates is None else candidates)
     sources: dict[str, bytes] = {}
@@ -112,25 +112,33 @@ def find_protocol(
 def _next_step(protocol: Protocol, schedule: Schedule, progress: Progress) -> int:
     """Return the index of the first unfinished step, checked against its name in the journal."""
     steps = schedule.steps
-    here = steps[progress.step] if progress.step < len(steps) else None
-    named = here.page_id if isinstance(here, PageStep) else here.form if isinstance(here, FormStep) else None
-    number = here.number if isinstance(here, Trial) else None
-    if (progress.page, progress.trial) not in {(None, None), (named, number)}:
+    step_to_check = steps[progress.step] if progress.step < len(steps) else None
+    step_name = (
+        step_to_check.page_id
+        if isinstance(step_to_check, PageStep)
+        else step_to_check.form
+        if isinstance(step_to_check, FormStep)
+        else None
+    )
+    number = step_to_check.number if isinstance(step_to_check, Trial) else None
+    if (progress.page, progress.trial) not in {(None, None), (step_name, number)}:
         raise SessionError(
             "the journal does not follow the order determined by the seed and the participant, so the session "
             "cannot be resumed"
         )
     if number is not None and progress.invalid >= (protocol.limits.attempts or math.inf):
-        return progress.step + 1  # it was presented the greatest permitted number of times
-    asks = isinstance(here, Trial) and protocol.questionnaire_of(here.block) is not None
-    return progress.step + 1 if number is not None and progress.task_done and not asks else progress.step
+        return progress.step + 1  # all permitted attempts were made
+    has_questions = isinstance(step_to_check, Trial) and protocol.questionnaire_of(step_to_check.block) is not None
+    return progress.step + 1 if number is not None and progress.task_done and not has_questions else progress.step
 
 
 def _trial_around(steps: tuple[Step, ...], step: int) -> Trial | None:
     """Return a trial of the block that contains ``step`` (a trial, or a break between trials); None elsewhere."""
-    here, before, after = (steps[at] if 0 <= at < len(steps) else None for at in (step, step - 1, step + 1))
-    if isinstance(here, Trial):
-        return here
-    if isinstance(before, Trial) and isinstance(after, Trial) and before.block == after.block:
-        return after
+    current, previous, following = (
+        steps[index] if 0 <= index < len(steps) else None for index in (step, step - 1, step + 1)
+    )
+    if isinstance(current, Trial):
+        return current
+    if isinstance(previous, Trial) and isinstance(following, Trial) and previous.block == following.block:
+        return following
     return None

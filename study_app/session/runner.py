@@ -1,16 +1,15 @@
 """Run one session: feed events to the state machine, execute its commands, and poll the device.
 
-All side effects go through ``Ports``. Events come from windows (``post``) and from the device
-(``poll``, once a frame); what the participant sees comes from ``view``, what was seen goes into ``frame_shown``. All of
-it in one thread; a window that answers a page while it is being presented is heard after the commands under way.
+All side effects go through ``Ports``. Events come from windows (``post``) and from the device (``poll``, once a frame).
+``view`` returns the tank to draw, and ``frame_shown`` records what was drawn. Everything runs in one thread. Events
+posted while a command runs are queued.
 
 A trial begins with the first ``frame_shown`` after its page was presented: then its force fades in, its task's clock
-starts and its recording begins (see ``trial``).
+starts and its recording begins (see ``trial``). If the program or the computer is suspended during a trial, the session
+pauses and the trial is repeated.
 
-Where the program or the machine stood still within a trial, the session pauses, and the trial comes again.
-
-Where the disk takes nothing, the session stalls: zero force, a calm page, and what was to be done is kept and tried
-again until it is done, in order and once. Then the session is paused, and goes on when the operator resumes it.
+If a write fails, the session stalls: zero force, a waiting page, and the pending writes are retried in order, each
+exactly once. Afterwards the session is paused until the operator resumes it.
 """
 
 import math
@@ -37,14 +36,14 @@ from study_app.session.trial import Recording, RunningTrial, is_ball_at_start, r
 from study_app.store.journals.journal_events import TargetReached
 from study_app.store.session_progress import broken_interval_limits, broken_limits, delivered_values
 
-_STOOD_STILL_S = 3.0  # a longer gap between two trials is noted; in a trial see `trial.FROZEN_S` [choice]
+_MAX_STANDSTILL_S = 3.0  # a longer gap between two trials is noted; in a trial see `trial.FROZEN_S` [choice]
 RETRY_S = 1.0  # interval between attempts to write after a failure [s]
 
 
 class Runner:
-    """Run one session; ``key`` has the condition of each code by block, ``start`` is the step of a resumed session.
+    """Run one session; ``key`` maps block and code to the condition, ``start`` is the point of resumption.
 
-    ``secret`` is the sealed key's nonce, from which levels are drawn; a study without designs needs none.
+    ``secret`` is the sealed key's nonce, from which levels are drawn; it is not needed in a study without designs.
     """
 
     def __init__(
@@ -109,7 +108,7 @@ class Runner:
     def post(self, event: events.Event) -> None:
         """Apply an event. Raise SessionError, leaving the state unchanged, if it is not allowed now.
 
-        StoreError means that the session ended while it was stalled: it stays unfinished, without an end on the disk.
+        StoreError means that the session ended while it was stalled: its end was not written, so it stays unfinished.
         """
         if isinstance(event, events.ForceStopped):
             self._ports.servo.stop_force()
@@ -117,17 +116,17 @@ class Runner:
         if self._busy:
             return
         self._busy = True
-        refused: SessionError | None = None
+        first_error: SessionError | None = None
         try:
             while self._waiting:
                 try:
                     self._apply_event(self._waiting.popleft())
                 except SessionError as error:
-                    refused = refused or error
+                    first_error = first_error or error
         finally:
             self._busy = False
-        if refused is not None:
-            raise refused
+        if first_error is not None:
+            raise first_error
 
     def poll(self) -> None:
         """Poll the device: update the task, handle buttons, detect faults. Call it once per frame."""
@@ -136,16 +135,16 @@ class Runner:
         if self._ending is not None:
             if self._ports.settled():
                 (finish, at_s), self._ending = self._ending, None
-                self._carry_out_all((finish,), at_s)
+                self._execute_all((finish,), at_s)
                 self._notify_listeners()
             return
         now_s = self._ports.clock()
-        still_s, self._polled_s = now_s - self._polled_s, now_s
+        standstill_s, self._polled_s = now_s - self._polled_s, now_s
         if self._state.stall is not None:
             if now_s >= self._retry_s:
                 self.post(events.WriteRetried(now_s))
             return
-        if not self._carry_out_all((events.CheckFlushed(),), now_s):
+        if not self._execute_all((events.CheckFlushed(),), now_s):
             return
         fault = self._ports.servo.fault
         if fault is not None and self._state.phase not in {Phase.TROUBLE, *FINAL}:
@@ -155,12 +154,12 @@ class Runner:
                 self.post(event)
             self._follow_samples(samples)
         running = self._running
-        if running is None and still_s > _STOOD_STILL_S and self._state.phase not in {Phase.OPENING, *FINAL}:
-            self.post(events.Note(now_s, "note", f"the program stalled for {still_s:.1f} s"))
+        if running is None and standstill_s > _MAX_STANDSTILL_S and self._state.phase not in {Phase.OPENING, *FINAL}:
+            self.post(events.Note(now_s, "note", f"the program stalled for {standstill_s:.1f} s"))
         if running is not None and running.frozen:
             self.post(events.PauseRequested(self._ports.clock(), "program"))
         elif running is not None and (outcome := running.outcome()) is not None:
-            self.post(self._task_done(running, outcome))
+            self.post(self._task_done_event(running, outcome))
         elif self._state.phase in {Phase.RESTING, Phase.FEEDBACK} and now_s >= (self._state.until_s or 0.0):
             rest = self.view(self._ports.servo.now_ns())
             if rest is None or is_ball_at_start(rest, self._state.task):
@@ -170,9 +169,9 @@ class Runner:
         return self._state, self._running is not None and self._running.adjustable
 
     def view(self, now_ns: int) -> TankView | None:
-        """Return the view to draw at ``now_ns`` (servo's clock) with the trial's delay; None without a trial.
+        """Return the view to draw at ``now_ns`` (servo's clock) with the trial's delay, in a rest without one.
 
-        In a rest there is no delay.
+        Return None if there is neither a trial nor a rest.
         """
         if self._running is not None:
             return self._running.view(now_ns)
@@ -181,13 +180,13 @@ class Runner:
         return resting_view(self._ports.servo, self._state.task, now_ns)
 
     def frame_shown(self, painted_ns: int, sample_ns: int) -> None:
-        """Record a painted frame of the trial's tank and the time that it shows [ns, servo's clock]."""
+        """Record the time of a painted frame, and of the sample that it shows [ns, servo's clock]."""
         if self._running is None:
             return
         try:
             self._running.frame(painted_ns, sample_ns)
         except StudyError as error:
-            self._fail(error)
+            self._report_failure(error)
 
     def _apply_event(self, event: events.Event) -> None:
         if isinstance(event, events.Stepped) and not self._button_state()[1]:
@@ -203,7 +202,7 @@ class Runner:
         elif isinstance(event, events.Reconnected):
             self._cause = ""
             self._recording.forget()
-        if self._carry_out_all(commands, event.at_s):
+        if self._execute_all(commands, event.at_s):
             self._notify_listeners()
         if isinstance(event, events.EndRequested) and stall is not None:
             raise StoreError(
@@ -215,38 +214,38 @@ class Runner:
         """Retry the pending writes; continue the session if they succeed."""
         waiting = tuple(self._waiting)
         self._state, commands = advance(self._state, events.WriteRetried(stall.at_s))
-        done = self._carry_out_all(commands, stall.at_s)
-        broke = [event for event in self._waiting if isinstance(event, events.Broke) and event not in waiting]
-        self._waiting = deque((*waiting, *broke))  # events of a page that is covered again at once are sent again later
-        if done:
+        succeeded = self._execute_all(commands, stall.at_s)
+        failures = [event for event in self._waiting if isinstance(event, events.Broke) and event not in waiting]
+        self._waiting = deque((*waiting, *failures))  # other events belong to a page that is covered again
+        if succeeded:
             self._apply_event(events.WriteCompleted(self._ports.clock()))
 
     def _notify_listeners(self) -> None:
         for listener in self._listeners:
             listener(self._state)
 
-    def _carry_out_all(self, commands: Sequence[events.Command], at_s: float) -> bool:
+    def _execute_all(self, commands: Sequence[events.Command], at_s: float) -> bool:
         """Execute commands in order; return whether all writes succeeded. Other failures are reported as events."""
         for index, command in enumerate(commands):
             if isinstance(command, events.Finish) and not self._ports.settled():
                 self._ending = command, at_s
                 continue
             try:
-                self._carry_out(command, at_s)
+                self._execute(command, at_s)
             except StoreError as error:
                 self._retry_s = self._ports.clock() + RETRY_S
                 self._apply_event(events.WriteFailed(at_s, str(error), tuple(commands[index:])))
                 return False
             except StudyError as error:
-                self._fail(error)
+                self._report_failure(error)
                 return True
         return True
 
-    def _fail(self, error: StudyError) -> None:
+    def _report_failure(self, error: StudyError) -> None:
         self._ports.servo.stop_force()
         self.post(events.broken(self._ports.clock(), error))
 
-    def _carry_out(self, command: events.Command, at_s: float) -> None:
+    def _execute(self, command: events.Command, at_s: float) -> None:
         servo, journal = self._ports.servo, self._ports.journal
         match command:
             case events.StopForce():
@@ -271,8 +270,8 @@ class Runner:
             case events.StartTrial():
                 self._running = self._prepare_trial(command)
             case events.Adjust(presented, delay_s, stepped):
-                other = None if presented.vary == DELAY else self._protocol.presented_scene(presented)
-                scene = None if self._running is None else self._running.adjust(other, delay_s)
+                changed_scene = None if presented.vary == DELAY else self._protocol.presented_scene(presented)
+                scene = None if self._running is None else self._running.adjust(changed_scene, delay_s)
                 journal.append(replace(stepped, scene=scene), t_s=at_s, waits=False)
             case events.ShowPage(page):
                 self._page_since_ns = servo.now_ns()
@@ -297,16 +296,16 @@ class Runner:
             videos=any(condition.shows_video for condition in self._protocol.conditions.values()),
         )
 
-    def _task_done(self, running: RunningTrial, outcome: Outcome) -> events.TaskDone:
-        """Return the event of a completed task; for an interval, with delivered values and broken limits."""
+    def _task_done_event(self, running: RunningTrial, outcome: Outcome) -> events.TaskDone:
+        """Return the event of a completed task; for an interval, with delivered values and violated limits."""
         summary, limits, command = running.summary(), self._protocol.limits, running.command
         reasons: tuple[str, ...] = ()
         if command.interval is not None and limits.attempts is not None:
-            what = command.presented, command.task
-            delivery = delivered_values(self._protocol, *what, running.samples, adjusted=command.adjusts)
+            interval_arguments = command.presented, command.task
+            delivery = delivered_values(self._protocol, *interval_arguments, running.samples, adjusted=command.adjusts)
             summary |= delivery.columns
             reasons = (
-                *broken_interval_limits(limits, *what, delivery, adjusted=command.adjusts),
+                *broken_interval_limits(limits, *interval_arguments, delivery, adjusted=command.adjusts),
                 *broken_limits(summary, limits.model_dump()),
             )
         return events.TaskDone(self._ports.clock(), outcome, summary, reasons)
@@ -314,7 +313,7 @@ class Runner:
     def _follow_samples(self, samples: Any) -> None:
         if (running := self._running) is None:
             return
-        self._carry_out_all(
+        self._execute_all(
             [
                 events.Write(TargetReached(trial=running.trial, target=reached.target, t_task_s=reached.t_task_s))
                 for reached in running.follow(samples)

@@ -57,13 +57,14 @@ _PLAYED_MEASURED_S = 0.5  # the same before a session played from the designer [
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NewSession:
-    """The choices of the operator; ``results`` is the study's folder, ``screen`` counts from 1 (None: the last).
+    """The operator's choices for a session to begin or resume.
 
-    ``resumes`` is the folder of the session to resume, None for a new one; ``device_options`` are the values of the
-    device's options, by name. ``row_of`` is the id of the replaced participant, ``group`` the participant's
-    pre-existing group; None: none, or as in the participant's first session. ``played`` means that it is played from
-    the designer: it continues exactly at the interrupted step and has no operator's window. ``footage`` is the folder
-    of the study's footage, None: that of its file.
+    ``results`` is the study's folder. ``screen`` counts from 1; None is the last screen. ``resumes`` is the folder of
+    the session to resume, None for a new one; ``device_options`` are the values of the device's options, by name.
+    ``row_of`` is the id of the replaced participant and ``group`` the participant's pre-existing group; each is None if
+    there is none, or to keep that of the first session. ``played`` means that the session is played from the designer:
+    it continues exactly at the interrupted step and has no operator's window. ``footage`` is the folder of the study's
+    footage; by default it is the folder of the study's file.
     """
 
     source: str
@@ -116,16 +117,16 @@ def resumed_choices(
     screen: int | None = None,
     device_options: Mapping[str, str | Path] | None = None,
 ) -> NewSession:
-    """Return the choices with which the session in a folder is resumed: its own, and the present screen.
+    """Return the choices for resuming the session in a folder: those recorded, with the current screen.
 
-    StoreError: the session cannot be resumed, since it is not a session folder, open in another program, finished,
-    damaged, or of another protocol. SessionError: no available protocol is of its study.
+    Raise StoreError if the session cannot be resumed: it is not a session folder, open in another program, finished,
+    damaged, or of another protocol. Raise SessionError if no available protocol belongs to its study.
     """
     study, folder = locate_session(session_folder)
     refuse_never_begun(folder)
     lines = journal.read(folder.journal)
-    start, done = start_of(lines), progress_of(lines)
-    refuse_finished(folder, done)
+    start, progress = start_of(lines), progress_of(lines)
+    refuse_finished(folder, progress)
     read = partial(source_to_resume, session_folder)
     chosen = protocol if protocol is not None else find_protocol(start, candidates, read)
     source = read(chosen)
@@ -136,7 +137,7 @@ def resumed_choices(
         session=start.session,
         seed=start.seed,
         operator=operator,
-        language=done.language,
+        language=progress.language,
         device=device if device is not None else start.device or "",
         windowed=windowed or start.pilot,
         screen=screen,
@@ -151,9 +152,9 @@ def resumed_choices(
 
 
 def check_row(row_of: str | None, study: Protocol) -> None:
-    """Raise SessionError for a replaced participant's id if it has no effect in this study.
+    """Raise SessionError if a replaced participant's id has no effect in this study.
 
-    With groups the replaced participant's entry is looked up (`allocation.check_choice`), not the number in the id.
+    In a study with groups any id is accepted here, since `allocation.check_choice` looks up its entry.
     """
     if row_of is None or study.groups:
         return
@@ -176,17 +177,17 @@ def draw_seed() -> int:
 
 def study_results(results: Path, study: str, device: str, *, pilot: bool = False) -> Path:
     """Return a study's folder under ``results``; pilots and simulated hands are kept apart from participants' data."""
-    used = descriptor_of(device)
-    name = f"{study}-{used.name}" if used.simulated else study
+    descriptor = descriptor_of(device)
+    name = f"{study}-{descriptor.name}" if descriptor.simulated else study
     return study_folder(results, name, pilot=pilot).path
 
 
 @dataclass(frozen=True, slots=True)
 class Ready:
-    """Device and servo at rest with their measurements; ``masking`` is the operator's answer, if asked.
+    """Device and servo at rest with their measurements; ``masking`` is the operator's answer, None if not asked.
 
-    ``outlets`` are open already, so that programs that record them can be connected before the session; ``videos`` are
-    those of the study, None where it shows none.
+    ``outlets`` are already open, so that recording programs can connect before the session; ``videos`` are those of the
+    study, None if it shows none.
     """
 
     rig: Rig
@@ -239,13 +240,13 @@ def unopened_videos(chosen: NewSession, study: Protocol, camera: str, rig: Rig) 
 def measure_rig(
     rig: Rig, chosen: NewSession, videos: Videos | None = None, *, sleep: Callable[[float], object] = time.sleep
 ) -> Measurements:
-    """Return the measurements for the pre-flight except the screen's; a ``sleep`` that does not wait shortens them.
+    """Return the measurements for the pre-flight, without those of the screen.
 
-    ``videos`` that are not open yet, or failed, are opened.
+    ``videos`` that are not open yet, or failed, are opened. Tests pass a ``sleep`` that does not wait.
     """
     from study_app.session.preflight_measurements import measure_servo_and_disk  # noqa: PLC0415 - the compiler: only once it is needed
 
-    looked = None if videos is None else videos.open()
+    video_status = None if videos is None else videos.open()
     facts = measure_servo_and_disk(
         rig.servo,
         chosen.results,
@@ -260,10 +261,10 @@ def measure_rig(
     untranslated = untranslated_on_pages(document)
     return replace(
         facts,
-        video=looked,
+        video=video_status,
         ran_otherwise=participant_with_other_contents(chosen),
         untranslated=untranslated,
-        late_device=seen_late(rig, StudyFolder(chosen.results), chosen.read_protocol().study.blinding),
+        late_device=late_device_sentence(rig, StudyFolder(chosen.results), chosen.read_protocol().study.blinding),
     )
 
 
@@ -274,17 +275,17 @@ def participant_with_other_contents(chosen: NewSession) -> str:
     source = chosen.read_source()
     version = parse(source, chosen.source).study.version
     for session in StudyFolder(chosen.results).sessions():
-        ran = run_of(session.receipt)
-        if ran is not None and ran.version == version and not has_hash(source, ran.hash):
+        run = run_of(session.receipt)
+        if run is not None and run.version == version and not has_hash(source, run.hash):
             return session.participant
     return ""
 
 
-def seen_late(rig: Rig, folder: StudyFolder, blinding: str) -> str:
-    """Return a sentence on when the device answered later than the servo assumes; "" if that was not seen.
+def late_device_sentence(rig: Rig, folder: StudyFolder, blinding: str) -> str:
+    """Return a sentence if the device is known to have answered later than the servo assumes, else "".
 
-    The bench test on this computer shows it, or else the trials of the study's last session. In a double-blind study,
-    these would reveal which participants felt a thick liquid, so they are only read after unblinding.
+    The sources are the bench test on this computer, or else the trials of the study's last session. In a double-blind
+    study these would reveal which participants felt a thick liquid, so they are read only after unblinding.
     """
     bench = with_bench_measurements(rig.described).get("bench")
     if bench is not None:
@@ -321,7 +322,7 @@ def open_store(
     videos: Videos | None = None,
 ) -> SessionStore:
     """Claim a new session on the disk or open the resumed one; ``outlets`` get the markers of its events."""
-    here: dict[str, Any] = {
+    environment: dict[str, Any] = {
         "operator": chosen.operator,
         "device": with_bench_measurements(rig.described),
         "screens": screens,
@@ -330,7 +331,7 @@ def open_store(
         "video": None if videos is None else videos.describe(),
     }
     if chosen.resumes is not None:
-        store = reopen_store(chosen.resumes, protocol, source, now_ns=rig.servo.now_ns, **here)
+        store = reopen_store(chosen.resumes, protocol, source, now_ns=rig.servo.now_ns, **environment)
     else:
         start = SessionStart(
             chosen.participant,
@@ -342,7 +343,7 @@ def open_store(
             recordings=chosen.recordings,
             row_of=chosen.row_of,
             group=chosen.group,
-            **here,
+            **environment,
         )
         store = begin_session(chosen.results, protocol, source, start, clock=SessionClock(rig.servo.now_ns))
     if outlets is not None:

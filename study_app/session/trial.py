@@ -1,9 +1,9 @@
-"""The running trial: prepared, begun by the first painted frame of its tank, tracked, recorded and summarised.
+"""The running trial: prepared, started by the first painted frame of its tank, tracked, recorded and summarised.
 
-Until that frame there is no force, the task's clock stands at zero and nothing is recorded, however long a window takes
-to show the tank. Without a window, whoever runs the session reports the first frame at once. A recording has every tick
-from shortly before the first frame: whatever the force was still fading from, so that every force of the trial can be
-computed again from the recording alone. Measures name no requested delay: only the achieved one less the requested.
+Before that frame there is no force, the task's clock is at zero and nothing is recorded, however long a window takes to
+show the tank. Without a window, the caller reports the first frame at once. A recording begins shortly before the first
+frame and contains every tick, so that all forces of the trial, including the fade from an earlier force, can be
+computed from the recording alone. Measures contain only the error of the delay, never the requested delay.
 """
 
 import math
@@ -24,28 +24,28 @@ from study_app.store.session_progress import JUDGED, delivered_error, judged_fie
 from study_app.video.frames import VideoFrame, VideoSource, VideoStatistics
 
 _LEAD_S = 0.6  # time of samples kept for the next recording [s]: longer than the slowest fade
-_OF_ROW = ("tick", "lateness_ns", "permitted_n", "withheld_n", "delay_ticks")
-_KEPT = np.dtype([(name, SAMPLE[name]) for name in (*(JUDGED.names or ()), *_OF_ROW)])
-"""The fields kept of a trial's samples: 128 of 320 bytes."""
-# Everything is drawn this much later than the trial asks. Then the moment to draw lies between two samples at every
-# delay, including none, and is met exactly; else the newest sample, up to a tick old, would be drawn if there is no
-# delay, and the error of the delay would identify these trials. Two ticks at 1 kHz.
+_ROW_FIELDS = ("tick", "lateness_ns", "permitted_n", "withheld_n", "delay_ticks")
+_STORED_SAMPLE = np.dtype([(name, SAMPLE[name]) for name in (*(JUDGED.names or ()), *_ROW_FIELDS)])
+"""The fields of a trial's samples that are stored: 128 of 320 bytes."""
+# Everything is drawn this much later than requested (two ticks at 1 kHz), so that the drawn time always lies between
+# two samples and is met exactly. Otherwise a trial without a delay would draw the newest sample, which is up to a tick
+# old, and the error of its delay would identify it.
 SETTLED_S = 0.002
-_LEAST_SET_S = 1.0
-"""Least time of a setting after the task's lead [s]: a shorter one could not be judged. [choice]"""
+_MIN_SETTING_S = 1.0
+"""Minimum time of a setting after the task's lead-in [s], since a shorter one could not be evaluated. [choice]"""
 _FROZEN_S = 1.0
-"""Longest time without a tick or frame before the attempt ends [s]: no limit of a study permits more. [choice]"""
+"""Longest time without a tick or frame that does not end the attempt [s]; no study permits more. [choice]"""
 
 
 class Recording:
-    """Passes samples and frames of trials to the recorder; without a recorder it does nothing."""
+    """Pass samples and frames of trials to the recorder; without a recorder do nothing."""
 
     def __init__(self, recorder: RecorderPort | None, rate_hz: float) -> None:
         self._recorder = recorder
         self._rate_hz = rate_hz
         self._lead = round(_LEAD_S * rate_hz)
         self._before: deque[Any] = deque()
-        self._held = 0
+        self._sample_count = 0
         self._running = False
 
     def add_samples(self, samples: Any) -> None:
@@ -55,14 +55,14 @@ class Recording:
         if self._running:
             self._recorder.append(samples)
         self._before.append(samples)
-        self._held += len(samples)
-        while self._held - len(self._before[0]) >= self._lead:
-            self._held -= len(self._before.popleft())
+        self._sample_count += len(samples)
+        while self._sample_count - len(self._before[0]) >= self._lead:
+            self._sample_count -= len(self._before.popleft())
 
     def forget(self) -> None:
-        """Discard earlier samples: the servo was restarted, so that the force does not continue from them."""
+        """Discard earlier samples after a restart of the servo, since the force does not continue from them."""
         self._before.clear()
-        self._held = 0
+        self._sample_count = 0
 
     def start(self, trial: int, attempt: int, interval: int | None = None) -> None:
         """Begin the recording of a trial or of one of its intervals with the samples just before it."""
@@ -70,9 +70,9 @@ class Recording:
             return
         self._recorder.start(trial, attempt, self._rate_hz, interval)
         self._running = True
-        spare = max(self._held - self._lead, 0)
+        surplus = max(self._sample_count - self._lead, 0)
         for index, samples in enumerate(self._before):
-            self._recorder.append(samples[spare:] if index == 0 else samples)
+            self._recorder.append(samples[surplus:] if index == 0 else samples)
 
     def frame(self, painted_ns: int, sample_ns: int, video: VideoFrame | None = None) -> None:
         """Record a painted frame, the time that it shows [ns], and its video frame."""
@@ -91,7 +91,7 @@ class _FrameStatistics:
     def __init__(self, *, late_s: float, due_ns: int, paints: bool = True, videos: bool = False) -> None:
         self._video = VideoStatistics() if videos else None
         self._late_s = late_s
-        self._fewest = 1 if paints else 2  # a gap before the first frame does not count
+        self._min_frames = 1 if paints else 2  # a gap before the first frame does not count
         self._errors_s: list[float] = []
         self._painted_ns = due_ns
         self._first_gap_ns = 0
@@ -114,43 +114,43 @@ class _FrameStatistics:
 
     def frame_gap_ns(self, until_ns: int) -> int:
         """Return the longest time between frames, including the one since the newest [ns]; 0 before the first frame."""
-        return max(self._frame_gap_ns, until_ns - self._painted_ns) if len(self._errors_s) >= self._fewest else 0
+        return max(self._frame_gap_ns, until_ns - self._painted_ns) if len(self._errors_s) >= self._min_frames else 0
 
     def columns(self, until_ns: int) -> dict[str, Any]:
-        """Return the columns of the trial row; the last frame was shown until ``until_ns``."""
+        """Return the frame columns of a trial's row; the last frame was shown until ``until_ns``."""
         errors_s = np.asarray(self._errors_s, np.float64)
-        seen = errors_s.size > 0
+        has_frames = errors_s.size > 0
         return {
             "frames": int(errors_s.size),
             "frames_late": int((errors_s > self._late_s).sum()),
-            "delay_error_mean_ms": float(errors_s.mean()) * 1e3 if seen else None,
-            "delay_error_p95_ms": float(np.percentile(errors_s, 95)) * 1e3 if seen else None,
-            "delay_error_max_ms": float(errors_s.max()) * 1e3 if seen else None,
-            "first_frame_gap_ms": self._first_gap_ns * 1e-6 if seen else None,
-            "worst_frame_gap_ms": self.frame_gap_ns(until_ns) * 1e-6 if errors_s.size >= self._fewest else None,
+            "delay_error_mean_ms": float(errors_s.mean()) * 1e3 if has_frames else None,
+            "delay_error_p95_ms": float(np.percentile(errors_s, 95)) * 1e3 if has_frames else None,
+            "delay_error_max_ms": float(errors_s.max()) * 1e3 if has_frames else None,
+            "first_frame_gap_ms": self._first_gap_ns * 1e-6 if has_frames else None,
+            "worst_frame_gap_ms": self.frame_gap_ns(until_ns) * 1e-6 if errors_s.size >= self._min_frames else None,
             **({} if self._video is None else self._video.columns()),
         }
 
 
 def _sample_columns(samples: Any, rate_hz: float, samples_dropped: int, worst_gap_s: float) -> dict[str, Any]:
-    """Return the columns of a trial's row from its samples (array of ``layout.SAMPLE``); None without samples.
+    """Return the sample columns of a trial's row (array of ``layout.SAMPLE``); most are None without samples.
 
     ``worst_gap_s`` is the longest time between two ticks, as recorded by the servo.
     """
-    timed = timing(samples.view(np.recarray), rate_hz)
-    ticks = timed.ticks
+    trial_timing = timing(samples.view(np.recarray), rate_hz)
+    ticks = trial_timing.ticks
     elapsed_s = float(samples["time_ns"][-1] - samples["time_ns"][0]) * 1e-9 if ticks else 0.0
-    places = samples["position_m"][samples["limiters"] & LIMITER_GLITCH == 0]
-    steps = np.diff(places[np.isfinite(places).all(axis=1)], axis=0)
+    positions_m = samples["position_m"][samples["limiters"] & LIMITER_GLITCH == 0]
+    steps = np.diff(positions_m[np.isfinite(positions_m).all(axis=1)], axis=0)
     path_m = float(np.sqrt(np.einsum("ij,ij->i", steps, steps)).sum())
     force_n = np.sqrt(np.einsum("ij,ij->i", samples["device_force_n"], samples["device_force_n"]))
     permitted_n, delay_ticks = float(samples["permitted_n"].sum()), samples["delay_ticks"]
     return {
         "ticks": ticks,
-        "tick_rate_hz": timed.rate_hz if ticks > 1 else None,
-        "lateness_p99_ms": timed.lateness_p99_s * 1e3 if ticks else None,
+        "tick_rate_hz": trial_timing.rate_hz if ticks > 1 else None,
+        "lateness_p99_ms": trial_timing.lateness_p99_s * 1e3 if ticks else None,
         "worst_gap_ms": worst_gap_s * 1e3 if ticks else None,
-        "overruns": timed.overruns,
+        "overruns": trial_timing.overruns,
         "samples_dropped": samples_dropped,
         "path_length_m": path_m,
         "mean_speed_mps": path_m / elapsed_s if elapsed_s > 0 else None,
@@ -190,7 +190,7 @@ class RunningTrial:
         if video is not None:
             video.rewind()
         self._hides_ball = hides_ball
-        self._taken: list[bytes] = []
+        self._chunks: list[bytes] = []
         self.command = command
         self._delay_s = self._drawn_delay_s = command.delay_s
         self._scene = scene
@@ -204,7 +204,7 @@ class RunningTrial:
 
     @property
     def task(self) -> TaskView:
-        """The task on the device's clock: for decisions, never for the participant."""
+        """The task at the newest sample, for decisions; the participant sees a delayed view."""
         return self._tracker.now()
 
     def view(self, now_ns: int) -> TankView:
@@ -232,14 +232,14 @@ class RunningTrial:
         """Process the newest samples in order (array of ``layout.SAMPLE``); return the reached targets."""
         if self._serial is None or self._tracker.done:
             return []
-        mine = samples[samples["scene"] >= self._serial]  # each adjustment adds one
-        reached = self._tracker.feed(mine[mine["limiters"] & LIMITER_GLITCH == 0])
+        trial_samples = samples[samples["scene"] >= self._serial]  # each adjustment adds one
+        reached = self._tracker.feed(trial_samples[trial_samples["limiters"] & LIMITER_GLITCH == 0])
         end_ns = self._tracker.end_ns
-        mine = mine if end_ns is None else mine[mine["time_ns"] <= end_ns]
-        kept = np.empty(len(mine), _KEPT)
-        for name in _KEPT.names or ():
-            kept[name] = mine[name]
-        self._taken.append(kept.tobytes())
+        trial_samples = trial_samples if end_ns is None else trial_samples[trial_samples["time_ns"] <= end_ns]
+        stored = np.empty(len(trial_samples), _STORED_SAMPLE)
+        for name in _STORED_SAMPLE.names or ():
+            stored[name] = trial_samples[name]
+        self._chunks.append(stored.tobytes())
         return reached
 
     @property
@@ -248,7 +248,7 @@ class RunningTrial:
         return self.command.adjusts and self._serial is not None and not self._tracker.done
 
     def adjust(self, scene: Scene | None, delay_s: float) -> int | None:
-        """Change the numbers of the scene (None: no force depends on them) and the delay [s].
+        """Change the parameters of the scene (None if they do not affect a force) and the delay [s].
 
         Return the new number of the scene in telemetry; None if it does not change.
         """
@@ -258,18 +258,18 @@ class RunningTrial:
     def leave(self) -> None:
         """End the task at the participant's request, if that is allowed."""
         if self.command.adjusts:
-            self._tracker.finish(self.command.task.judged_from_s + _LEAST_SET_S)
+            self._tracker.finish(self.command.task.judged_from_s + _MIN_SETTING_S)
         else:
             self._tracker.leave()
 
     def outcome(self) -> Outcome | None:
-        """Return the outcome of the task after its end was drawn with the block's longest delay; None before."""
+        """Return the outcome of the task once its end was visible with the block's longest delay; None before that."""
         end_ns = self._tracker.end_ns
         linger_ns = round((self.command.linger_s + SETTLED_S) * 1e9)
         if end_ns is None or self._servo.now_ns() - end_ns < linger_ns:
             return None
-        by_limit = self.command.adjusts and self._tracker.now().elapsed_s >= self.command.task.limit_s
-        return "timeout" if by_limit else self._tracker.outcome
+        at_limit = self.command.adjusts and self._tracker.now().elapsed_s >= self.command.task.limit_s
+        return "timeout" if at_limit else self._tracker.outcome
 
     @property
     def samples(self) -> Any:
@@ -278,14 +278,14 @@ class RunningTrial:
 
     @property
     def _samples(self) -> Any:
-        # records are concatenated field by field, five times slower
-        return np.frombuffer(b"".join(self._taken), _KEPT)
+        # np.concatenate copies records field by field, five times slower
+        return np.frombuffer(b"".join(self._chunks), _STORED_SAMPLE)
 
     @property
     def frozen(self) -> bool:
         """Whether the program or computer was suspended so long that the trial was not presented as specified.
 
-        Telemetry has no missing ticks: the servo's longest gap and the frames' intervals are used.
+        This is computed from the servo's longest gap and the frame intervals, since telemetry shows no missing ticks.
         """
         if self._serial is None:
             return False
@@ -297,20 +297,20 @@ class RunningTrial:
         return self._servo.now_ns() if self._tracker.end_ns is None else self._tracker.end_ns
 
     def summary(self) -> dict[str, Any]:
-        """Return the columns of its row so far (``store.files.columns``)."""
+        """Return the columns of the trial's row so far (see ``store.files.columns``)."""
         dropped = 0 if self._serial is None else self._reader.dropped - self._dropped_before
-        measured = {
+        columns = {
             **_sample_columns(self._samples, self._servo.rate_hz, dropped, self._servo.worst_gap_s),
             **self._frames.columns(self._until_ns),
         }
-        measured = {name: round(value, 6) if isinstance(value, float) else value for name, value in measured.items()}
-        error = None  # if the participant set the force, or the study delays it
+        columns = {name: round(value, 6) if isinstance(value, float) else value for name, value in columns.items()}
+        force_error = None  # stays None if the participant set the force, or the study delays it
         if self._serial is not None and not self.command.adjusts and not self._scene.link.acts:
             from study_app.haptics.runtime.offline import law_along  # noqa: PLC0415 - the compiler: the servo loaded it
 
             law_n = partial(law_along, self._scene)
-            error = delivered_error(self.samples, self._servo.rate_hz, self._scene.fade_s, law_n)
-        return self._tracker.summary() | measured | {"delivered_error": error}
+            force_error = delivered_error(self.samples, self._servo.rate_hz, self._scene.fade_s, law_n)
+        return self._tracker.summary() | columns | {"delivered_error": force_error}
 
 
 def resting_view(servo: ServoPort, task: AnyTask, now_ns: int) -> TankView:

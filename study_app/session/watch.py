@@ -1,7 +1,8 @@
 """Playback of a trial or interval from its recording and its session's journal.
 
-The key opens a recording only once the study is unblinded. While it is sealed, the key gives the task in memory alone,
-and a recording of an earlier version, which is not encrypted, shows the motion without forces, delay and condition.
+An encrypted recording can be opened only after the study is unblinded. Before that, the key is used in memory only to
+read the task, and a recording of an earlier version, which is not encrypted, is shown without forces, delay and
+condition.
 """
 
 from collections.abc import Iterator, Sequence
@@ -54,11 +55,11 @@ class Mark:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Watched:
-    """A recorded trial, or one of its ``intervals`` (0: it has none); times are since its task began [s].
+    """A recorded trial, or one of its ``intervals`` (0 if it has none); all times are since its task began [s].
 
-    ``presented`` is the condition or the interval's contents, "" while the study is ``blinded``: then forces and delay
-    are hidden, too. ``samples`` (n,), at ``times_s``, have valid positions. Frames were painted at ``painted_s`` (k,)
-    and showed the hand at ``shown_s`` (k,); ``lacking`` is the reason if they cannot be read.
+    ``presented`` is the condition or the interval's contents. While the study is ``blinded`` it is "", and forces and
+    delay are hidden, too. ``samples`` (n,), at ``times_s``, have valid positions. Frames were painted at ``painted_s``
+    (k,) and showed the hand at ``shown_s`` (k,); ``lacking`` is the reason if the frames cannot be read.
     """
 
     page: TaskPage
@@ -89,7 +90,7 @@ class Watched:
         return max(int(np.searchsorted(self.times_s, at_s, "right")) - 1, 0)
 
     def drawn_s(self, at_s: float) -> float:
-        """Return the time that the frame visible at ``at_s`` shows [s]; before the first frame ``at_s``."""
+        """Return the time of the hand in the frame visible at ``at_s`` [s]; before the first frame return ``at_s``."""
         frame = int(np.searchsorted(self.painted_s, at_s, "right")) - 1
         return at_s if frame < 0 else float(self.shown_s[frame])
 
@@ -110,10 +111,10 @@ class Watched:
 
 
 def reason_motion_is_hidden(start: events.SessionStarted, key: Key | None) -> str:
-    """Return the reason why a session's motion cannot be shown, or ""; ``key`` is the study's, None while sealed."""
+    """Return the reason why a session's motion cannot be shown, or ""; ``key`` is None while the study is sealed."""
     device = DEVICES.get(start.device or "")
-    seen = device is not None and not device.motion_shows_force
-    return "" if seen or key is not None else _MOTION_HIDDEN
+    is_visible = device is not None and not device.motion_shows_force
+    return "" if is_visible or key is not None else _MOTION_HIDDEN
 
 
 def read_watched(session_folder: Path, trial: int, attempt: int = 1, interval: int = 1) -> Watched:
@@ -127,54 +128,59 @@ def read_watched(session_folder: Path, trial: int, attempt: int = 1, interval: i
     from study_app.store import recordings  # noqa: PLC0415 - pyarrow: only once it is needed
 
     study, session = locate_session(session_folder)
-    shown, lines = opened_key(study), journal.read(session.journal)
-    named = f"trial {trial}"
-    begun = [at for at, line in enumerate(lines) if isinstance(line, events.TrialStarted)]
-    first = next((at for at in begun if lines[at].which[:2] == (trial, attempt)), None)  # type: ignore[attr-defined]
+    key, lines = opened_key(study), journal.read(session.journal)
+    trial_name = f"trial {trial}"
+    start_rows = [at for at, line in enumerate(lines) if isinstance(line, events.TrialStarted)]
+    first = next((at for at in start_rows if lines[at].which[:2] == (trial, attempt)), None)  # type: ignore[attr-defined]
     if first is None:
-        raise StoreError(f"{session.journal} does not contain attempt {attempt} of {named}: choose another trial")
-    _, *own = open_events([lines[0], *lines[first : next((at for at in begun if at > first), None)]], shown)
-    started = own[0]
+        raise StoreError(f"{session.journal} does not contain attempt {attempt} of {trial_name}: choose another trial")
+    _, *trial_lines = open_events([lines[0], *lines[first : next((at for at in start_rows if at > first), None)]], key)
+    started = trial_lines[0]
     assert isinstance(started, events.TrialStarted)  # noqa: S101 - checked before
     which: events.Which = (trial, attempt, interval if started.has_intervals else None)
-    stored = next((line for line in lines if isinstance(line, _STORED) and line.which == which), None)
-    if not isinstance(stored, events.Recorded):
-        why = "no recording was requested, or the recording was interrupted" if stored is None else stored.reason
-        raise StoreError(f"{named} does not have a recording ({why}): choose another trial")
-    secret = None if shown is None else shown.nonce
-    recorded = recordings.read_samples(session.path / stored.recording, secret)
-    if why := reason_motion_is_hidden(events.start_of(lines), shown):
-        raise StoreError(why.rstrip("."))
-    begins = [line for line in own if isinstance(line, _BEGINS)][started.has_intervals :]
-    at = next(number for number, line in enumerate(begins) if line.which == which)
-    ended = next((line for line in own if isinstance(line, _ENDS) and line.which == which), None)
-    samples, times_s = _timed_samples(recorded, own, last=at + 1 == len(begins))
+    recording_line = next((line for line in lines if isinstance(line, _RECORDING_EVENTS) and line.which == which), None)
+    if not isinstance(recording_line, events.Recorded):
+        reason = (
+            "no recording was requested, or the recording was interrupted"
+            if recording_line is None
+            else recording_line.reason
+        )
+        raise StoreError(f"{trial_name} does not have a recording ({reason}): choose another trial")
+    secret = None if key is None else key.nonce
+    recorded_samples = recordings.read_samples(session.path / recording_line.recording, secret)
+    if reason := reason_motion_is_hidden(events.start_of(lines), key):
+        raise StoreError(reason.rstrip("."))
+    starts = [line for line in trial_lines if isinstance(line, _START_EVENTS)][started.has_intervals :]
+    at = next(number for number, line in enumerate(starts) if line.which == which)
+    ended = next((line for line in trial_lines if isinstance(line, _END_EVENTS) and line.which == which), None)
+    samples, times_s = _timed_samples(recorded_samples, trial_lines, last=at + 1 == len(starts))
     if not len(samples):
-        raise StoreError(f"the recording for {named} is empty: choose another trial")
+        raise StoreError(f"the recording for {trial_name} is empty: choose another trial")
     page = _page(study, session.receipt, lines, started, which[-1])
-    lasted_s = None if ended is None else ended.others.get("duration_s")
+    duration_s = None if ended is None else ended.others.get("duration_s")
     tracker = new_tracker(page.task)
-    tracker.feed(samples[(times_s >= 0) & (times_s <= (np.inf if lasted_s is None else lasted_s))])
-    until_s = begins[at + 1].t_s if at + 1 < len(begins) else np.inf
+    tracker.feed(samples[(times_s >= 0) & (times_s <= (np.inf if duration_s is None else duration_s))])
+    until_s = starts[at + 1].t_s if at + 1 < len(starts) else np.inf
     watched_task = Watched(
         page=page,
         language=progress_of(lines).language,
-        blinded=shown is None,
-        presented=_presented_condition(started, which[-1], shown),
-        intervals=len(begins) if started.has_intervals else 0,
+        blinded=key is None,
+        presented=_presented_condition(started, which[-1], key),
+        intervals=len(starts) if started.has_intervals else 0,
         samples=samples,
         times_s=times_s,
         tracker=tracker,
         marks=tuple(
             sorted(
-                [*_marks(own, begins[at], ended, until_s), *_target_marks(ended, page.task)], key=lambda mark: mark.at_s
+                [*_marks(trial_lines, starts[at], ended, until_s), *_target_marks(ended, page.task)],
+                key=lambda mark: mark.at_s,
             )
         ),
     )
-    if shown is None:  # the delay between a sample and its frame is sealed
+    if key is None:  # the delay between a sample and its frame is sealed
         return watched_task
     try:
-        frames = recordings.read_frames(session.path / stored.recording_frames, secret)
+        frames = recordings.read_frames(session.path / recording_line.recording_frames, secret)
     except StoreError as error:
         return replace(watched_task, lacking=f"The frames of the participant's screen are missing: {error}.")
     start_ns = samples["time_ns"][0] - round(watched_task.begins_s * 1e9)
@@ -182,38 +188,44 @@ def read_watched(session_folder: Path, trial: int, attempt: int = 1, interval: i
     return replace(watched_task, painted_s=painted_s, shown_s=shown_s)
 
 
-_STORED: Final = events.Recorded | events.RecordingLost
-_BEGINS: Final = events.TrialStarted | events.IntervalStarted
-_ENDS: Final = events.TrialEnded | events.IntervalEnded
+_RECORDING_EVENTS: Final = events.Recorded | events.RecordingLost
+_START_EVENTS: Final = events.TrialStarted | events.IntervalStarted
+_END_EVENTS: Final = events.TrialEnded | events.IntervalEnded
 
 
-def _timed_samples(recorded: Any, own: Sequence[events.Event], *, last: bool) -> tuple[Any, NDArray[np.float64]]:
+def _timed_samples(
+    recorded: Any, trial_lines: Sequence[events.Event], *, last: bool
+) -> tuple[Any, NDArray[np.float64]]:
     """Return the valid samples, with their times since the first one of the task's scene [s].
 
     An adjustment, of the ``last`` interval, changes the scene's number from its first step on.
     """
     samples = recorded[np.isfinite(recorded["position_m"]).all(axis=1)]
     samples = samples[samples["limiters"] & LIMITER_GLITCH == 0]
-    steps = [line.scene - 1 for line in own if isinstance(line, events.Stepped) and line.scene is not None and last]
-    first = samples["scene"] >= min([*steps, samples["scene"].max(initial=0)])
-    start_ns = samples["time_ns"][int(first.argmax())] if len(samples) else 0
+    steps = [
+        line.scene - 1 for line in trial_lines if isinstance(line, events.Stepped) and line.scene is not None and last
+    ]
+    in_task = samples["scene"] >= min([*steps, samples["scene"].max(initial=0)])
+    start_ns = samples["time_ns"][int(in_task.argmax())] if len(samples) else 0
     return samples, (samples["time_ns"] - start_ns) * 1e-9
 
 
-def _marks(own: Sequence[events.Event], begun: events.Event, ended: Any, until_s: float) -> Iterator[Mark]:
-    """Yield the marks of events after ``begun`` and before ``until_s`` [s, session's clock].
+def _marks(
+    trial_lines: Sequence[events.Event], start_line: events.Event, end_line: Any, until_s: float
+) -> Iterator[Mark]:
+    """Yield the marks of events after ``start_line`` and before ``until_s`` [s, session's clock].
 
-    Targets are on the task's own clock. The task begins with its first frame, whose time is known to a few
-    milliseconds.
+    Targets have times on the task's own clock. The task begins with its first frame, whose time is known to within a
+    few milliseconds.
     """
-    gap_ms = (ended.others.get("first_frame_gap_ms") if ended is not None else None) or 0.0
-    for line in own:
-        if begun.n < line.n and line.t_s < until_s and (told := _mark_text(line)) is not None:
-            at_s = line.t_s - begun.t_s - gap_ms * 1e-3
+    gap_ms = (end_line.others.get("first_frame_gap_ms") if end_line is not None else None) or 0.0
+    for line in trial_lines:
+        if start_line.n < line.n and line.t_s < until_s and (mark_text := _mark_text(line)) is not None:
+            at_s = line.t_s - start_line.t_s - gap_ms * 1e-3
             if isinstance(line, events.TargetReached) and line.t_task_s is not None:
                 at_s = line.t_task_s
-            if line is ended or not isinstance(line, _ENDS):
-                kind, text = told
+            if line is end_line or not isinstance(line, _END_EVENTS):
+                kind, text = mark_text
                 yield Mark(at_s, kind, text)
 
 
@@ -255,15 +267,15 @@ def _page(
         protocol = complete_protocol(receipt.read(path)["protocol"], key).for_session(group, start.session)
     body = protocol.scene.body
     if opened_key(study) is not None:
-        named = key.condition(started.block, started.code) if interval is None else None
-        body = protocol.scene_for(named or protocol.conditions_in(started.block)[0]).body
-    about = {name: getattr(started, name) for name in ("block", "phase", "part", "index", "of", "code")}
-    trial = Trial(number=started.trial, **about, items=())
+        condition = key.condition(started.block, started.code) if interval is None else None
+        body = protocol.scene_for(condition or protocol.conditions_in(started.block)[0]).body
+    trial_fields = {name: getattr(started, name) for name in ("block", "phase", "part", "index", "of", "code")}
+    trial = Trial(number=started.trial, **trial_fields, items=())
     page = task_page(protocol, progress_of(lines).language, trial, body)
     if interval is None:
         return page
-    of = protocol.design_of(protocol.blocks[started.block]).intervals
-    return replace(page, interval=Interval(interval, of, resting=False, announced=""))
+    interval_count = protocol.design_of(protocol.blocks[started.block]).intervals
+    return replace(page, interval=Interval(interval, interval_count, resting=False, announced=""))
 
 
 def _presented_condition(started: events.TrialStarted, interval: int | None, key: Key | None) -> str:
