@@ -1,7 +1,7 @@
 """Accuracy over computation time as CSV, Markdown and a figure for the width of a page, also in grey.
 
-The panels show ways to compute one definition, models of a real liquid, and the force on the hand. Mere
-rounding errors are in a separate strip, so that the other errors keep their resolution.
+The panels compare methods to compute one definition, models of a real liquid, and the force on the hand. Rounding
+errors are in a separate strip, so that the other errors keep their resolution.
 """
 
 import math
@@ -38,7 +38,7 @@ _SLANT_PT: Final = 4.0
 """Rise of labels per decade of time, so that hairlines from the left pass below the points to the right."""
 
 _ROUNDED: Final = 1e-5
-"""Errors below this share of the force are drawn in the strip."""
+"""Errors below this share of the force are rounding errors, which are drawn in a separate strip."""
 
 _LOOKS: Final[dict[str, dict[str, Any]]] = {
     "tick": {"marker": "o", "facecolor": "#0b65a3"},
@@ -52,24 +52,24 @@ _LOOKS: Final[dict[str, dict[str, Any]]] = {
 
 @style.own_settings(style.PLOT_SETTINGS)
 def draw(accuracy: Accuracy) -> Figure:
-    """Draw one panel for each kind of reference and one for the force on the hand, with a legend below."""
+    """Draw a panel for each kind of reference and one for the force on the hand, with a legend below."""
     kinds: tuple[Kind, ...] = ("numerical", "physical")
     panels = [_Panel(accuracy, kind) for kind in kinds if accuracy.of(kind)]
     columns = len(panels) + bool(accuracy.acting)
     notes = " ".join(f"{note[0].upper()}{note[1:]}." for note in accuracy.notes)
-    key = textwrap.wrap(_KEY + notes, columns * _LETTERS)
-    height_pt = max(panel.height_pt for panel in panels) + _FOOT_PT + _LINE_PT * len(key)
+    legend_lines = textwrap.wrap(_LEGEND + notes, columns * _LETTERS)
+    height_pt = max(panel.height_pt for panel in panels) + _FOOT_PT + _LINE_PT * len(legend_lines)
     figure = Figure(figsize=(columns * _WIDTH_PT / 72, height_pt / 72), facecolor="white")
-    places = figure.subfigures(1, columns, wspace=0, squeeze=False)[0]
-    least, most = _span(accuracy)
-    for panel, place in zip(panels, places, strict=False):
-        panel.draw(place, height_pt, (least, most))
+    subfigures = figure.subfigures(1, columns, wspace=0, squeeze=False)[0]
+    shortest_ns, longest_ns = _time_span(accuracy)
+    for panel, subfigure in zip(panels, subfigures, strict=False):
+        panel.draw(subfigure, height_pt, (shortest_ns, longest_ns))
     if accuracy.acting:
-        _draw_acting(places[-1], accuracy, height_pt)
+        _draw_acting(subfigures[-1], accuracy, height_pt)
     figure.text(
         4 / (columns * _WIDTH_PT),
-        (_LINE_PT * len(key) + 4) / height_pt,
-        "\n".join(key),
+        (_LINE_PT * len(legend_lines) + 4) / height_pt,
+        "\n".join(legend_lines),
         va="top",
         fontsize=_SMALL,
         color=style.TEXT_SOFT,
@@ -78,16 +78,16 @@ def draw(accuracy: Accuracy) -> Figure:
     return figure
 
 
-_KEY: Final = (
+_LEGEND: Final = (
     "Points show each model's largest error across its references; a thin line extends to the smallest. The ring marks "
     "the model that the program uses. For each connected model, no other model is both faster and more accurate. The "
     "effect of fewer ticks per second on stability is not shown. "
 )
 
 
-def _span(accuracy: Accuracy) -> tuple[float, float]:
+def _time_span(accuracy: Accuracy) -> tuple[float, float]:
     times = [row.ns_per_ms for row in accuracy.rows] + [
-        it.computing_s * 1e6 for it in accuracy.truths if it.computing_s
+        truth.computing_s * 1e6 for truth in accuracy.truths if truth.computing_s
     ]
     return min(times) / 2, max(*times, _BUDGET_NS) * 4
 
@@ -114,25 +114,27 @@ def _draw_acting(figure: FigureBase, accuracy: Accuracy, height_pt: float) -> No
     axes.tick_params(labelsize=_SMALL, pad=2)
     axes.set_title("Error [% of the force]", fontsize=_SMALL, pad=4, x=-0.075)
     axes.set_xlabel("Computation time per tick [ns]", fontsize=_SMALL + 0.4, labelpad=2)
-    estimators = tuple(dict.fromkeys(it.estimator for it in accuracy.acting))  # cheapest first
-    times = [it.ns for it in accuracy.acting]
+    estimators = tuple(dict.fromkeys(error.estimator for error in accuracy.acting))  # cheapest first
+    times = [error.ns for error in accuracy.acting]
     margin_ns = 0.25 * (max(times) - min(times)) + 5
     axes.set_xlim(min(times) - 2 * margin_ns, max(times) + 2 * margin_ns)
     offset: dict[str, Any] = {"textcoords": "offset points", "fontsize": _SMALL}
     for k, name in enumerate(estimators):
-        points = sorted((it for it in accuracy.acting if it.estimator == name), key=lambda it: it.error)
-        ns = float(np.median([it.ns for it in points]))
-        axes.plot([ns] * len(points), [it.error for it in points], color=style.ZERO, linewidth=1.2, zorder=2)
-        near: list[list[ActingError]] = []
-        for it in points:
-            axes.scatter(ns, it.error, s=17, zorder=4, edgecolor=style.TEXT, linewidth=0.7, **_ESTIMATOR_LOOKS[k % 3])
-            axes.scatter(ns, it.least, s=60, marker="_", color=style.TEXT, linewidth=1.0, zorder=3)
-            if near and it.error < _SAME_LABEL * near[-1][0].error:
-                near[-1].append(it)
+        points = sorted((error for error in accuracy.acting if error.estimator == name), key=lambda error: error.error)
+        ns = float(np.median([error.ns for error in points]))
+        axes.plot([ns] * len(points), [error.error for error in points], color=style.ZERO, linewidth=1.2, zorder=2)
+        labelled: list[list[ActingError]] = []
+        for error in points:
+            axes.scatter(
+                ns, error.error, s=17, zorder=4, edgecolor=style.TEXT, linewidth=0.7, **_ESTIMATOR_LOOKS[k % 3]
+            )
+            axes.scatter(ns, error.least, s=60, marker="_", color=style.TEXT, linewidth=1.0, zorder=3)
+            if labelled and error.error < _SAME_LABEL * labelled[-1][0].error:
+                labelled[-1].append(error)
             else:
-                near.append([it])
-        for group in near:
-            text = ", ".join(map(str, sorted(it.delay for it in group)))
+                labelled.append([error])
+        for group in labelled:
+            text = ", ".join(map(str, sorted(error.delay for error in group)))
             height = math.sqrt(group[0].error * group[-1].error)
             axes.annotate(text, (ns, height), (5, 0), va="center", **offset)
         height = math.sqrt(points[0].error * points[-1].error)
@@ -141,7 +143,7 @@ def _draw_acting(figure: FigureBase, accuracy: Accuracy, height_pt: float) -> No
 
 
 def _acting_range(accuracy: Accuracy) -> tuple[float, float]:
-    values = [value for it in accuracy.acting for value in (it.error, it.least)]
+    values = [value for error in accuracy.acting for value in (error.error, error.least)]
     return min(values) / 1.5, max(values) * 2
 
 
@@ -156,8 +158,8 @@ def _write_heading(figure: FigureBase, heading: str, text: str, height_pt: float
     """Write a panel's heading, and its text in lines below."""
     lines = "\n".join(textwrap.wrap(text, _LETTERS))
     figure.text(4 / _WIDTH_PT, 1 - 6 / height_pt, heading, va="top", fontweight="bold")
-    below = 1 - (6 + _HEADING_PT) / height_pt
-    figure.text(4 / _WIDTH_PT, below, lines, va="top", fontsize=_SMALL, color=style.TEXT_SOFT)
+    below_heading = 1 - (6 + _HEADING_PT) / height_pt
+    figure.text(4 / _WIDTH_PT, below_heading, lines, va="top", fontsize=_SMALL, color=style.TEXT_SOFT)
 
 
 def _axes_at(figure: FigureBase, top_pt: float, tall_pt: float, height_pt: float) -> Axes:
@@ -174,7 +176,7 @@ class _Panel:
         self._points = worst_rows(rows)
         self._rows = rows
         self._front = [self._points[candidate] for candidate in pareto_front(self._points)]
-        self._solved = [it.computing_s * 1e6 for it in accuracy.truths if it.computing_s]
+        self._solved = [truth.computing_s * 1e6 for truth in accuracy.truths if truth.computing_s]
         self._numerical = kind == "numerical"
         self._strip = [row for row in self._points.values() if row.error.rms < _ROUNDED]
         names = ", ".join(dict.fromkeys(row.truth for row in rows))
@@ -198,13 +200,13 @@ class _Panel:
         axes = [main]
         if self._strip:
             axes.append(_axes_at(figure, top_pt + _PANEL_PT + _BREAK_PT, _STRIP_PT, height_pt))
-        for it in axes:
-            self._axes(it, span, lowest=it is axes[-1])
-        self._main(main)
+        for panel_axes in axes:
+            self._set_up_axes(panel_axes, span, lowest=panel_axes is axes[-1])
+        self._draw_points(main)
         if self._strip:
-            self._rounding(axes[1], main)
+            self._draw_rounding_errors(axes[1], main)
 
-    def _axes(self, axes: Axes, span: tuple[float, float], *, lowest: bool) -> None:
+    def _set_up_axes(self, axes: Axes, span: tuple[float, float], *, lowest: bool) -> None:
         axes.set_xscale("log")
         axes.set_yscale("log")
         axes.set_xlim(*span)
@@ -222,7 +224,7 @@ class _Panel:
             times, errors = (row.ns_per_ms, other.ns_per_ms), (100 * row.error.rms, 100 * other.error.rms)
             axes.plot(times, errors, color=style.ZERO, linewidth=1.2, zorder=2)
 
-    def _main(self, axes: Axes) -> None:
+    def _draw_points(self, axes: Axes) -> None:
         """Draw the points with error bars, their labels, and the accuracy target."""
         shown = [row for row in self._points.values() if row.error.rms >= _ROUNDED]
         target = 100 * min(row.error.target for row in self._rows)
@@ -237,10 +239,10 @@ class _Panel:
         axes.annotate(f"target {share}", (axes.get_xlim()[0], target), (3, 2), va="bottom", **offset)
         axes.annotate("1 ms", (_BUDGET_NS, axes.get_ylim()[1]), (2, 0), va="top", **offset)
         for row in shown:
-            self._point(axes, row)
-            least = min(100 * it.error.rms for it in self._rows if it.candidate is row.candidate)
+            self._draw_point(axes, row)
+            least = min(100 * other.error.rms for other in self._rows if other.candidate is row.candidate)
             axes.plot([row.ns_per_ms] * 2, [least, 100 * row.error.rms], color=style.TEXT_SOFT, linewidth=0.6, zorder=3)
-        self._label(axes, shown)
+        self._draw_labels(axes, shown)
         if self._solved and not self._numerical:
             least, greatest = min(self._solved), max(self._solved)
             axes.axvspan(
@@ -249,21 +251,33 @@ class _Panel:
             foot = (least, axes.get_ylim()[0])
             axes.annotate("fluid solver", foot, (-2, 3), rotation=90, ha="right", va="bottom", **offset)
 
-    def _rounding(self, axes: Axes, main: Axes) -> None:
+    def _draw_rounding_errors(self, axes: Axes, main: Axes) -> None:
         errors = [max(100 * row.error.rms, 1e-15) for row in self._strip]
         axes.set_ylim(10.0 ** (np.floor(np.log10(min(errors))) - 4), 100 * _ROUNDED * 10)
         axes.yaxis.set_major_locator(FixedLocator([1e-12, 1e-8, 1e-4]))
         for row in self._strip:
-            self._point(axes, row)
+            self._draw_point(axes, row)
             weight = "bold" if row.chosen else "normal"
-            at = (row.ns_per_ms, 100 * row.error.rms)
-            axes.annotate(row.candidate.label, at, fontsize=_SMALL, fontweight=weight, **self._beside(row))
-        for it, edge in ((main, 0.0), (axes, 1.0)):
-            slash: dict[str, Any] = {"transform": it.transAxes, "color": style.AXIS, "clip_on": False, "linewidth": 0.6}
-            it.plot([-0.012, 0.012], [edge - 0.01, edge + 0.01], **slash)
+            point = (row.ns_per_ms, 100 * row.error.rms)
+            axes.annotate(row.candidate.label, point, fontsize=_SMALL, fontweight=weight, **self._label_position(row))
+        for marked_axes, edge in ((main, 0.0), (axes, 1.0)):
+            slash: dict[str, Any] = {
+                "transform": marked_axes.transAxes,
+                "color": style.AXIS,
+                "clip_on": False,
+                "linewidth": 0.6,
+            }
+            marked_axes.plot([-0.012, 0.012], [edge - 0.01, edge + 0.01], **slash)
 
-    def _beside(self, row: Row) -> dict[str, Any]:
-        lists = sorted((it for it in self._strip if not it.chosen and it.error.rms < ROUNDING), key=_time)
+    def _label_position(self, row: Row) -> dict[str, Any]:
+        lists = sorted(
+            (
+                row_of_strip
+                for row_of_strip in self._strip
+                if not row_of_strip.chosen and row_of_strip.error.rms < ROUNDING
+            ),
+            key=_time_ns,
+        )
         if row.chosen:
             return {"xytext": (0, -6), "textcoords": "offset points", "ha": "center", "va": "top"}
         if row in lists[1::2]:
@@ -271,29 +285,31 @@ class _Panel:
         side = "right" if row in lists[1:] else "center"
         return {"xytext": (4 if side == "right" else 0, 4), "textcoords": "offset points", "ha": side, "va": "bottom"}
 
-    def _point(self, axes: Axes, row: Row) -> None:
-        look = _LOOKS[row.candidate.family]
-        at = (row.ns_per_ms, 100 * row.error.rms)
+    def _draw_point(self, axes: Axes, row: Row) -> None:
+        marker_style = _LOOKS[row.candidate.family]
+        point = (row.ns_per_ms, 100 * row.error.rms)
         if row.chosen:
-            axes.scatter(*at, s=74, marker="o", facecolor="none", edgecolor=style.TEXT, linewidth=1.1, zorder=5)
-        axes.scatter(*at, s=17, edgecolor=style.TEXT, linewidth=0.7, zorder=4, **look)
+            axes.scatter(*point, s=74, marker="o", facecolor="none", edgecolor=style.TEXT, linewidth=1.1, zorder=5)
+        axes.scatter(*point, s=17, edgecolor=style.TEXT, linewidth=0.7, zorder=4, **marker_style)
 
-    def _label(self, axes: Axes, shown: Sequence[Row]) -> None:
+    def _draw_labels(self, axes: Axes, shown: Sequence[Row]) -> None:
         """Label the points: those at lower rates next to them, the others in a column, joined by thin lines."""
         low, high = np.log(axes.get_ylim())
-        near = [row for row in shown if row.candidate.family == "rate"]
-        for row in near:
-            at = (row.ns_per_ms, 100 * row.error.rms)
-            axes.annotate(row.candidate.label, at, (5, 0), textcoords="offset points", va="center", fontsize=_SMALL)
-        place_pt = {row: (np.log(_height(row)) - low) / (high - low) * _PANEL_PT for row in shown if row not in near}
-        listed = sorted(place_pt, key=lambda row: place_pt[row] + _SLANT_PT * np.log10(row.ns_per_ms))
-        wanted = [place_pt[row] for row in listed]
-        column_ns = max(_COLUMN_NS, *(2.2 * row.ns_per_ms for row in listed))
-        for row, label_pt in zip(listed, _spread_apart(wanted, _LABEL_PT, _PANEL_PT), strict=True):
+        at_point = [row for row in shown if row.candidate.family == "rate"]
+        for row in at_point:
+            point = (row.ns_per_ms, 100 * row.error.rms)
+            axes.annotate(row.candidate.label, point, (5, 0), textcoords="offset points", va="center", fontsize=_SMALL)
+        point_pt = {
+            row: (np.log(_error_percent(row)) - low) / (high - low) * _PANEL_PT for row in shown if row not in at_point
+        }
+        ordered = sorted(point_pt, key=lambda row: point_pt[row] + _SLANT_PT * np.log10(row.ns_per_ms))
+        wanted_pt = [point_pt[row] for row in ordered]
+        column_ns = max(_COLUMN_NS, *(2.2 * row.ns_per_ms for row in ordered))
+        for row, label_pt in zip(ordered, _spread_apart(wanted_pt, _LABEL_PT, _PANEL_PT), strict=True):
             height = float(np.exp(low + label_pt / _PANEL_PT * (high - low)))
             axes.annotate(
                 row.candidate.label,
-                (row.ns_per_ms, _height(row)),
+                (row.ns_per_ms, _error_percent(row)),
                 (column_ns, height),
                 va="center",
                 fontsize=_SMALL,
@@ -310,24 +326,24 @@ class _Panel:
             )
 
 
-def _time(row: Row) -> float:
+def _time_ns(row: Row) -> float:
     return row.ns_per_ms
 
 
-def _height(row: Row) -> float:
+def _error_percent(row: Row) -> float:
     return 100 * row.error.rms
 
 
-def _spread_apart(wanted: Sequence[float], gap: float, most: float) -> list[float]:
-    """Return positions close to ``wanted``, in the same order, at least ``gap`` apart and at most ``most``."""
-    places: list[float] = []
-    for place in wanted:
-        places.append(max(place, places[-1] + gap) if places else place)
-    ceiling = most
-    for k in range(len(places) - 1, -1, -1):
-        places[k] = min(places[k], ceiling)
-        ceiling = places[k] - gap
-    return places
+def _spread_apart(desired: Sequence[float], gap: float, greatest: float) -> list[float]:
+    """Return positions close to ``desired``, in the same order, at least ``gap`` apart and at most ``greatest``."""
+    positions: list[float] = []
+    for position in desired:
+        positions.append(max(position, positions[-1] + gap) if positions else position)
+    ceiling = greatest
+    for k in range(len(positions) - 1, -1, -1):
+        positions[k] = min(positions[k], ceiling)
+        ceiling = positions[k] - gap
+    return positions
 
 
 COLUMNS: Final = (
@@ -360,14 +376,23 @@ def accuracy_evidence(accuracy: Accuracy) -> Evidence:
         parts.append(f"## Against the {truth.name} ({rows[0].kind}), {rows[0].liquid}\n\n" + _markdown_table(rows))
     if accuracy.acting:
         acting = [
-            (it.estimator, it.delay, _count(it.ns), _digits(it.error), _digits(it.least)) for it in accuracy.acting
+            (
+                error.estimator,
+                error.delay,
+                _format_count(error.ns),
+                _format_digits(error.error),
+                _format_digits(error.least),
+            )
+            for error in accuracy.acting
         ]
         headings = ("estimator", "ticks of delay", "ns per tick", "error [%]", "smallest error [%]")
         parts.append(
             f"## The force on the hand, {accuracy.acting_liquid}\n\n{Table(headings, acting, left=1).markdown()}"
         )
     text = "\n\n".join(parts) + "\n"
-    cells = [[f"{it:.6g}" if isinstance(it, float) else it for it in _csv_row(row)] for row in accuracy.rows]
+    cells = [
+        [f"{value:.6g}" if isinstance(value, float) else value for value in _csv_row(row)] for row in accuracy.rows
+    ]
     files = {"accuracy.csv": Table(COLUMNS, cells).csv(), "accuracy.md": text}
     return Evidence(text, files, plot_files("accuracy", "Accuracy and computation time", draw, accuracy))
 
@@ -397,26 +422,26 @@ def _markdown_table(rows: Sequence[Row]) -> str:
             (
                 mark,
                 row.candidate.name.replace("C_d", "C<sub>d</sub>"),
-                _count(row.time.median_ns),
-                _count(row.time.p99_ns),
-                *(_digits(it) for it in (error.rms_n, error.most_n, 100 * error.rms, 100 * error.most)),
-                _digits(error.direction_deg),
-                _digits(row.memory_bytes / 1e3),
-                _count(ticks_per_s),
-                _count(ticks_per_s / row.candidate.rate_hz),
+                _format_count(row.time.median_ns),
+                _format_count(row.time.p99_ns),
+                *(_format_digits(value) for value in (error.rms_n, error.most_n, 100 * error.rms, 100 * error.most)),
+                _format_digits(error.direction_deg),
+                _format_digits(row.memory_bytes / 1e3),
+                _format_count(ticks_per_s),
+                _format_count(ticks_per_s / row.candidate.rate_hz),
             )
         )
     return "\n".join(f"| {' | '.join(cells)} |" for cells in table)
 
 
-def _count(value: float) -> str:
+def _format_count(value: float) -> str:
     if not math.isfinite(value):
         return "–"
     digits = 0 if value == 0 else 2 - math.floor(math.log10(abs(value)))
     return f"{round(value, digits):,.{max(digits, 0)}f}" if value < 100 else f"{round(value, digits):,.0f}"
 
 
-def _digits(value: float) -> str:
+def _format_digits(value: float) -> str:
     if not math.isfinite(value):
         return "–"
     if value != 0 and abs(value) < 1e-4:

@@ -1,8 +1,8 @@
 """Candidates: models and methods to compute a force from a motion, each measured for error and time.
 
-All run the servo's own tick, sample validation and safety layer included, so that what differs between their times is
-the model alone. The wake as a list, which is processed entirely at every tick, is the naive implementation: its
-computation time grows with its length.
+All run the servo's own tick, including sample validation and safety layer, so that their times differ only by the
+model. The naive implementation of the wake is a list that is processed entirely at every tick; its computation time
+grows with its length.
 """
 
 import math
@@ -76,7 +76,7 @@ def list_wake(wake: Any, tail: Any, element: Any, segment: Any) -> None:
 def list_follow(
     wake: Any, tail: Any, element: Any, arc: Any, segment: Any, h: Any, place_m: Any, interval_s: float
 ) -> None:
-    """Let every element decay, and store the velocity of this tick if the rules require it."""
+    """Let all elements decay, and store the velocity of this tick if the rules require it."""
     keep = math.exp(wake.log_decay_per_s * interval_s)
     rows = len(segment)
     for row in range(tail.held):
@@ -101,8 +101,8 @@ def list_follow(
             tail.segment += 1
         else:
             x, y, z = element[reference, 0], element[reference, 1], element[reference, 2]
-            least = (wake.breaking_cosine - 1e-12) * speed * math.sqrt(x * x + y * y + z * z)
-            if hx * x + hy * y + hz * z < least:
+            breaking_product = (wake.breaking_cosine - 1e-12) * speed * math.sqrt(x * x + y * y + z * z)
+            if hx * x + hy * y + hz * z < breaking_product:
                 tail.segment += 1
     tail.newest = tail.newest + 1 if tail.newest + 1 < rows else 0
     tail.held = min(tail.held + 1, rows)
@@ -115,7 +115,7 @@ def list_follow(
 
 
 _UNLIMITED: Final = DampingLimits(1e9, 1e9)
-"""Forces are compared without slope limit, which the table lacks for the slowest candidates."""
+"""No limits: the table of slope limits has no entry for the slowest candidates."""
 Family: TypeAlias = Literal["tick", "list", "rate", "estimator", "law", "effects"]
 
 
@@ -234,7 +234,7 @@ class _WakeList(Candidate):
     def run_ticks(self, start: int, stop: int) -> None:
         self._run.run(start, stop)
         period_s = 1 / self.scene.rate_hz
-        _by_the_list(self._liquid, self._list, self._t_ns, period_s, self._run.results, self.force_n, start, stop)
+        _run_wake_list(self._liquid, self._list, self._t_ns, period_s, self._run.results, self.force_n, start, stop)
 
 
 def with_given_velocity(scene: Scene) -> Scene:
@@ -243,7 +243,7 @@ def with_given_velocity(scene: Scene) -> Scene:
 
 
 @kernel
-def _by_the_list(
+def _run_wake_list(
     liquid: Any, listed: Any, t_ns: Any, period_s: float, results: Any, force_n: Any, start: int, stop: int
 ) -> None:
     tails, element, arc, segment = listed
@@ -263,15 +263,15 @@ def _by_the_list(
 
 SLOWER = (2, 4, 10)
 _RESOLUTIONS_M = (0.005, 0.02)
-_LEAST_RATE_HZ = 50.0
-_WORDS: dict[Effect, str] = {"added_mass": "added mass", "history": "history"}
+_MIN_RATE_HZ = 50.0
+_EFFECT_NAMES: dict[Effect, str] = {"added_mass": "added mass", "history": "history"}
 _LAWS: dict[Law, tuple[str, str]] = {
     "constant": ("constant C_d", "constant C$_d$"),
     "schiller-naumann": ("Schiller–Naumann", "SN"),
     "haider-levenspiel": ("Haider–Levenspiel", "HL"),
     "brown-lawler": ("Brown–Lawler", "BL"),
 }
-"""Name and initials."""
+"""The name and the label of each drag law."""
 
 
 def _with_wake(scene: Scene, **changes: Any) -> Scene:
@@ -279,16 +279,16 @@ def _with_wake(scene: Scene, **changes: Any) -> Scene:
     return scene.model_copy(update={"liquids": (scene.liquids[0].model_copy(update={"wake": wake}),)})
 
 
-def _with_only(scene: Scene, liquid: Any) -> Scene:
-    alone = liquid.model_copy(update={"region": Everywhere(), "current": None})
-    return scene.model_copy(update={"liquids": (alone,)})
+def _with_single_liquid(scene: Scene, liquid: Any) -> Scene:
+    single = liquid.model_copy(update={"region": Everywhere(), "current": None})
+    return scene.model_copy(update={"liquids": (single,)})
 
 
 def drag_and_wake(scene: Scene) -> Scene:
     """Return the scene with its first liquid everywhere, and only its drag law and, if selected, its wake."""
     liquid = resolve(scene).liquids[0]
     effects = ("drag", "wake") if "wake" in liquid.effects else ("drag",)
-    return _with_only(scene, liquid.model_copy(update={"effects": effects}))
+    return _with_single_liquid(scene, liquid.model_copy(update={"effects": effects}))
 
 
 def numerical_candidates(scene: Scene) -> tuple[tuple[Candidate, ...], Candidate]:
@@ -303,13 +303,15 @@ def numerical_candidates(scene: Scene) -> tuple[tuple[Candidate, ...], Candidate
     if _has_wake(scene):
         candidates += _lists(exact)
     for every in SLOWER:
-        if scene.rate_hz / every >= _LEAST_RATE_HZ:
+        if scene.rate_hz / every >= _MIN_RATE_HZ:
             slower = exact.model_copy(update={"rate_hz": scene.rate_hz / every})
             hertz = f"{slower.rate_hz:g} Hz"
             candidates.append(Candidate(f"{program.name}, {hertz}", hertz, "rate", slower, every=every))
-    own = scene.velocity
+    scene_estimator = scene.velocity
     for kind in (Ewma(), Raw()):
-        estimator = own if not isinstance(own, Given) and own.kind == kind.kind else kind
+        estimator = (
+            scene_estimator if not isinstance(scene_estimator, Given) and scene_estimator.kind == kind.kind else kind
+        )
         name = f"{program.name}, velocity by {estimator.kind} from encoder counts"
         noisy = scene.model_copy(update={"velocity": estimator})
         candidates.append(Candidate(name, f"velocity: {estimator.kind}", "estimator", noisy, counted=True))
@@ -336,7 +338,7 @@ def _lists(exact: Scene) -> list[Candidate]:
 
 def physical_candidates(scene: Scene) -> tuple[tuple[Candidate, ...], Candidate]:
     """Return models of a viscous liquid in order of accuracy, and the one that the program would select."""
-    exact = with_given_velocity(_with_only(scene, scene.liquids[0]))
+    exact = with_given_velocity(_with_single_liquid(scene, scene.liquids[0]))
     candidates: list[Candidate] = [_LinearViscosity("linear viscosity", "linear viscosity", "law", exact)]
     candidates += [
         Candidate(name, f"{name} ({short})" if len(short) == 2 else short, "law", with_effects(exact, "drag", law=law))
@@ -347,25 +349,25 @@ def physical_candidates(scene: Scene) -> tuple[tuple[Candidate, ...], Candidate]
         carried = (*carried, effect)
         candidates.append(_effects_candidate(exact, REFERENCE, carried))
     candidates.append(_UnsteadyDrag("unsteady drag", "unsteady drag", "effects", with_effects(exact, "unsteady_drag")))
-    gated = resolve(_with_only(scene, scene.liquids[0].model_copy(update={"effects": "auto"}))).liquids[0]
-    carried = tuple(it for it in _WORDS if it in gated.effects)
+    gated = resolve(_with_single_liquid(scene, scene.liquids[0].model_copy(update={"effects": "auto"}))).liquids[0]
+    carried = tuple(effect for effect in _EFFECT_NAMES if effect in gated.effects)
     if "unsteady_drag" in gated.effects:
         return tuple(candidates), candidates[-1]
     if "drag" not in gated.effects:
         choice: Candidate = Candidate("no resistance", "no resistance", "effects", with_effects(exact, *carried))
     else:
         choice = _effects_candidate(exact, gated.drag.law, carried)
-    same = next(
+    equal = next(
         (candidate for candidate in candidates if type(candidate) is Candidate and candidate.scene == choice.scene),
         None,
     )
-    return (tuple(candidates), same) if same is not None else ((*candidates, choice), choice)
+    return (tuple(candidates), equal) if equal is not None else ((*candidates, choice), choice)
 
 
 def _effects_candidate(exact: Scene, law: Law, carried: tuple[Effect, ...]) -> Candidate:
-    words, (name, short) = [_WORDS[it] for it in carried], _LAWS[law]
-    of = with_effects(exact, "drag", *carried, law=law)
-    return Candidate(" + ".join([name, *words]), " + ".join([short, *words]), "effects", of)
+    effect_names, (name, short) = [_EFFECT_NAMES[effect] for effect in carried], _LAWS[law]
+    scene = with_effects(exact, "drag", *carried, law=law)
+    return Candidate(" + ".join([name, *effect_names]), " + ".join([short, *effect_names]), "effects", scene)
 
 
 def _has_wake(scene: Scene) -> bool:

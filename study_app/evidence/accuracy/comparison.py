@@ -1,4 +1,4 @@
-"""Accuracy against computation time: every candidate against its reference, and all timed in one run."""
+"""Accuracy and computation time: every candidate is compared with its references, and all are timed in one run."""
 
 import itertools
 import math
@@ -36,21 +36,21 @@ from study_app.haptics.model.scene import Scene
 Kind: TypeAlias = Literal["numerical", "physical"]
 
 
-_ALIKE: Final = 1.05
+_EQUAL_TIMES_RATIO: Final = 1.05
 """Times within this factor count as equal."""
 
-_FINE_S: Final = 1e-6
-"""Required resolution of the clock: batches take 100 µs and more."""
+_MAX_RESOLUTION_S: Final = 1e-6
+"""Coarsest permitted resolution of the CPU clock, since batches take 100 µs or more."""
 
 _REPEATS: Final = 5
 _BATCHES: Final = 40
-_ALLOWANCE_S: Final = 0.8
+_TIME_LIMIT_S: Final = 0.8
 """Time limit of a candidate per repeat; a slower one runs fewer batches, at least one."""
 
 
 def _clock() -> Callable[[], int]:
     """Return a clock [ns] of CPU time or, if that is too coarse, of elapsed time."""
-    fine = time.get_clock_info("thread_time").resolution <= _FINE_S
+    fine = time.get_clock_info("thread_time").resolution <= _MAX_RESOLUTION_S
     return time.thread_time_ns if fine else time.perf_counter_ns
 
 
@@ -125,7 +125,7 @@ def accuracy(
     notes: Sequence[str] = (),
     repeats: int = _REPEATS,
     batches: int = _BATCHES,
-    allowance_s: float = _ALLOWANCE_S,
+    allowance_s: float = _TIME_LIMIT_S,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Accuracy:
     """Compare the candidates of one scene with its definition, and those of another with physical references.
@@ -137,18 +137,20 @@ def accuracy(
     StudyError
         The first scene's liquid exerts no force along the motion, or a stored table cannot be used.
     """
-    said = list(notes)
+    all_notes = list(notes)
     if motion.velocity_mps is None:
-        said.append("the motion does not contain velocities: central differences of its positions are used instead")
+        all_notes.append(
+            "the motion does not contain velocities: central differences of its positions are used instead"
+        )
         motion = with_velocity(motion)
     fewest = len(motion.t_s) // max(models.SLOWER)
     if fewest < Candidate.BATCH:
-        said.append(
+        all_notes.append(
             f"the motion is short: each batch has {fewest} ticks instead of 1,000, so call overhead adds some µs to "
             "the times"
         )
     measured: list[Row] = []
-    found: list[Truth] = []
+    references: list[Truth] = []
     if numerical is not None:
         scene = models.drag_and_wake(numerical)
         candidates, choice = models.numerical_candidates(scene)
@@ -158,28 +160,30 @@ def accuracy(
                 f"{scene.liquids[0].id} does not exert a force along {named}, so its error cannot be "
                 "expressed as a percentage"
             )
-        measured += _rows("numerical", scene, candidates, choice, (truth,), progress)
-        found.append(truth)
+        measured += _compare_candidates("numerical", scene, candidates, choice, (truth,), progress)
+        references.append(truth)
     if physical is not None:
         candidates, choice = models.physical_candidates(physical)
-        real = _physical_truths(candidates[0].scene, said)
-        measured += _rows("physical", physical, candidates, choice, real, progress)
-        found += real
+        physical_references = _physical_truths(candidates[0].scene, all_notes)
+        measured += _compare_candidates("physical", physical, candidates, choice, physical_references, progress)
+        references += physical_references
     progress("timing")
-    times = _race(tuple(dict.fromkeys(row.candidate for row in measured)), motion, repeats, batches, allowance_s)
+    times = _time_candidates(
+        tuple(dict.fromkeys(row.candidate for row in measured)), motion, repeats, batches, allowance_s
+    )
     measured = [replace(row, time=times[row.candidate]) for row in measured]
     by_kind = [[row for row in measured if row.kind == kind] for kind in ("numerical", "physical")]
     fronts = {candidate for rows in by_kind for candidate in pareto_front(worst_rows(rows))}
     rows = tuple(replace(row, on_front=row.candidate in fronts) for row in measured)
     progress("force on the hand")
     subject = physical or numerical
-    plain_c = "" if numerical is None else _in_plain_c(numerical, repeats * batches)
+    plain_c = "" if numerical is None else _plain_c_sentence(numerical, repeats * batches)
     acting = () if subject is None else _acting_errors(subject, batches)
     liquid = "" if subject is None else subject.liquids[0].id
     return Accuracy(
         rows=rows,
-        truths=tuple(found),
-        notes=tuple(said),
+        truths=tuple(references),
+        notes=tuple(all_notes),
         machine=machine(),
         motion=named,
         acting=acting,
@@ -188,17 +192,17 @@ def accuracy(
     )
 
 
-def _in_plain_c(scene: Scene, batches: int) -> str:
+def _plain_c_sentence(scene: Scene, batches: int) -> str:
     """Return the time of a tick relative to plain C, or why it was not measured, as a sentence."""
     liquid = scene.liquids[0].id
     try:
-        found = compare_with_plain_c({liquid: scene}, batches=batches)[liquid]
+        times = compare_with_plain_c({liquid: scene}, batches=batches)[liquid]
     except StudyError as error:
         return f"The time of a tick relative to plain C was not measured: {error}."
     return (
-        f"A complete servo tick in {liquid}, with the estimator and the safety layer, takes {found.tick_ns:.0f} ns, "
-        f"{found.ratio:.1f} times as long as computing velocity and force in plain C ({found.plain_ns:.0f} ns; the "
-        f"forces differ by at most {found.difference:.0e} of the largest force)."
+        f"A complete servo tick in {liquid}, with the estimator and the safety layer, takes {times.tick_ns:.0f} ns, "
+        f"{times.ratio:.1f} times as long as computing velocity and force in plain C ({times.plain_ns:.0f} ns; the "
+        f"forces differ by at most {times.difference:.0e} of the largest force)."
     )
 
 
@@ -207,15 +211,15 @@ def _acting_errors(scene: Scene, batches: int) -> tuple[ActingError, ...]:
     loops = list(itertools.product([kind for kind in ESTIMATORS.values() if kind.of_device], delivered_force.DELAYS))
     scenes = [without_buoyancy(scene.model_copy(update={"velocity": kind.model()})) for kind, _ in loops]
     timers = [
-        TickTimer(it, Dynamics(delay_s=delay / it.rate_hz, count_m=COUNT_M))
-        for it, (_, delay) in zip(scenes, loops, strict=True)
+        TickTimer(loop_scene, Dynamics(delay_s=delay / loop_scene.rate_hz, count_m=COUNT_M))
+        for loop_scene, (_, delay) in zip(scenes, loops, strict=True)
     ]
     for _ in range(batches):
         for timer in timers:
-            timer.batch()
+            timer.run_batch()
     errors = [
-        delivered_force.acting_on_random_motion(delivered_force.case_of(it, kind.name, delay), it)
-        for it, (kind, delay) in zip(scenes, loops, strict=True)
+        delivered_force.acting_on_random_motion(delivered_force.case_of(loop_scene, kind.name, delay), loop_scene)
+        for loop_scene, (kind, delay) in zip(scenes, loops, strict=True)
     ]
     return tuple(
         ActingError(
@@ -236,7 +240,7 @@ def _physical_truths(scene: Scene, notes: list[str]) -> tuple[Truth, ...]:
     return (*steady, truths.oscillation_truth(scene), truths.starting_truth(scene), *solved)
 
 
-def _rows(
+def _compare_candidates(
     kind: Kind,
     scene: Scene,
     candidates: Sequence[Candidate],
@@ -257,16 +261,16 @@ def _rows(
     return rows
 
 
-class _Bench:
-    """One candidate that is run along the motion repeatedly, with its memory filled before it is timed."""
+class _CandidateTimer:
+    """The timing of one candidate along a repeated motion; its wake is filled before it is timed."""
 
     def __init__(self, candidate: Candidate, motion: Motion) -> None:
         self._candidate, self._motion, self._clock_ns = candidate, motion, _clock()
         self._begin()
-        self.forget()
+        self.reset()
 
-    def forget(self) -> None:
-        """Discard the batch times per tick [ns] and the elapsed time [s] before a new repeat."""
+    def reset(self) -> None:
+        """Reset the batch times per tick [ns] and the elapsed time [s] before a new repeat."""
         self.costs_ns: list[float] = []
         self.passed_s = 0.0
 
@@ -274,49 +278,49 @@ class _Bench:
         self._candidate.begin(self._motion)
         liquid = self._candidate.scene.liquids[0]
         length = liquid.wake.length if liquid.wake is not None and "wake" in liquid.effects else 0
-        filled = min(round(length * self._candidate.rate_hz / 1000), self._candidate.ticks - self._size)
-        self._candidate.run_ticks(0, filled)
-        self._at = filled
+        warm_up_ticks = min(round(length * self._candidate.rate_hz / 1000), self._candidate.ticks - self._size)
+        self._candidate.run_ticks(0, warm_up_ticks)
+        self._row = warm_up_ticks
 
     @property
     def _size(self) -> int:
         return min(self._candidate.BATCH, self._candidate.ticks)
 
-    def batch(self) -> None:
-        if self._at + self._size > self._candidate.ticks:
+    def run_batch(self) -> None:
+        if self._row + self._size > self._candidate.ticks:
             self._begin()
         began_s, began = time.perf_counter(), self._clock_ns()
-        self._candidate.run_ticks(self._at, self._at + self._size)
+        self._candidate.run_ticks(self._row, self._row + self._size)
         self.costs_ns.append((self._clock_ns() - began) / self._size)
         self.passed_s += time.perf_counter() - began_s
-        self._at += self._size
+        self._row += self._size
 
 
-def _race(
+def _time_candidates(
     candidates: Sequence[Candidate], motion: Motion, repeats: int, batches: int, allowance_s: float
 ) -> dict[Candidate, Time]:
     """Return the times of all candidates in alternating batches, so that slow phases of the machine affect all alike.
 
     Time used by other programs is excluded: it would affect every batch of 10 ms, but few of 100 µs.
     """
-    benches = {candidate: _Bench(candidate, motion) for candidate in candidates}
+    benches = {candidate: _CandidateTimer(candidate, motion) for candidate in candidates}
     costs: dict[Candidate, list[list[float]]] = {candidate: [] for candidate in candidates}
     for _ in range(repeats):
         for bench in benches.values():
-            bench.forget()
+            bench.reset()
         for _ in range(batches):
             for bench in benches.values():
                 if bench.passed_s < allowance_s:
-                    bench.batch()
+                    bench.run_batch()
         for candidate, bench in benches.items():
             costs[candidate].append(bench.costs_ns)
     return {
         candidate: Time(
-            statistics.median(statistics.median(one) for one in taken),
-            statistics.median(float(np.percentile(one, 99)) for one in taken),
-            sum(len(one) for one in taken),
+            statistics.median(statistics.median(costs_ns) for costs_ns in repeats_ns),
+            statistics.median(float(np.percentile(costs_ns, 99)) for costs_ns in repeats_ns),
+            sum(len(costs_ns) for costs_ns in repeats_ns),
         )
-        for candidate, taken in costs.items()
+        for candidate, repeats_ns in costs.items()
     }
 
 
@@ -341,7 +345,7 @@ def pareto_front(points: dict[Candidate, Row]) -> tuple[Candidate, ...]:
     def beats(other: Row, row: Row) -> bool:
         if error(other) == error(row):
             return other.ns_per_ms < row.ns_per_ms
-        return error(other) < error(row) and other.ns_per_ms <= row.ns_per_ms * _ALIKE
+        return error(other) < error(row) and other.ns_per_ms <= row.ns_per_ms * _EQUAL_TIMES_RATIO
 
     best = [row for row in points.values() if not any(beats(other, row) for other in points.values())]
     return tuple(row.candidate for row in sorted(best, key=lambda row: row.ns_per_ms))

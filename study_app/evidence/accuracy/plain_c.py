@@ -24,10 +24,10 @@ from study_app.haptics.runtime.offline import simulate
 _SOURCE: Final = Path(__file__).with_name("thesis_law.c")
 _RATE_HZ: Final = 1000.0
 _BATCH: Final = 1_000
-_CHECKED: Final = 12_000
-"""Ticks whose forces are compared: a wake fills, empties at rest and fills again."""
-_FASTER: Final = 3.0
-"""Factor of `hand_motion` in that comparison: the ball then exceeds the threshold of the knee."""
+_CHECKED_TICKS: Final = 12_000
+"""Number of ticks whose forces are compared, in which a wake fills, empties at rest and fills again."""
+_SPEED_FACTOR: Final = 3.0
+"""Factor for `hand_motion` in that comparison, with which the ball exceeds the threshold of the knee."""
 
 
 class _Parameters(ctypes.Structure):
@@ -73,36 +73,36 @@ def compare_with_plain_c(scenes: Mapping[str, Scene], *, batches: int) -> dict[s
         There is no C compiler, or a scene has something that the C program lacks.
     """
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
-        library = _compiled_library(Path(folder))
-        differences = {name: _difference(library, scene) for name, scene in scenes.items()}
+        library = _compile_library(Path(folder))
+        differences = {name: _force_difference(library, scene) for name, scene in scenes.items()}
         timers = {
             name: (_PlainC(library, scene), TickTimer(scene), TickTimer(scene.model_copy(update={"liquids": ()})))
             for name, scene in scenes.items()
         }
         for _ in range(batches):
-            for each in timers.values():
-                for timer in each:
-                    timer.batch()
-        compared = {}
-        for name, each in timers.items():
-            plain_ns, tick_ns, rest_ns = (statistics.median(timer.costs_ns) for timer in each)
-            compared[name] = Comparison(
+            for scene_timers in timers.values():
+                for timer in scene_timers:
+                    timer.run_batch()
+        comparisons = {}
+        for name, scene_timers in timers.items():
+            plain_ns, tick_ns, rest_ns = (statistics.median(timer.costs_ns) for timer in scene_timers)
+            comparisons[name] = Comparison(
                 plain_ns=plain_ns, tick_ns=tick_ns, rest_ns=rest_ns, difference=differences[name]
             )
-        return compared
+        return comparisons
 
 
-def _compiled_library(folder: Path) -> ctypes.CDLL:
+def _compile_library(folder: Path) -> ctypes.CDLL:
     """Compile the C program into ``folder`` and load it."""
     compiler = shutil.which("gcc")
     if compiler is None:
         raise StudyError("there is no C compiler (gcc)")
-    made = folder / "thesis_law"
-    command = (compiler, "-O2", "-shared", "-fPIC", "-o", made, _SOURCE, "-lm")
-    done = subprocess.run(command, capture_output=True, text=True, check=False)  # noqa: S603 - our own words
-    if done.returncode != 0:
-        raise StudyError(f"gcc cannot compile {_SOURCE.name}: {done.stderr.strip().splitlines()[-1]}")
-    library = ctypes.CDLL(str(made))
+    library_path = folder / "thesis_law"
+    command = (compiler, "-O2", "-shared", "-fPIC", "-o", library_path, _SOURCE, "-lm")
+    result = subprocess.run(command, capture_output=True, text=True, check=False)  # noqa: S603 - a fixed command
+    if result.returncode != 0:
+        raise StudyError(f"gcc cannot compile {_SOURCE.name}: {result.stderr.strip().splitlines()[-1]}")
+    library = ctypes.CDLL(str(library_path))
     rows = np.ctypeslib.ndpointer(np.float64, ndim=2, flags="C_CONTIGUOUS")
     library.create_liquid.restype = ctypes.c_void_p
     library.free_liquid.argtypes = (ctypes.c_void_p,)
@@ -121,7 +121,7 @@ class _PlainC:
         self._row = 0
         self.costs_ns: list[float] = []
 
-    def batch(self) -> None:
+    def run_batch(self) -> None:
         rows = slice(self._row, self._row + _BATCH)
         began = time.perf_counter_ns()
         self.run(self._hand_m[rows], self._force_n[rows])
@@ -133,12 +133,12 @@ class _PlainC:
         self._library.run(self._liquid, len(hand_m), hand_m, force_n)
 
 
-def _difference(library: ctypes.CDLL, scene: Scene) -> float:
+def _force_difference(library: ctypes.CDLL, scene: Scene) -> float:
     """Return the greatest difference of the two programs' forces, relative to the greatest force."""
-    hand_m = _FASTER * hand_motion(_CHECKED)
+    hand_m = _SPEED_FACTOR * hand_motion(_CHECKED_TICKS)
     force_n = np.empty_like(hand_m)
     _PlainC(library, scene).run(hand_m, force_n)
-    table = simulate(scene, Motion(np.arange(_CHECKED) / _RATE_HZ, scene.origin_m + scene.scale * hand_m))
+    table = simulate(scene, Motion(np.arange(_CHECKED_TICKS) / _RATE_HZ, scene.origin_m + scene.scale * hand_m))
     servo_n = np.column_stack([table.fx_n, table.fy_n, table.fz_n])
     return float(np.abs(force_n - servo_n).max() / np.abs(servo_n).max())
 

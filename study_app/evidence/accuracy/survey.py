@@ -16,7 +16,7 @@ from study_app.evidence.table import Evidence, Table
 from study_app.haptics.model.laws import LAWS, finite_reynolds
 from study_app.haptics.model.scene import Liquid, Scene
 
-_NO_REFERENCE_REYNOLDS: Final = 1000.0
+_MAX_REFERENCE_REYNOLDS: Final = 1000.0
 """Greatest Reynolds number with a solution or measurement of an unsteady motion in this program."""
 FILE: Final = "liquids.md"
 _REYNOLDS: Final = (1.0, 10.0, 100.0, 200.0, 1e3, 3e3, 1e4, 3e4, 1e5)
@@ -85,30 +85,30 @@ def survey_scenes(
             continue
         progress(name)
         surveyed.append(_survey_liquid(name, scene, liquid, liquid.viscosity_pa_s))
-    return tuple(sorted(surveyed, key=lambda it: it.reynolds))
+    return tuple(sorted(surveyed, key=lambda liquid: liquid.reynolds))
 
 
 def _survey_liquid(name: str, scene: Scene, liquid: Liquid, viscosity_pa_s: float) -> Surveyed:
     models, model = candidates.physical_candidates(scene)
-    alone = models[0].scene
+    scene_ = models[0].scene
 
-    def share(truth: truths.Truth) -> float:
+    def relative_error(truth: truths.Truth) -> float:
         return error_of(model.forces_against(truth), truth).rms
 
-    steady, solved = truths.steady_truth(alone), solver_truths(alone)
+    steady, solved = truths.steady_truth(scene_), solver_truths(scene_)
     mps_per_reynolds = viscosity_pa_s / (liquid.density_kg_m3 * scene.body.diameter_m)
-    motions = [case.motion for it in solved for case in it.cases]
-    speeds = [float(np.abs(it.velocity_mps).max()) for it in motions if it.velocity_mps is not None]
+    motions = [case.motion for truth in solved for case in truth.cases]
+    speeds = [float(np.abs(truth.velocity_mps).max()) for truth in motions if truth.velocity_mps is not None]
     speed_mps = scene.motion_in(liquid).speed_mps or math.nan
-    creeping = max(share(truths.oscillation_truth(alone)), share(truths.starting_truth(alone)))
+    creeping = max(relative_error(truths.oscillation_truth(scene_)), relative_error(truths.starting_truth(scene_)))
     return Surveyed(
         liquid=name,
         speed_mps=speed_mps,
         mps_per_reynolds=mps_per_reynolds,
         model=model.name,
-        creeping=creeping if speed_mps <= _NO_REFERENCE_REYNOLDS * mps_per_reynolds else None,
-        steady=None if steady is None else share(steady),
-        solver=max(map(share, solved)) if solved else None,
+        creeping=creeping if speed_mps <= _MAX_REFERENCE_REYNOLDS * mps_per_reynolds else None,
+        steady=None if steady is None else relative_error(steady),
+        solver=max(map(relative_error, solved)) if solved else None,
         solver_reynolds=(min(speeds) / mps_per_reynolds, max(speeds) / mps_per_reynolds)
         if solved
         else (math.nan, math.nan),
@@ -116,7 +116,7 @@ def _survey_liquid(name: str, scene: Scene, liquid: Liquid, viscosity_pa_s: floa
     )
 
 
-def _law_spread(reynolds: float) -> float:
+def _relative_law_spread(reynolds: float) -> float:
     """Return the greatest difference between published laws of steady drag, relative to their mean."""
     ratios = [law(reynolds) for law in PUBLISHED.values()]
     return (max(ratios) - min(ratios)) * len(ratios) / sum(ratios)
@@ -133,13 +133,13 @@ def survey_evidence(found: tuple[Surveyed, ...]) -> Evidence:
             it.liquid,
             f"{float(f'{it.reynolds:.3g}'):,g} ({it.speed_mps:g} m/s)",
             it.model,
-            _percent(it.creeping),
-            _percent(it.steady),
-            _percent(it.solver) + (f" (Re {_range(least, greatest)})" if it.solver is not None else ""),
+            _format_percent(it.creeping),
+            _format_percent(it.steady),
+            _format_percent(it.solver) + (f" (Re {_format_range(least, greatest)})" if it.solver is not None else ""),
             f"{checked_mps:.2g} m/s" if it.model == "unsteady drag" else "–",
-            _percent(_law_spread(it.reynolds)),
-            _percent(it.expected.causes.law),
-            _percent(it.expected.error_share),
+            _format_percent(_relative_law_spread(it.reynolds)),
+            _format_percent(it.expected.causes.law),
+            _format_percent(it.expected.error_share),
             f"{it.expected.cost_ns:.0f}",
         )
         liquids.append(cells)
@@ -147,7 +147,7 @@ def survey_evidence(found: tuple[Surveyed, ...]) -> Evidence:
     for reynolds in _REYNOLDS:
         drags = [law(reynolds) for law in (*PUBLISHED.values(), finite_reynolds)]
         values = [f"{24 / reynolds * ratio:.3g}" for ratio in (*drags, _measured_drag_ratio(reynolds))]
-        laws.append((f"{reynolds:,g}", *values, _percent(_law_spread(reynolds))))
+        laws.append((f"{reynolds:,g}", *values, _format_percent(_relative_law_spread(reynolds))))
     tables = (
         Table(_HEADINGS, liquids, left=(0, 2)),
         Table(("Re", *PUBLISHED, "unsteady drag", "experiments", "spread"), laws),
@@ -164,7 +164,7 @@ _WHAT: Final = (
     "Errors are RMS errors divided by the RMS force, with known velocities. Each is the largest over several "
     "references: creeping flow at Re 0.01, experiments on steady drag, and a fluid solver at 1 kHz. Unsteady drag "
     "predicts each motion with constants fitted to the other motions. Motions have been solved up to Re {:.3g}, or "
-    f"up to the scene's highest speed. Above Re {_NO_REFERENCE_REYNOLDS:g} there is no reference for unsteady motion, "
+    f"up to the scene's highest speed. Above Re {_MAX_REFERENCE_REYNOLDS:g} there is no reference for unsteady motion, "
     "and the uncertainty of steady drag is the difference between the published laws. Strokes are compared with the "
     "laws at the scene's highest speed and acceleration, with known velocities, and with velocities that the scene's "
     "estimator derives from encoder counts, after the force limits. The second table lists the drag coefficients of "
@@ -178,11 +178,11 @@ def _measured_drag_ratio(reynolds: float) -> float:
     return float(measured_drag_n(liquid, 1.0, np.array([reynolds]))[0]) / (3 * math.pi * reynolds)
 
 
-def _range(least: float, greatest: float) -> str:
-    return " to ".join(dict.fromkeys(f"{it:.2g}" if it < 10 else f"{it:.0f}" for it in (least, greatest)))
+def _format_range(least: float, greatest: float) -> str:
+    return " to ".join(dict.fromkeys(f"{value:.2g}" if value < 10 else f"{value:.0f}" for value in (least, greatest)))
 
 
-def _percent(share: float | None) -> str:
+def _format_percent(share: float | None) -> str:
     if share is None:
         return "–"
     return f"{100 * share:.0f} %" if share >= 0.1 else f"{100 * share:.2g} %"

@@ -1,7 +1,7 @@
 """Fits of models to the fluid solver's force on the ball, and the solver against published drag: tables and a figure.
 
-Every model is fitted to every motion by ``identify.fit``; what it found is then tried on the same liquid at the other
-speed, where nothing is fitted any more: a parameter of a liquid must not change with the hand.
+Every model is fitted to every motion by ``identify.fit``. The fitted parameters are then tested on the same liquid at
+the other speed, because the parameters of a liquid must not depend on the motion of the hand.
 """
 
 import math
@@ -59,8 +59,8 @@ MODELS: Final = (
     Model("... history, added mass fitted", ("drag", "added_mass", "history"), free=("coefficient",)),
     Model("unsteady drag", ("unsteady_drag",)),
 )
-"""From the thesis' drag alone to all that creeping flow has, and the law whose constants are fitted to the solver;
-"..." is the Reynolds-dependent drag."""
+"""From the thesis' drag alone to all forces of creeping flow, and the law whose constants are fitted to the solver. The
+"..." in a name stands for the Reynolds-dependent drag."""
 
 _START: Final = {"length": 300, "scaling": 1000.0}
 
@@ -105,9 +105,11 @@ def fit_one(model: Model, table: SolvedTable) -> tuple[dict[str, float], tuple[s
     """Return the best-fitting parameters of the model for the table, and the warnings of the fit."""
     if not model.free:
         return {}, ()
-    motion, force_n = even(table)
-    found = fit(_scene_of(model, table.case), table.case.liquid_id, model.free, motion, force_n)
-    return {it.name: found.values[it.name] for it in found.parameters}, found.warnings
+    motion, force_n = resampled(table)
+    fit_result = fit(_scene_of(model, table.case), table.case.liquid_id, model.free, motion, force_n)
+    return {
+        parameter.name: fit_result.values[parameter.name] for parameter in fit_result.parameters
+    }, fit_result.warnings
 
 
 def evaluate_fit(
@@ -118,13 +120,13 @@ def evaluate_fit(
     warnings: tuple[str, ...] = (),
 ) -> Fitted:
     """Return the errors of a model with these parameters for the table and for others of the same liquid."""
-    motion, solved_n = even(table)
+    motion, solved_n = resampled(table)
     force_n = _force_along(model, table.case, values, motion)
     error_n = np.abs(force_n - solved_n)
     carried = [
-        _share_of(_force_along(model, it.case, values, other) - truth, truth)
-        for it in others
-        for other, truth in (even(it),)
+        _relative_error(_force_along(model, other_table.case, values, other_motion) - true_n, true_n)
+        for other_table in others
+        for other_motion, true_n in (resampled(other_table),)
     ]
     after = motion.t_s > (STOP + RAMP) * table.case.unit_s
     return Fitted(
@@ -134,7 +136,7 @@ def evaluate_fit(
         force_n=force_n,
         rms_n=_rms(error_n),
         worst_n=float(error_n.max()),
-        share=_share_of(error_n, solved_n),
+        share=_relative_error(error_n, solved_n),
         within=float(np.mean(error_n <= np.maximum(RELATIVE * np.abs(solved_n), PERCEPTIBLE_N))),
         push=float(force_n[after].sum() / solved_n[after].sum()),
         carried=max(carried, default=math.nan),
@@ -169,15 +171,15 @@ def _force_along(model: Model, case: Case, values: Mapping[str, float], motion: 
     return force_n
 
 
-def even(table: SolvedTable) -> tuple[Motion, Floats]:
+def resampled(table: SolvedTable) -> tuple[Motion, Floats]:
     """Return a table's motion and force (n,), resampled to one row per tick so that all times have equal weight."""
     t_s, velocity_mps, force_n = table.columns.values()
-    even_s = np.arange(math.floor(t_s[-1] * _RATE_HZ) + 1) / _RATE_HZ
-    even_n = np.interp(even_s, t_s, force_n)
-    return along_a_line(even_s, np.interp(even_s, t_s, velocity_mps), even_n).motion, even_n
+    times_s = np.arange(math.floor(t_s[-1] * _RATE_HZ) + 1) / _RATE_HZ
+    even_n = np.interp(times_s, t_s, force_n)
+    return along_a_line(times_s, np.interp(times_s, t_s, velocity_mps), even_n).motion, even_n
 
 
-def _share_of(error_n: Floats, force_n: Floats) -> float:
+def _relative_error(error_n: Floats, force_n: Floats) -> float:
     return _rms(error_n) / _rms(force_n)
 
 
@@ -185,24 +187,25 @@ def _rms(values: Floats) -> float:
     return math.sqrt(float(np.mean(values**2)))
 
 
-_ENGINES: Final[Mapping[str, tuple[int, Mapping[str, float]]]] = {
+_SCORED_MODELS: Final[Mapping[str, tuple[int, Mapping[str, float]]]] = {
     "thesis: drag and wake": (1, {"length": 1700, "scaling": 1700.0, "exponent": 0.75}),  # of water, rek2024
     "drag, added mass, history": (8, {}),
     "unsteady drag": (10, {}),
 }
-"""The models that are scored by the benchmark of `score`: their places in `MODELS`, and parameters."""
-_ROUNDS: Final = 10
-"""So often all of them follow a motion in turn; the shortest time of each counts, which other programs delay least."""
+"""The models that the benchmark `score` scores, by name: their indices in `MODELS`, and parameters."""
+_REPEATS: Final = 10
+"""Number of times that all models follow each motion in turn; the shortest time counts, which other programs delay
+least."""
 
 
 class Tick:
-    """A model computed tick by tick along x, or with `along` for a known motion.
+    """A model that computes the force along x, tick by tick or, with `along`, for a known motion.
 
-    The law alone receives the exact velocities; a force that is ``sent`` has passed the estimator and the safety layer.
+    With ``sent``, velocities are estimated and the force passes the safety layer; otherwise velocities are exact.
     """
 
     def __init__(self, name: str, setup: Mapping[str, float], *, sent: bool) -> None:
-        place, values = _ENGINES[name]
+        place, values = _SCORED_MODELS[name]
         case = Case(
             liquid_id="liquid",
             density_kg_m3=setup["density_kg_m3"],
@@ -232,26 +235,26 @@ class Tick:
 
 
 def score_all(progress: Callable[[str], object] = lambda _line: None) -> Evidence:
-    """Score every model of `_ENGINES`, the law alone and as sent.
+    """Score every model of `_SCORED_MODELS`, the law alone and as sent.
 
     All models follow each motion in turn, so that their times are comparable.
     """
-    over = score.motions()
+    solved_motions = score.motions()
     engines = {
         f"{name}, as sent" if sent else name: partial(Tick, name, sent=sent)
-        for name in _ENGINES
+        for name in _SCORED_MODELS
         for sent in (False, True)
     }
     scores: dict[str, list[score.Score]] = {title: [] for title in engines}
-    for motion in over:
+    for motion in solved_motions:
         progress(f"{motion.name} ...")
-        rounds = [[score.score(engine, motion) for engine in engines.values()] for _ in range(_ROUNDS)]
-        for title, of_engine in zip(engines, zip(*rounds, strict=True), strict=True):
-            scores[title].append(min(of_engine, key=lambda it: it.tick_ns))
+        rounds = [[score.score(engine, motion) for engine in engines.values()] for _ in range(_REPEATS)]
+        for title, engine_scores in zip(engines, zip(*rounds, strict=True), strict=True):
+            scores[title].append(min(engine_scores, key=lambda engine_score: engine_score.tick_ns))
     rows, first = [], next(iter(scores.values()))
     for title, engine in engines.items():
         progress(f"{title}: released handles ...")
-        rows.append(score.row(title, scores[title], score.all_releases(engine, over), first))
+        rows.append(score.row(title, scores[title], score.all_releases(engine, solved_motions), first))
     table = Table(score.HEADINGS, rows, left=1)
     text = table.markdown() + "\n"
     return Evidence(text, {"score.md": text, "score.csv": table.csv()})
@@ -277,35 +280,35 @@ def draw(tables: Sequence[SolvedTable], fits: Sequence[Fitted]) -> Figure:
     axes = figure.subplots(len(shown), 1, squeeze=False)[:, 0]
     figure.subplots_adjust(left=0.12, right=0.98, top=1 - 44 / height_pt, bottom=28 / height_pt, hspace=0.42)
     for ax, table in zip(axes, shown.values(), strict=True):
-        _panel(ax, table, [it for it in fits if it.case == table.case and it.model.name in _LOOKS])
+        _draw_panel(ax, table, [it for it in fits if it.case == table.case and it.model.name in _LOOKS])
     handles, labels = axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="upper left", ncols=2, frameon=False, fontsize=6.8, bbox_to_anchor=(0.0, 1.0))
     axes[-1].set_xlabel("time [s]")
     return figure
 
 
-def _panel(ax: Axes, table: SolvedTable, fits: Sequence[Fitted]) -> None:
-    case, (motion, force_n) = table.case, even(table)
+def _draw_panel(ax: Axes, table: SolvedTable, fits: Sequence[Fitted]) -> None:
+    case, (motion, force_n) = table.case, resampled(table)
     t_s = motion.t_s
-    kept = t_s <= (STOP + _AFTER) * case.unit_s
-    ax.plot(t_s[kept], force_n[kept], label="fluid solver", **_SOLVER)
+    shown = t_s <= (STOP + _AFTER) * case.unit_s
+    ax.plot(t_s[shown], force_n[shown], label="fluid solver", **_SOLVER)
     order = [it.name for it in MODELS]
     for it in sorted(fits, key=lambda it: order.index(it.model.name)):
-        label, look = _LOOKS[it.model.name]
-        ax.plot(t_s[kept], it.force_n[kept], label=label, linewidth=1.1, **look)
+        label, line_style = _LOOKS[it.model.name]
+        ax.plot(t_s[shown], it.force_n[shown], label=label, linewidth=1.1, **line_style)
     even_n = float(np.interp(STOP * case.unit_s * 0.95, t_s, force_n))
     ax.set_ylim(2.3 * even_n, -1.6 * even_n)
     ax.axhline(0, color=style.ZERO, linewidth=0.6)
     ax.set_title(f"{case.liquid_id}, {case.speed_mps:g} m/s, Re {case.reynolds:.2g}: force along the motion [N]")
     ax.yaxis.set_major_locator(MaxNLocator(5))
-    _note(ax, "stop", (STOP * case.unit_s, 0), (-21, 5))
+    _annotate(ax, "stop", (STOP * case.unit_s, 0), (-21, 5))
     for peak, edge in ((int(force_n.argmin()), 0), (int(force_n.argmax()), 1)):
-        _note(ax, f"to {force_n[peak]:.1f} N", (t_s[peak], ax.get_ylim()[edge]), (9, -7 if edge else 3))
+        _annotate(ax, f"to {force_n[peak]:.1f} N", (t_s[peak], ax.get_ylim()[edge]), (9, -7 if edge else 3))
 
 
-def _note(ax: Axes, words: str, at: tuple[float, float], offset_pt: tuple[float, float]) -> None:
-    words = words.replace("-", "−")
-    ax.annotate(words, at, offset_pt, textcoords="offset points", fontsize=6.6, color=style.TEXT_SOFT)
+def _annotate(ax: Axes, text: str, point: tuple[float, float], offset_pt: tuple[float, float]) -> None:
+    text = text.replace("-", "−")
+    ax.annotate(text, point, offset_pt, textcoords="offset points", fontsize=6.6, color=style.TEXT_SOFT)
 
 
 FITS_FILE: Final = "fits.csv"
@@ -341,19 +344,19 @@ def _steady_markdown(table: SolvedTable) -> str:
 def _fits_markdown(fits: Sequence[Fitted]) -> str:
     """Return the fits as Markdown, one table per motion."""
     parts = []
-    for case in dict.fromkeys(it.case for it in fits):
+    for case in dict.fromkeys(fitted.case for fitted in fits):
         parts.append(f"{case.liquid_id}, {case.speed_mps:g} m/s (Re {case.reynolds:.3g})")
-        parts.append(Table(_HEADINGS, [_row(it) for it in fits if it.case == case], left=2).markdown())
+        parts.append(Table(_HEADINGS, [_fit_row(fitted) for fitted in fits if fitted.case == case], left=2).markdown())
     return "\n\n".join([*parts, "\\* at the edge of the permitted range: the best value may lie outside it."])
 
 
 def fits_csv(fits: Sequence[Fitted]) -> str:
     """Return the fits as CSV with the columns `COLUMNS`; parameters are ``name=value`` pairs separated by blanks."""
     rows = []
-    for it in fits:
-        numbers = (it.rms_n, it.worst_n, it.share, it.within, it.push, it.carried)
-        given = " ".join(f"{name}={value!r}" for name, value in it.values.items())
-        rows.append([it.case.name, it.model.name, given, *(f"{number:.6g}" for number in numbers)])
+    for fitted in fits:
+        numbers = (fitted.rms_n, fitted.worst_n, fitted.share, fitted.within, fitted.push, fitted.carried)
+        parameters = " ".join(f"{name}={value!r}" for name, value in fitted.values.items())
+        rows.append([fitted.case.name, fitted.model.name, parameters, *(f"{number:.6g}" for number in numbers)])
     return Table(COLUMNS, rows).csv()
 
 
@@ -369,7 +372,7 @@ _HEADINGS: Final = (
 )  # fmt: skip
 
 
-def _row(it: Fitted) -> tuple[str, ...]:
+def _fit_row(it: Fitted) -> tuple[str, ...]:
     ranges = find_parameters(_scene_of(it.model, it.case), it.case.liquid_id, it.model.free) if it.model.free else ()
     within = {
         parameter.name

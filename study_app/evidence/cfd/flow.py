@@ -1,15 +1,15 @@
 """Axisymmetric flow around a ball at rest in a wide stream, by finite elements (NGSolve, the extra ``cfd``).
 
-In units of the ball's diameter, the stream's speed and the liquid's density. The momentum equation and the condition
-that nothing is compressed, weighted by the distance r from the axis,
+The units are the ball's diameter, the stream's speed and the liquid's density. The momentum equation and the condition
+of incompressibility, weighted by the distance r from the axis,
 
     ∂u/∂t + (u·∇)u = dU/dt e_x − ∇p + ∇·2νε(u),   ∇·u = 0,   ν = 1/Re,
 
-on Taylor–Hood elements of order 3 on curved triangles; the stream U(t) on the borders ahead and aside, free outflow
-behind. dU/dt stands in for the pressure that a frame moving with the ball would add: forces are those of the resting
-frame. The drag is the residual of the momentum equation at the ball (Babuška & Miller 1984), more exact than an
-integral of stresses. In time: backward differences of order 2, convection extrapolated with order 2, one matrix for all
-steps.
+are solved with Taylor–Hood elements of order 3 on curved triangles. The stream U(t) is prescribed on the borders ahead
+and aside, and the outflow behind is free. The term dU/dt replaces the pressure that a frame moving with the ball would
+add, so that forces are those of the resting frame. The drag is the residual of the momentum equation at the ball
+(Babuška & Miller 1984), which is more accurate than an integral of stresses. Time steps use backward differences of
+order 2 and convection extrapolated with order 2, so that one matrix serves all steps of equal size.
 """
 
 import math
@@ -24,9 +24,9 @@ from study_app.errors import StudyError
 from study_app.haptics.model.motion import Floats
 
 ORDER: Final = 3
-_ROUNDS: Final = 20
-_SETTLED: Final = 1e-8
-_EDGE: Final = 1e-9
+_MAX_ITERATIONS: Final = 20
+_TOLERANCE: Final = 1e-8
+_EDGE_TOLERANCE: Final = 1e-9
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,7 +47,7 @@ class Grid:
     symmetric: bool = False
 
 
-def library() -> Any:
+def import_ngsolve() -> Any:
     """Import NGSolve, with linear algebra limited to one thread.
 
     With matrices this small, more threads make it ten times slower on busy cores.
@@ -66,7 +66,7 @@ class Flow:
     """The liquid around the ball on one grid; ``unknowns`` is the number of degrees of freedom."""
 
     def __init__(self, grid: Grid) -> None:
-        self._ng = ng = library()
+        self._ng = ng = import_ngsolve()
         self.grid = grid
         self._mesh = mesh = _mesh(grid)
         walls = "ball|ahead|aside"
@@ -75,8 +75,8 @@ class Flow:
         self._free = self._space.FreeDofs()
         self.unknowns = int(self._space.ndof)
         self._trial, self._test = self._space.TnT()
-        self._at_ball = self._one_on("ball")
-        self._stream = self._one_on("ahead|aside")
+        self._ball_indicator = self._indicator_of("ball")
+        self._stream = self._indicator_of("ahead|aside")
 
     def steady(self, reynolds: Sequence[float]) -> list[float]:
         """Return C_d at increasing Reynolds numbers, each by Newton's method starting from the previous solution."""
@@ -87,17 +87,17 @@ class Flow:
         for value in reynolds:
             form = ng.BilinearForm(self._space)
             form += self._integral(self._stokes(1 / value) + self._convection(*self._trial[:2]))
-            for _ in range(_ROUNDS):
+            for _ in range(_MAX_ITERATIONS):
                 form.Apply(flow.vec, residual)
                 form.AssembleLinearization(flow.vec)
                 step.data = form.mat.Inverse(self._free, inverse="umfpack") * residual
                 flow.vec.data -= step
-                if step.Norm() < _SETTLED * flow.vec.Norm():
+                if step.Norm() < _TOLERANCE * flow.vec.Norm():
                     break
             else:
                 raise StudyError(f"no steady flow was found at Re = {value:g}: approach it in smaller steps")
             form.Apply(flow.vec, residual)
-            forces.append(-2 * math.pi * ng.InnerProduct(residual, self._at_ball) / (math.pi / 8))
+            forces.append(-2 * math.pi * ng.InnerProduct(residual, self._ball_indicator) / (math.pi / 8))
         return forces
 
     def unsteady(
@@ -119,20 +119,22 @@ class Flow:
             form.Assemble()
         matrices: dict[float, tuple[Any, Any]] = {}
         load, rest, change, before, previous, carried_before, carried_previous = (self._zeros() for _ in range(7))
-        drag, moments = np.zeros(len(times)), times.tolist()  # NGSolve takes no numbers of numpy
+        drag, times_list = np.zeros(len(times)), times.tolist()  # NGSolve accepts no numpy numbers
         for k in range(1, len(times)):
-            step = moments[k] - moments[k - 1]
-            growth = step / (moments[k - 1] - moments[k - 2]) if k > 1 else 1.0
+            step = times_list[k] - times_list[k - 1]
+            growth = step / (times_list[k - 1] - times_list[k - 2]) if k > 1 else 1.0
             now, last, first = (1 + 2 * growth) / (1 + growth), 1 + growth, growth**2 / (1 + growth)
             weight = round(now / step, 9)
             if weight not in matrices:
                 matrices[weight] = self._with_inverse(stokes, mass, weight)
             matrix, inverse = matrices[weight]
-            at = [speed(moments[max(k - back, 0)]) for back in range(3)]
+            speeds = [speed(times_list[max(k - back, 0)]) for back in range(3)]
             change.data = first / step * before - last / step * previous
-            load.data = (weight * at[0] - last / step * at[1] + first / step * at[2]) * push.vec - mass.mat * change
+            load.data = (
+                weight * speeds[0] - last / step * speeds[1] + first / step * speeds[2]
+            ) * push.vec - mass.mat * change
             rest.data = load - (1 + growth) * carried_previous + growth * carried_before
-            flow.vec.data = at[0] * self._stream
+            flow.vec.data = speeds[0] * self._stream
             rest.data -= matrix * flow.vec
             flow.vec.data += inverse * rest
             load.data -= matrix * flow.vec
@@ -141,10 +143,10 @@ class Flow:
                 carried_before.data, carried_previous.data = carried_previous, carried.vec
                 load.data -= carried.vec
             before.data, previous.data = previous, flow.vec
-            drag[k] = 2 * math.pi * ng.InnerProduct(load, self._at_ball)
+            drag[k] = 2 * math.pi * ng.InnerProduct(load, self._ball_indicator)
             if not math.isfinite(drag[k]):
                 raise StudyError(
-                    f"the solution diverged at t = {moments[k]:g} D/U: use steps shorter than {step:g} D/U"
+                    f"the solution diverged at t = {times_list[k]:g} D/U: use steps shorter than {step:g} D/U"
                 )
         return drag
 
@@ -155,16 +157,16 @@ class Flow:
         return matrix, matrix.Inverse(self._free, inverse="umfpack")
 
     def _zeros(self) -> Any:
-        made = self._ng.BaseVector(self.unknowns)
-        made[:] = 0.0
-        return made
+        vector = self._ng.BaseVector(self.unknowns)
+        vector[:] = 0.0
+        return vector
 
-    def _one_on(self, border: str) -> Any:
+    def _indicator_of(self, border: str) -> Any:
         """Return the velocity vector that is 1 along the stream on one boundary and 0 at all other nodes."""
-        flow, made = self._ng.GridFunction(self._space), self._zeros()
+        flow, vector = self._ng.GridFunction(self._space), self._zeros()
         flow.components[0].Set(1, definedon=self._mesh.Boundaries(border))
-        made.data = flow.vec
-        return made
+        vector.data = flow.vec
+        return vector
 
     def _integral(self, integrand: Any) -> Any:
         return integrand * self._ng.dx(bonus_intorder=2)
@@ -180,7 +182,7 @@ class Flow:
     def _stokes(self, viscosity: float) -> Any:
         """Return the terms of viscosity, pressure and incompressibility."""
         (u, w, p), (v, z, q), r = self._trial, self._test, self._ng.y
-        du, dw, dv, dz = (self._ng.grad(it) for it in (u, w, v, z))
+        du, dw, dv, dz = (self._ng.grad(component) for component in (u, w, v, z))
         strain = 2 * du[0] * dv[0] + 2 * dw[1] * dz[1] + (du[1] + dw[0]) * (dv[1] + dz[0])
         around = 2 * w * z / r
         return viscosity * (r * strain + around) - p * (r * (dv[0] + dz[1]) + z) - q * (r * (du[0] + dw[1]) + w)
@@ -197,26 +199,29 @@ def _mesh(grid: Grid) -> Any:
     near, wake = (box(5, 10, 2), box(20, 40, 4)) if grid.symmetric else (box(2, 7, 2), box(4, 24, 4))
     wake -= near
     far = box(grid.ahead, grid.ahead + grid.behind, grid.aside) - near - wake
-    for part, longest in ((near, grid.near), (wake, 4 * grid.near), (far, grid.far)):
-        part.faces.maxh = longest
-    whole = Glue([near, wake, far])
-    for edge in whole.edges:
-        edge.name = _border(grid, edge)
+    for part, max_edge in ((near, grid.near), (wake, 4 * grid.near), (far, grid.far)):
+        part.faces.maxh = max_edge
+    domain = Glue([near, wake, far])
+    for edge in domain.edges:
+        edge.name = _border_name(grid, edge)
         if edge.name == "ball":
             edge.maxh = grid.ball
-    mesh = library().Mesh(OCCGeometry(whole, dim=2).GenerateMesh(maxh=grid.far, grading=0.25))
+    mesh = import_ngsolve().Mesh(OCCGeometry(domain, dim=2).GenerateMesh(maxh=grid.far, grading=0.25))
     mesh.Curve(ORDER)
     return mesh
 
 
-def _border(grid: Grid, edge: Any) -> str:
+def _border_name(grid: Grid, edge: Any) -> str:
     x, r = edge.center[0], edge.center[1]
-    if r < _EDGE:
+    if r < _EDGE_TOLERANCE:
         return "axis"
-    if math.hypot(edge.start[0], edge.start[1]) < 0.5 + _EDGE and math.hypot(edge.end[0], edge.end[1]) < 0.5 + _EDGE:
+    if (
+        math.hypot(edge.start[0], edge.start[1]) < 0.5 + _EDGE_TOLERANCE
+        and math.hypot(edge.end[0], edge.end[1]) < 0.5 + _EDGE_TOLERANCE
+    ):
         return "ball"
-    if abs(x + grid.ahead) < _EDGE:
+    if abs(x + grid.ahead) < _EDGE_TOLERANCE:
         return "ahead"
-    if abs(x - grid.behind) < _EDGE:
+    if abs(x - grid.behind) < _EDGE_TOLERANCE:
         return "behind"
-    return "aside" if abs(r - grid.aside) < _EDGE else "between"
+    return "aside" if abs(r - grid.aside) < _EDGE_TOLERANCE else "between"

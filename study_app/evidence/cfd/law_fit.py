@@ -1,7 +1,7 @@
 """The constants of unsteady drag by least squares over solved motions, and the errors of motions left out of the fit.
 
-The equations of the law are fitted along motions whose speed and acceleration are known exactly: the constants are
-then those of the flow, and no delay of a tick or of a velocity estimator is fitted into them.
+The equations of the law are fitted along motions whose speed and acceleration are known exactly, so that the constants
+do not include the delay of a tick or of a velocity estimator.
 """
 
 import math
@@ -22,7 +22,7 @@ from study_app.haptics.model.motion import Floats
 
 STEP: Final = 0.005
 """Interval between the rows that are compared [D/U]."""
-_BEGIN: Final = Constants(c_m=0.5, c_y=1.0, c_z=2.0, c_s=1.0, beta=1.0, r_0=5.0)
+_INITIAL_CONSTANTS: Final = Constants(c_m=0.5, c_y=1.0, c_z=2.0, c_s=1.0, beta=1.0, r_0=5.0)
 """Initial values of the search: orders of magnitude."""
 
 
@@ -50,7 +50,7 @@ class Refit:
     errors: tuple[_MotionError, ...]
 
 
-class _Solved:
+class _SolvedMotion:
     """One solved motion at even times, in the units of its liquid."""
 
     def __init__(self, table: SolvedTable) -> None:
@@ -68,7 +68,7 @@ class _Solved:
         self._prompt_n = -stokes_nspm * self._w_mps[:, 0] - added_kg * self._dw_mps2[:, 0]
 
     def residuals(self, constants: Constants) -> Floats:
-        """Return the errors (n,), whose sum of squares is the square of the relative RMS error."""
+        """Return the scaled errors (n,), whose sum of squares is the square of the relative RMS error."""
         residuals: Floats = self._error_n(constants) / np.linalg.norm(self._force_n)
         return residuals
 
@@ -102,49 +102,53 @@ def refit_law(
     """
     if len(tables) < 2:
         raise StudyError(f"{len(tables)} solved motion(s): leave-one-out fitting needs at least two")
-    solved = [_Solved(it) for it in tables]
+    solved = [_SolvedMotion(table) for table in tables]
     progress(f"fitting the constants to {len(tables)} motions ...")
     constants = fit_constants(tables)
     errors = []
-    for table, one in zip(tables, solved, strict=True):
+    for table, left_out in zip(tables, solved, strict=True):
         progress(f"... without {table.case.liquid_id}, {table.notes['title']} ...")
-        others = _fit([it for it in solved if it is not one], constants)
+        others = _fit_constants([motion for motion in solved if motion is not left_out], constants)
         errors.append(
             _MotionError(
                 table=table,
                 others=others,
-                fitted=one.errors(constants),
-                left_out=one.errors(others),
-                program=_as_run(table),
+                fitted=left_out.errors(constants),
+                left_out=left_out.errors(others),
+                program=_tick_errors(table),
             )
         )
     errors += [
         _MotionError(
-            table=it, others=constants, fitted=None, left_out=_Solved(it).errors(constants), program=_as_run(it)
+            table=table,
+            others=constants,
+            fitted=None,
+            left_out=_SolvedMotion(table).errors(constants),
+            program=_tick_errors(table),
         )
-        for it in held_out
+        for table in held_out
     ]
     return Refit(constants, tuple(errors))
 
 
-def _as_run(table: SolvedTable) -> tuple[float, float]:
+def _tick_errors(table: SolvedTable) -> tuple[float, float]:
     """Return the errors of the program's tick."""
-    (program,) = [it for it in MODELS if it.effects == ("unsteady_drag",)]
-    judged = evaluate_fit(program, table, {})
-    return judged.share, judged.worst_n / float(np.abs(table.columns["force_n"]).max())
+    (program,) = [model for model in MODELS if model.effects == ("unsteady_drag",)]
+    fitted = evaluate_fit(program, table, {})
+    return fitted.share, fitted.worst_n / float(np.abs(table.columns["force_n"]).max())
 
 
 def fit_constants(tables: Sequence[SolvedTable]) -> Constants:
     """Return the constants fitted to all tables with equal weight."""
-    return _fit([_Solved(it) for it in tables], _BEGIN)
+    return _fit_constants([_SolvedMotion(table) for table in tables], _INITIAL_CONSTANTS)
 
 
-def _fit(solved: Sequence[_Solved], begin: Constants) -> Constants:
-    """Search in logarithms, so that the constants stay positive."""
+def _fit_constants(solved: Sequence[_SolvedMotion], begin: Constants) -> Constants:
+    """Return the best-fitting constants; the search uses their logarithms, so that they stay positive."""
 
     def residuals(logs: Floats) -> Floats:
         constants = Constants._make(np.exp(logs).tolist())
-        return np.concatenate([it.residuals(constants) for it in solved])
+        return np.concatenate([motion.residuals(constants) for motion in solved])
 
     solution = least_squares(residuals, np.log(begin), diff_step=1e-4, xtol=1e-6, ftol=1e-9)
     if not solution.success:

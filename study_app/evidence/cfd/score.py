@@ -43,19 +43,19 @@ _Engine: TypeAlias = Callable[[Mapping[str, float]], Step]
 
 _RATE_HZ: Final = 1000.0
 _FOLDERS: Final = {"": True, "training": True, "held_out": False}
-"""Where the tables are, and whether the constants of unsteady drag, this project's law, are fitted to them."""
+"""The folders of the tables, and whether the constants of unsteady drag, this project's law, are fitted to them."""
 LIQUIDS: Final = ("honey", "glycerin", "gear_oil")
-"""In which handles are let go."""
+"""The liquids in which handles are released."""
 HANDLES_KG: Final = (0.05, 0.2)
 _STROKE_M: Final = 0.03
 _STROKE_HZ: Final = 2.0
 _PHASES: Final = (0.5, 0.625, 0.75)
-"""When the hand lets go, in periods of its stroke: at its far end, on the way back, and in the middle."""
+"""Times of the release, in periods of the stroke: at its far end, on the way back, and in the middle."""
 _FREE_S: Final = 0.6
 DELAYS: Final = (0, 1, 2, 4, 8, 16, 32)
-"""Delays of the force that are tried [ticks]: with 0, a force acts from the reading that it answers to the next one."""
+"""Tested delays of the force [ticks]; with 0, a force acts from the reading that it answers to the next one."""
 _SETTLES_S: Final = 0.2
-"""A handle that goes on swinging after this time rings: more than `_RINGS` changes of direction by `_RINGS_MPS`."""
+"""Time after which a handle must not ring: change direction more than `_RINGS` times by `_RINGS_MPS` [s]."""
 _RINGS: Final = 3
 _RINGS_MPS: Final = 0.01
 _ALLOWANCE_J: Final = 1e-4
@@ -116,33 +116,33 @@ def motions(folder: Path | None = None, only: str = "") -> tuple[Motion, ...]:
     lines = (folder / SUMS).read_text("utf-8").splitlines()
     sums = {line[66:]: line[:64] for line in lines if not line.startswith("#")}
     records = []
-    for place, fitted in _FOLDERS.items():
-        for path in sorted(it for it in (folder / place).glob("*mmps.csv") if only in it.stem):
+    for subfolder, fitted in _FOLDERS.items():
+        for path in sorted(it for it in (folder / subfolder).glob("*mmps.csv") if only in it.stem):
             content = path.read_bytes()
             if hashlib.sha256(content).hexdigest() != sums.get(path.relative_to(folder).as_posix()):
                 raise _EngineError(f"{path} is not the published table: its checksum is not in {SUMS}")
-            records.append(_motion(path.stem, content.decode("utf-8"), fitted=fitted))
+            records.append(_parse_motion(path.stem, content.decode("utf-8"), fitted=fitted))
     if not records:
         raise _EngineError(f"{folder} does not contain a motion with '{only}' in its name")
     return tuple(records)
 
 
-def _motion(name: str, text: str, *, fitted: bool) -> Motion:
+def _parse_motion(name: str, text: str, *, fitted: bool) -> Motion:
     lines = text.splitlines()
     notes = dict(line[2:].split(": ", 1) for line in lines if line.startswith("#"))
     rows = [line for line in lines if not line.startswith("#")][1:]
     t_s, velocity_mps, force_n = np.array([[float(cell) for cell in row.split(",")] for row in rows]).T
-    even_s = np.arange(math.floor(t_s[-1] * _RATE_HZ) + 1) / _RATE_HZ
-    even_mps = np.interp(even_s, t_s, velocity_mps)
-    place_m = np.concatenate([[0.0], np.cumsum((even_mps[1:] + even_mps[:-1]) / (2 * _RATE_HZ))])
+    times_s = np.arange(math.floor(t_s[-1] * _RATE_HZ) + 1) / _RATE_HZ
+    speeds_mps = np.interp(times_s, t_s, velocity_mps)
+    position_m = np.concatenate([[0.0], np.cumsum((speeds_mps[1:] + speeds_mps[:-1]) / (2 * _RATE_HZ))])
     return Motion(
         name=name,
         fitted=fitted,
         notes=notes,
-        t_s=even_s,
-        position_m=place_m,
-        velocity_mps=even_mps,
-        force_n=np.interp(even_s, t_s, force_n),
+        t_s=times_s,
+        position_m=position_m,
+        velocity_mps=speeds_mps,
+        force_n=np.interp(times_s, t_s, force_n),
     )
 
 
@@ -194,19 +194,19 @@ def release(
         Whether that exceeds the hand's work on the liquid, or the handle keeps oscillating.
     """
     step = engine({**setup, "handle_kg": handle_kg, "delay_ticks": delay})
-    way = 2 * math.pi * _STROKE_HZ
-    period_s, held = 1 / _RATE_HZ, round((1 + phase) / _STROKE_HZ * _RATE_HZ)
-    late = deque([0.0] * delay)
+    angular_per_s = 2 * math.pi * _STROKE_HZ
+    period_s, release_tick = 1 / _RATE_HZ, round((1 + phase) / _STROKE_HZ * _RATE_HZ)
+    delayed_n = deque([0.0] * delay)
     x_m = v_mps = put_in_j = given_j = 0.0
     start_j, turns, heading = math.inf, 0, 0.0
-    for k in range(held + round(_FREE_S * _RATE_HZ)):
-        late.append(float(step(k * period_s, x_m, v_mps)))
-        acting_n = late.popleft()
-        if k < held:
+    for k in range(release_tick + round(_FREE_S * _RATE_HZ)):
+        delayed_n.append(float(step(k * period_s, x_m, v_mps)))
+        acting_n = delayed_n.popleft()
+        if k < release_tick:
             # from rest at one end of the stroke to the other, and back
-            to_m = _STROKE_M * (1 - math.cos(way * (k + 1) * period_s))
-            put_in_j -= acting_n * (to_m - x_m)
-            x_m, v_mps = to_m, _STROKE_M * way * math.sin(way * (k + 1) * period_s)
+            next_m = _STROKE_M * (1 - math.cos(angular_per_s * (k + 1) * period_s))
+            put_in_j -= acting_n * (next_m - x_m)
+            x_m, v_mps = next_m, _STROKE_M * angular_per_s * math.sin(angular_per_s * (k + 1) * period_s)
             start_j, heading = 0.5 * handle_kg * v_mps**2, math.copysign(1.0, v_mps)
             continue
         v_mps += acting_n / handle_kg * period_s
@@ -215,22 +215,22 @@ def release(
             return math.inf, True
         given_j = max(given_j, 0.5 * handle_kg * v_mps**2 - start_j)
         if v_mps * heading < -_RINGS_MPS:
-            turns, heading = turns + (k > held + _SETTLES_S * _RATE_HZ), -heading
+            turns, heading = turns + (k > release_tick + _SETTLES_S * _RATE_HZ), -heading
     return given_j, given_j > max(put_in_j, 0.0) + _ALLOWANCE_J or turns > _RINGS
 
 
 def releases(engine: _Engine, motion: Motion, delays: Sequence[int] = DELAYS) -> Releases:
     """Release handles in the liquid of a motion with increasing delay until one is unstable."""
-    given_j, borne = 0.0, -1
+    given_j, tolerated = 0.0, -1
     for delay in delays:
         cases = itertools.product(HANDLES_KG, _PHASES)
         measured = [release(engine, motion.setup, handle_kg, phase, delay) for handle_kg, phase in cases]
         if delay <= 1:
-            given_j = max(given_j, *(one_j for one_j, _ in measured))
+            given_j = max(given_j, *(case_j for case_j, _ in measured))
         if any(fails for _, fails in measured):
             break
-        borne = delay
-    return Releases(motion.notes["liquid"], given_j, borne)
+        tolerated = delay
+    return Releases(motion.notes["liquid"], given_j, tolerated)
 
 
 def measure(
@@ -254,13 +254,13 @@ def all_releases(
     progress: Callable[[str], object] = lambda _line: None,
 ) -> list[Releases]:
     """Return an engine's releases in each liquid of the motions."""
-    first = {it.notes["liquid"]: it for it in reversed(over)}
-    let = []
+    first = {motion.notes["liquid"]: motion for motion in reversed(over)}
+    all_results = []
     for name in LIQUIDS:
         if name in first:
             progress(f"released handles in {name}")
-            let.append(releases(engine, first[name], delays))
-    return let
+            all_results.append(releases(engine, first[name], delays))
+    return all_results
 
 
 HEADINGS: Final = (
@@ -306,20 +306,20 @@ class _Program:
         except OSError as error:
             raise _EngineError(f"{words[0]} cannot be started: {error.strerror}") from error
         self._asked_s, self._late = math.inf, False
-        threading.Thread(target=self._watch, daemon=True).start()
+        threading.Thread(target=self._kill_if_silent, daemon=True).start()
 
     def __call__(self, setup: Mapping[str, float]) -> Step:
-        told = {name: value if math.isfinite(value) else None for name, value in setup.items()}
-        if (said := self._answer(json.dumps(told))) != "ready":
-            raise _EngineError(f"{self._name} answered '{said}' to a new ball, not 'ready'")
+        finite_setup = {name: value if math.isfinite(value) else None for name, value in setup.items()}
+        if (answer := self._answer(json.dumps(finite_setup))) != "ready":
+            raise _EngineError(f"{self._name} answered '{answer}' to a new ball, not 'ready'")
         return self._tick
 
     def _tick(self, t_s: float, x_m: float, v_mps: float) -> float:
-        said = self._answer(f"{t_s!r} {x_m!r} {v_mps!r}")
+        answer = self._answer(f"{t_s!r} {x_m!r} {v_mps!r}")
         try:
-            return float(said)
+            return float(answer)
         except ValueError:
-            raise _EngineError(f"{self._name} answered '{said}' to a tick, not a number") from None
+            raise _EngineError(f"{self._name} answered '{answer}' to a tick, not a number") from None
 
     def _answer(self, line: str) -> str:
         stdin, stdout = self._process.stdin, self._process.stdout
@@ -328,18 +328,18 @@ class _Program:
         self._asked_s = time.perf_counter()
         try:
             stdin.write(line + "\n")
-            said = stdout.readline()
+            answer = stdout.readline()
         except OSError:
-            said = ""
-        if not said:
+            answer = ""
+        if not answer:
             code = self._process.wait()  # a program that only closed its output is ended, too
-            why = f"did not answer within {ANSWER_S:g} s" if self._late else f"ended with code {code}"
-            raise _EngineError(f"{self._name} {why}")
+            reason = f"did not answer within {ANSWER_S:g} s" if self._late else f"ended with code {code}"
+            raise _EngineError(f"{self._name} {reason}")
         self._asked_s = math.inf
-        return said.strip()
+        return answer.strip()
 
-    def _watch(self) -> None:
-        """Terminate a program that does not answer."""
+    def _kill_if_silent(self) -> None:
+        """Kill the program if it does not answer in time; runs in its own thread."""
         while self._process.poll() is None:
             time.sleep(0.2)
             if time.perf_counter() - self._asked_s > ANSWER_S:
@@ -360,7 +360,7 @@ class _Program:
 
 
 @contextmanager
-def _engine_of(words: Sequence[str], function: str) -> Iterator[_Engine]:
+def _open_engine(words: Sequence[str], function: str) -> Iterator[_Engine]:
     """Yield a program, or a function named ``module:function``, as an engine."""
     if not function:
         program = _Program(words)
@@ -384,18 +384,23 @@ def main(words: Sequence[str] | None = None) -> int:
     parser.add_argument("--function", default="", metavar="MODULE:FUNCTION")
     parser.add_argument("--only", default="", metavar="WORD", help="only motions with this word in their names")
     parser.add_argument("program", nargs=argparse.REMAINDER)
-    asked = parser.parse_args(words)
-    if bool(asked.program) == bool(asked.function):
+    arguments = parser.parse_args(words)
+    if bool(arguments.program) == bool(arguments.function):
         parser.error("specify either a program or --function MODULE:FUNCTION")
     try:
-        with _engine_of(asked.program, asked.function) as engine:
-            over = motions(only=asked.only)
-            scores, let = measure(engine, over, DELAYS, lambda line: print(line, "...", file=sys.stderr))  # noqa: T201
+        with _open_engine(arguments.program, arguments.function) as engine:
+            solved_motions = motions(only=arguments.only)
+            scores, handle_releases = measure(
+                engine,
+                solved_motions,
+                DELAYS,
+                lambda line: print(line, "...", file=sys.stderr),  # noqa: T201
+            )
     except _EngineError as error:
         print(f"score: {error}", file=sys.stderr)  # noqa: T201
         return 2
-    name = asked.function or Path(asked.program[0]).name
-    each = [
+    name = arguments.function or Path(arguments.program[0]).name
+    cells = [
         [
             it.motion.name,
             it.motion.notes["reynolds"],
@@ -403,10 +408,10 @@ def main(words: Sequence[str] | None = None) -> int:
             f"{it.rms:.1%}",
             f"{it.greatest:.1%}",
         ]
-        for it in sorted(scores, key=lambda one: float(one.motion.notes["reynolds"]))
+        for it in sorted(scores, key=lambda score_: float(score_.motion.notes["reynolds"]))
     ]
-    print(table(("motion", "Re", "fitted", "RMS error", "greatest error"), each))  # noqa: T201
-    print(table(HEADINGS, [row(name, scores, let)]), end="")  # noqa: T201
+    print(table(("motion", "Re", "fitted", "RMS error", "greatest error"), cells))  # noqa: T201
+    print(table(HEADINGS, [row(name, scores, handle_releases)]), end="")  # noqa: T201
     return 0
 
 

@@ -1,6 +1,6 @@
 """The solved cases: a ball in liquids of a shipped protocol, its speed over time, and the exact force of creeping flow.
 
-Numbers of profiles are in ball diameters D, speeds U and liquid densities: times in D/U, forces in ρU²D².
+Profiles are in units of the ball diameter D, the speed U and the liquid density ρ: times in D/U, forces in ρU²D².
 """
 
 import itertools
@@ -58,33 +58,34 @@ class VelocityProfile:
 
     def speed(self, t: Floats) -> Floats:
         """Return the speed (n,) at times (n,)."""
-        return self._stepped(t) * self._waved(t)
+        return self._step_sum(t) * self._sine_sum(t)
 
     def acceleration(self, t: Floats) -> Floats:
         """Return the acceleration (n,) [U²/D] at times (n,)."""
-        steps: Floats = np.sum([by * _slope((t - at) / RAMP) / RAMP for at, by in self.steps], axis=0)
+        steps: Floats = np.sum([by * _step_slope((t - at) / RAMP) / RAMP for at, by in self.steps], axis=0)
         rates = [a * 2 * math.pi / T * np.cos(2 * math.pi * t / T + phase) for a, T, phase in self.sines]
-        found: Floats = steps * self._waved(t) + self._stepped(t) * np.sum(rates, axis=0)
-        return found
+        values: Floats = steps * self._sine_sum(t) + self._step_sum(t) * np.sum(rates, axis=0)
+        return values
 
-    def moments(self, step: float) -> Floats:
-        """Return the times (n,) at which the flow is solved: ``step`` apart for half a D/U after each change of speed.
+    def solution_times(self, step: float) -> Floats:
+        """Return the times (n,) at which the flow is solved.
 
-        They are twice as far apart in the following D/U, and four times in the rest.
+        They are ``step`` apart for half a D/U after each change of speed, twice as far apart in the following D/U, and
+        four times as far apart in the rest.
         """
         parts = []
         ends = [*(it.at for it in self.steps[1:]), self.end]
         for (begin, _), end in zip(self.steps, ends, strict=True):
-            least = begin
-            for length, times in (*_FINE, (end - begin - sum(it for it, _ in _FINE), 4)):
-                parts.append(np.linspace(least, least + length, round(length / (times * step)), endpoint=False))
-                least += length
+            start = begin
+            for length, factor in (*_FINE, (end - begin - sum(it for it, _ in _FINE), 4)):
+                parts.append(np.linspace(start, start + length, round(length / (factor * step)), endpoint=False))
+                start += length
         return np.concatenate([*parts, [self.end]])
 
     def near_steps(self, t: Floats) -> NDArray[np.bool_]:
         """Return which of the times (n,) lie within two ramps after the start of a step."""
-        found: NDArray[np.bool_] = np.any([(t >= at) & (t <= at + 2 * RAMP) for at, _ in self.steps], axis=0)
-        return found
+        near: NDArray[np.bool_] = np.any([(t >= at) & (t <= at + 2 * RAMP) for at, _ in self.steps], axis=0)
+        return near
 
     def linear_drags(self, t: Floats, reynolds: float) -> Floats:
         """Return the force (n,) against the motion in creeping flow at times (n,), exact for an unbounded liquid.
@@ -99,8 +100,8 @@ class VelocityProfile:
             roots = np.multiply.outer((most - least) / 2, _NODES) + ((most + least) / 2)[:, np.newaxis]
             memory += (most - least) * (self.acceleration(t[:, np.newaxis] - roots**2) @ _WEIGHTS)
         prompt = 3 * math.pi * viscosity * self.speed(t) + math.pi / 12 * self.acceleration(t)
-        found: Floats = prompt + 1.5 * math.sqrt(math.pi * viscosity) * memory
-        return found
+        force: Floats = prompt + 1.5 * math.sqrt(math.pi * viscosity) * memory
+        return force
 
     def _panels(self) -> list[tuple[float, float]]:
         """Return the intervals of acceleration, split so that each is smooth and short enough for the quadrature."""
@@ -110,35 +111,35 @@ class VelocityProfile:
         edges = sorted({*np.arange(0.0, self.end + _PANEL, _PANEL).tolist(), *(it for ramp in ramps for it in ramp)})
         return list(itertools.pairwise(edges))
 
-    def _stepped(self, t: Floats) -> Floats:
-        found: Floats = np.sum([by * _rise((t - at) / RAMP) for at, by in self.steps], axis=0)
-        return found
+    def _step_sum(self, t: Floats) -> Floats:
+        values: Floats = np.sum([by * _rising_step((t - at) / RAMP) for at, by in self.steps], axis=0)
+        return values
 
-    def _waved(self, t: Floats) -> Floats:
+    def _sine_sum(self, t: Floats) -> Floats:
         if not self.sines:
             return np.ones_like(t)
-        found: Floats = np.sum([a * np.sin(2 * math.pi * t / T + phase) for a, T, phase in self.sines], axis=0)
-        return found
+        values: Floats = np.sum([a * np.sin(2 * math.pi * t / T + phase) for a, T, phase in self.sines], axis=0)
+        return values
 
 
-def _rise(x: Floats) -> Floats:
-    held = np.clip(x, 0.0, 1.0)
-    found: Floats = held**3 * (10 - 15 * held + 6 * held**2)
-    return found
+def _rising_step(x: Floats) -> Floats:
+    clipped = np.clip(x, 0.0, 1.0)
+    values: Floats = clipped**3 * (10 - 15 * clipped + 6 * clipped**2)
+    return values
 
 
-def _slope(x: Floats) -> Floats:
-    held = np.clip(x, 0.0, 1.0)
-    found: Floats = 30 * (held * (1 - held)) ** 2
-    return found
+def _step_slope(x: Floats) -> Floats:
+    clipped = np.clip(x, 0.0, 1.0)
+    values: Floats = 30 * (clipped * (1 - clipped)) ** 2
+    return values
 
 
-def _oscillation(keulegan_carpenter: float) -> VelocityProfile:
+def _oscillation_profile(keulegan_carpenter: float) -> VelocityProfile:
     """Return four periods of an oscillation with the Keulegan–Carpenter number U T/D."""
     sine = _Sine(amplitude=1.0, period=keulegan_carpenter, phase=0.0)
-    words = f"oscillation, KC {keulegan_carpenter:g}"
+    title = f"oscillation, KC {keulegan_carpenter:g}"
     return VelocityProfile(
-        f"oscillation-kc{keulegan_carpenter:g}", words, (Step(0.0, 1.0),), (sine,), 4 * keulegan_carpenter
+        f"oscillation-kc{keulegan_carpenter:g}", title, (Step(0.0, 1.0),), (sine,), 4 * keulegan_carpenter
     )
 
 
@@ -159,8 +160,8 @@ _MULTI_SINE: Final = VelocityProfile(
     ),
     26.0,
 )
-_OSCILLATION_KC4: Final = _oscillation(4.0)
-_OSCILLATION_KC5: Final = _oscillation(5.0)
+_OSCILLATION_KC4: Final = _oscillation_profile(4.0)
+_OSCILLATION_KC5: Final = _oscillation_profile(5.0)
 PROFILES: Final = {
     it.name: it for it in (STOPPING, _REVERSAL, _RETURN, _MULTI_SINE, _OSCILLATION_KC4, _OSCILLATION_KC5)
 }
@@ -183,7 +184,7 @@ TRAINING: Final = (
 )
 """Motions by profile, liquid and Reynolds number, that the constants of unsteady drag are fitted to.
 
-They are added to those of `cases`, which alone do not determine the constants: none of them goes back through its own
+They are added to those of `cases`, which do not determine the constants because none of them moves back through its own
 wake.
 """
 HELD_OUT: Final = (
@@ -197,9 +198,9 @@ HELD_OUT: Final = (
     (_RETURN, "glycerin", 30.0),
     (STOPPING, "gear_oil", 60.0),
 )
-"""Motions as those of `TRAINING`, and a return after a pause, that no fit uses: the constants are tested by them.
+"""Motions like those of `TRAINING`, and a return after a pause, that no fit uses, to test the constants.
 
-The reversal at Re 60 and the return also served to choose the form of the law.
+The reversal at Re 60 and the return were also used to choose the form of the law.
 """
 
 
@@ -259,11 +260,11 @@ def cases() -> tuple[Case, ...]:
 
 def cases_of(motions: Sequence[tuple[VelocityProfile, str, float]]) -> tuple[Case, ...]:
     """Return the cases of motions by profile, liquid and Reynolds number."""
-    found = []
+    all_cases = []
     for profile, liquid_id, reynolds in motions:
         case = _case(liquid_id, 1e-3)
-        found.append(_case(liquid_id, 1e-3 * reynolds / case.reynolds, profile))
-    return tuple(found)
+        all_cases.append(_case(liquid_id, 1e-3 * reynolds / case.reynolds, profile))
+    return tuple(all_cases)
 
 
 def _case(liquid_id: str, speed_mps: float, profile: VelocityProfile = STOPPING) -> Case:

@@ -1,7 +1,7 @@
-"""Solves, checks and stores every case: about 20 minutes of one core's time, with the extra ``cfd``.
+"""Solve, check and store every case, which takes about 20 minutes on one core and requires the extra ``cfd``.
 
-Every motion is solved three times: as it is; on a coarser grid with steps twice as long; and without convection, where
-the exact force is known. A solution that misses one of the two by more than is permitted is not stored.
+Every motion is solved three times: normally, on a coarser grid with steps twice as long, and without convection, where
+the exact force is known. A solution is not stored if one of the two differences exceeds `PERMITTED`.
 """
 
 import time
@@ -15,7 +15,7 @@ from typing import Final
 import numpy as np
 
 from study_app.errors import StudyError
-from study_app.evidence.cfd.flow import ORDER, Flow, Grid, library
+from study_app.evidence.cfd.flow import ORDER, Flow, Grid, import_ngsolve
 from study_app.evidence.cfd.solved_cases import HELD_OUT, TRAINING, Case, cases, cases_of
 from study_app.evidence.cfd.stored_flows import (
     HELD_OUT_FOLDER,
@@ -33,13 +33,13 @@ from study_app.store.files import make_folder, write_file
 COMMAND: Final = "liquid-study cfd --solve"
 GRID: Final = Grid(ahead=40, behind=80, aside=40, ball=0.1, near=0.4, far=8)
 COARSE: Final = Grid(ahead=40, behind=80, aside=40, ball=0.14, near=0.6, far=10)
-_BOTH_WAYS: Final = Grid(ahead=40, behind=40, aside=40, ball=0.1, near=0.4, far=8, symmetric=True)
-_BOTH_WAYS_COARSE: Final = Grid(ahead=40, behind=40, aside=40, ball=0.14, near=0.6, far=10, symmetric=True)
+_SYMMETRIC: Final = Grid(ahead=40, behind=40, aside=40, ball=0.1, near=0.4, far=8, symmetric=True)
+_SYMMETRIC_COARSE: Final = Grid(ahead=40, behind=40, aside=40, ball=0.14, near=0.6, far=10, symmetric=True)
 _WIDE: Final = Grid(ahead=80, behind=160, aside=80, ball=0.07, near=0.25, far=16)
 _WIDE_COARSE: Final = Grid(ahead=80, behind=160, aside=80, ball=0.1, near=0.4, far=16)
 _STEP: Final = 0.005
 FAST_REYNOLDS: Final = 50.0
-"""Above this Reynolds number, steps are halved: otherwise the solution on the coarse grid would diverge."""
+"""Reynolds number above which steps are halved, because the solution on the coarse grid would diverge."""
 _REYNOLDS: Final = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0)
 
 PERMITTED: Final = 0.02
@@ -54,22 +54,22 @@ def solve(to: Path, executor: Executor, progress: Callable[[str], None]) -> tupl
     StudyError
         NGSolve is not installed, a solution is not accurate enough, or a file cannot be written.
     """
-    library()
-    solved = {
+    import_ngsolve()
+    tables = {
         folder / f"{case.name}.csv": executor.submit(_solve_case, case, *grids)
-        for some, folder, grids in (
+        for group_cases, folder, grids in (
             (cases(), to, (GRID, COARSE)),
-            (cases_of(TRAINING), to / TRAINING_FOLDER, (_BOTH_WAYS, _BOTH_WAYS_COARSE)),
-            (cases_of(HELD_OUT), to / HELD_OUT_FOLDER, (_BOTH_WAYS, _BOTH_WAYS_COARSE)),
+            (cases_of(TRAINING), to / TRAINING_FOLDER, (_SYMMETRIC, _SYMMETRIC_COARSE)),
+            (cases_of(HELD_OUT), to / HELD_OUT_FOLDER, (_SYMMETRIC, _SYMMETRIC_COARSE)),
         )
-        for case in some
+        for case in group_cases
     }
-    solved[to / STEADY_FILE] = executor.submit(steady_table)
-    for number, (path, table) in enumerate(solved.items(), start=1):
-        progress(f"{path.name}, {number} of {len(solved)} ...")
+    tables[to / STEADY_FILE] = executor.submit(steady_table)
+    for number, (path, table) in enumerate(tables.items(), start=1):
+        progress(f"{path.name}, {number} of {len(tables)} ...")
         make_folder(path.parent, waits=False)
         write_file(path, table.result())
-    return tuple(solved)
+    return tuple(tables)
 
 
 def _solve_case(case: Case, grid: Grid, coarse: Grid) -> bytes:
@@ -86,19 +86,19 @@ def flow_of(grid: Grid) -> Flow:
 def motion_table(case: Case, flow: Flow, coarse: Flow, step: float = _STEP) -> bytes:
     """Return the file content of one case, with a row every `_STEP` or ``step``, whichever is longer."""
     profile = case.profile
-    times, rough = profile.moments(step), profile.moments(2 * step)
+    times, coarse_times = profile.solution_times(step), profile.solution_times(2 * step)
 
     def speed(t: float) -> float:
         return float(profile.speed(np.array([t]))[0])
 
     began_s = time.process_time()
     drag = flow.unsteady(case.reynolds, times, speed)
-    took_s = time.process_time() - began_s
+    computing_s = time.process_time() - began_s
     linear = flow.unsteady(case.reynolds, times, speed, convection=False)
     exact = profile.linear_drags(times, case.reynolds)
-    by_grid = np.interp(times, rough, coarse.unsteady(case.reynolds, rough, speed)) - drag
+    grid_error = np.interp(times, coarse_times, coarse.unsteady(case.reynolds, coarse_times, speed)) - drag
     checks = {
-        "from_coarse": _check(case, "the coarse solution", by_grid, drag, times),
+        "from_coarse": _check(case, "the coarse solution", grid_error, drag, times),
         "from_exact": _check(case, "the exact force without convection", linear - exact, exact, times),
     }
     steps = f"{step:g}, {2 * step:g}, {4 * step:g} D/U, increasing with the time after each start and stop"
@@ -112,19 +112,19 @@ def motion_table(case: Case, flow: Flow, coarse: Flow, step: float = _STEP) -> b
         "from_coarse": f"{checks['from_coarse']} ({coarse.unknowns} unknowns, steps twice as long)",
         "from_exact": f"{checks['from_exact']} (convection off; Stokes, added mass and Basset)",
         "computing": "single-threaded processor time per second of motion",
-        "computing_s_per_s": f"{took_s / (profile.end * case.unit_s):.3g}",
+        "computing_s_per_s": f"{computing_s / (profile.end * case.unit_s):.3g}",
     }
     columns = (times * case.unit_s, case.speed_mps * profile.speed(times), 0.0 - drag * case.unit_n)
     every = max(1, round(_STEP / step))
-    return file_bytes(notes, dict(zip(MOTION, (it[::every] for it in columns), strict=True)))
+    return file_bytes(notes, dict(zip(MOTION, (column[::every] for column in columns), strict=True)))
 
 
 def steady_table() -> bytes:
     """Return the file content of steady drag."""
-    solved = [Flow(it) for it in (_WIDE, _WIDE_COARSE, GRID)]
+    solved = [Flow(grid) for grid in (_WIDE, _WIDE_COARSE, GRID)]
     columns = [flow.steady(_REYNOLDS) for flow in solved]
     method = "; ".join(
-        f"{flow.unknowns} unknowns, {it}" for flow, it in zip(solved, (_WIDE, _WIDE_COARSE, GRID), strict=True)
+        f"{flow.unknowns} unknowns, {grid}" for flow, grid in zip(solved, (_WIDE, _WIDE_COARSE, GRID), strict=True)
     )
     notes = {
         "title": "steady drag of a sphere",
@@ -134,14 +134,14 @@ def steady_table() -> bytes:
     return file_bytes(notes, dict(zip(STEADY, (_REYNOLDS, *columns), strict=True)))
 
 
-def _check(case: Case, what: str, difference: Floats, force: Floats, times: Floats) -> str:
+def _check(case: Case, other: str, difference: Floats, force: Floats, times: Floats) -> str:
     """Return the greatest differences relative to the greatest force, during acceleration and otherwise."""
     size = np.abs(difference) / np.abs(force).max()
     ramps = case.profile.near_steps(times)
     worst = float(size.max())
     if not worst <= PERMITTED:
         raise StudyError(
-            f"{case.liquid_id}, {case.title}, differs from {what} by {worst:.1%} of the largest force, which is more "
+            f"{case.liquid_id}, {case.title}, differs from {other} by {worst:.1%} of the largest force, which is more "
             f"than the permitted {PERMITTED:.0%}: nothing was stored"
         )
     return (

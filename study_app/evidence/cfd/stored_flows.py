@@ -1,4 +1,4 @@
-"""Solved flows as CSV files, with comment lines ``# name: value`` on what made them; read without the solver."""
+"""Solved flows as CSV files with ``# name: value`` comment lines on their provenance; reading needs no solver."""
 
 import csv
 import math
@@ -22,18 +22,18 @@ from study_app.lab.identify.measured_force import vectors_x
 from study_app.store.files import csv_text_of
 
 MOTION: Final = ("t_s", "velocity_mps", "force_n")
-"""Along one axis; the force on the ball, so against the motion at first."""
+"""Columns of a motion along one axis; the force is that on the ball, at first against the motion."""
 STEADY: Final = ("reynolds", "drag_coefficient", "drag_coefficient_coarse", "drag_coefficient_narrow")
-"""C_d, the same on a coarser grid, and in a box of half the size."""
+"""Columns of steady drag: C_d, C_d on a coarser grid, and C_d in a box of half the size."""
 STEADY_FILE: Final = "steady.csv"
 TRAINING_FOLDER: Final = "training"
 HELD_OUT_FOLDER: Final = "held_out"
 LEFT_OUT: Final = ("motion", *Constants._fields)
 """The constants of unsteady drag that are fitted to all motions but one, for each motion."""
 LEFT_OUT_FILE: Final = "left_out.csv"
-_OF_THE_MODEL: Final = ("density_kg_m3", "viscosity_pa_s", "diameter_m", "computing_s_per_s")
-"""The notes of a table of `MOTION` by which models are compared with it."""
-_OF_THE_CASE: Final = ("density_kg_m3", "viscosity_pa_s", "diameter_m", "speed_mps")
+_MODEL_NOTES: Final = ("density_kg_m3", "viscosity_pa_s", "diameter_m", "computing_s_per_s")
+"""The numeric notes of a `MOTION` table that a comparison with models needs."""
+_CASE_NOTES: Final = ("density_kg_m3", "viscosity_pa_s", "diameter_m", "speed_mps")
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +47,7 @@ class Table:
     def case(self) -> SolvedCase:
         """The solved case that the notes of a `MOTION` table describe."""
         profile = PROFILES[self.notes.get("profile", STOPPING.name)]
-        density_kg_m3, viscosity_pa_s, diameter_m, speed_mps = (float(self.notes[name]) for name in _OF_THE_CASE)
+        density_kg_m3, viscosity_pa_s, diameter_m, speed_mps = (float(self.notes[name]) for name in _CASE_NOTES)
         return SolvedCase(
             liquid_id=self.notes["liquid"],
             density_kg_m3=density_kg_m3,
@@ -71,32 +71,32 @@ def notes_of(case: SolvedCase) -> dict[str, str]:
     return {
         "liquid": case.liquid_id,
         "profile": case.profile.name,
-        **{name: f"{value:.6g}" for name, value in zip(_OF_THE_CASE, values, strict=True)},
+        **{name: f"{value:.6g}" for name, value in zip(_CASE_NOTES, values, strict=True)},
     }
 
 
-def load_tables(folder: Traversable | None = None, of: str = "") -> tuple[Table, ...]:
-    """Return the `MOTION` tables of the package or of a folder, or those in its subfolder ``of``, by liquid and speed.
+def load_tables(folder: Traversable | None = None, subfolder: str = "") -> tuple[Table, ...]:
+    """Return the `MOTION` tables of the package or of a folder, or of its ``subfolder``, sorted by liquid and speed.
 
     Raises
     ------
     StudyError
         There is no such table, or one cannot be parsed.
     """
-    place = folder or package()
-    place = place / of if of else place
-    names = place.iterdir() if place.is_dir() else ()
-    files = sorted((it for it in names if it.name.endswith("mmps.csv")), key=lambda it: it.name)
+    folder_ = folder or package()
+    folder_ = folder_ / subfolder if subfolder else folder_
+    names = folder_.iterdir() if folder_.is_dir() else ()
+    files = sorted((file for file in names if file.name.endswith("mmps.csv")), key=lambda file: file.name)
     if not files:
         raise StudyError(
-            f"{place} does not contain the fluid solver's tables: create them with liquid-study cfd --solve"
+            f"{folder_} does not contain the fluid solver's tables: create them with liquid-study cfd --solve"
         )
-    return tuple(read_table(it, MOTION, _OF_THE_MODEL) for it in files)
+    return tuple(read_table(file, MOTION, _MODEL_NOTES) for file in files)
 
 
-training: Final = partial(load_tables, of=TRAINING_FOLDER)
+training: Final = partial(load_tables, subfolder=TRAINING_FOLDER)
 """Motions that constants are fitted to in addition to those of `load_tables`."""
-held_out: Final = partial(load_tables, of=HELD_OUT_FOLDER)
+held_out: Final = partial(load_tables, subfolder=HELD_OUT_FOLDER)
 """Motions that no fit uses."""
 
 
@@ -126,8 +126,8 @@ def package() -> Traversable:
     return resources.files("study_app.evidence.cfd")
 
 
-def read_table(file: Traversable, names: Sequence[str], noted: Sequence[str] = ()) -> Table:
-    """Return a table with these columns, whose notes ``noted`` are numbers.
+def read_table(file: Traversable, names: Sequence[str], numeric_notes: Sequence[str] = ()) -> Table:
+    """Return a table with these columns, whose notes ``numeric_notes`` are numbers.
 
     Raises
     ------
@@ -136,9 +136,9 @@ def read_table(file: Traversable, names: Sequence[str], noted: Sequence[str] = (
     """
     try:
         lines = file.read_text(encoding="utf-8").splitlines()
-        said = (line[1:].split(":", 1) for line in lines if line.startswith("#"))
-        notes = {name.strip(): value.strip() for name, value in said}
-        for name in noted:
+        pairs = (line[1:].split(":", 1) for line in lines if line.startswith("#"))
+        notes = {name.strip(): value.strip() for name, value in pairs}
+        for name in numeric_notes:
             float(notes.get(name, f"the note {name} is missing"))
         header, *rows = csv.reader(line for line in lines if not line.startswith("#"))
         if tuple(header) != tuple(names):
@@ -155,28 +155,28 @@ def read_table(file: Traversable, names: Sequence[str], noted: Sequence[str] = (
 def solver_truths(scene: Scene, folder: Traversable | None = None) -> tuple[Truth, ...]:
     """Return the fluid solver's results for the scene's liquid and body at the scene's rate, if any."""
     liquid = scene.liquids[0]
-    ours = (liquid.density_kg_m3, liquid.viscosity_pa_s or math.nan, scene.body.diameter_m)
-    more = (*training(), *held_out()) if folder is None else ()
-    tables = (*load_tables(folder), *more)
-    without = _load_left_out() if folder is None else {}
+    scene_properties = (liquid.density_kg_m3, liquid.viscosity_pa_s or math.nan, scene.body.diameter_m)
+    further_tables = (*training(), *held_out()) if folder is None else ()
+    tables = (*load_tables(folder), *further_tables)
+    left_out = _load_left_out() if folder is None else {}
     truths = []
     for table in tables:
         notes = table.notes
-        *of, computing_s = (float(notes[name]) for name in _OF_THE_MODEL)
-        if not np.allclose(of, ours, rtol=0.01, atol=0):
+        *table_properties, computing_s = (float(notes[name]) for name in _MODEL_NOTES)
+        if not np.allclose(table_properties, scene_properties, rtol=0.01, atol=0):
             continue
         t_s, velocity_mps, force_n = table.columns.values()
-        even_s = np.arange(t_s[0], t_s[-1], 1 / scene.rate_hz)
-        even_mps = np.interp(even_s, t_s, velocity_mps)
-        way_m = np.concatenate([[0.0], np.cumsum((even_mps[1:] + even_mps[:-1]) / 2 * np.diff(even_s))])
+        times_s = np.arange(t_s[0], t_s[-1], 1 / scene.rate_hz)
+        speeds_mps = np.interp(times_s, t_s, velocity_mps)
+        distance_m = np.concatenate([[0.0], np.cumsum((speeds_mps[1:] + speeds_mps[:-1]) / 2 * np.diff(times_s))])
         case = Case(
-            along_x(even_s - even_s[0], way_m, even_mps),
-            vectors_x(np.interp(even_s, t_s, force_n)),
-            np.ones(len(even_s), bool),
+            along_x(times_s - times_s[0], distance_m, speeds_mps),
+            vectors_x(np.interp(times_s, t_s, force_n)),
+            np.ones(len(times_s), bool),
         )
         source = f"fluid solver: {notes.get('command', 'unknown command')}"
         title = notes.get("title", "a solved flow")
-        constants = without.get(table.case.name) if without else None
+        constants = left_out.get(table.case.name) if left_out else None
         truths.append(
             Truth(
                 name=title,

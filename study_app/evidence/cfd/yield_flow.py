@@ -1,12 +1,12 @@
-"""Steady creeping flow of Herschel–Bulkley liquids around a ball: the fluid solver's drag, and the law's next to it.
+"""Steady creeping flow of Herschel–Bulkley liquids around a ball: the fluid solver's drag compared with the law's.
 
 In units of the ball's diameter D, its speed U and the stress K (U/D)^n, the viscosity is
 
     η = g^(n−1) + Bi/g,   g² = γ̇² + ε²,   γ̇² = 2 e:e,   Bi = τ_y/(K (U/D)^n),
 
-with the rate of strain e and a small ε, by which the liquid that does not yield is very viscous instead of rigid. Each
-flow is found by Newton's method from the one with a larger ε. The table has the drag over 3πD² K (U/D)^n, that of a
-Newtonian liquid with the viscosity K (U/D)^(n−1). The liquid is unbounded: it moves only near the ball.
+with the rate of strain e and a small ε, which makes unyielded liquid very viscous instead of rigid. Each flow is found
+by Newton's method, starting from the flow with a larger ε. The table contains the drag divided by 3πD² K (U/D)^n, the
+drag of a Newtonian liquid with the viscosity K (U/D)^(n−1). The liquid is unbounded: it moves only near the ball.
 """
 
 import math
@@ -19,7 +19,7 @@ from typing import Any, Final
 import numpy as np
 
 from study_app.errors import StudyError
-from study_app.evidence.cfd.flow import ORDER, Flow, Grid, library
+from study_app.evidence.cfd.flow import ORDER, Flow, Grid, import_ngsolve
 from study_app.evidence.cfd.solver import provenance_notes
 from study_app.evidence.cfd.stored_flows import file_bytes, package, read_table
 from study_app.evidence.table import Evidence, Table
@@ -31,18 +31,18 @@ COMMAND: Final = "liquid-study cfd --materials --solve"
 FILE: Final = "herschel_bulkley.csv"
 _COMPARISON_FILE: Final = "materials.md"
 COLUMNS: Final = ("flow_index", "bingham", "drag", "drag_coarse", "drag_smooth")
-"""The drag, the same on a coarser grid, and with 3.3 times the ε."""
+"""``drag_coarse`` is the drag on a coarser grid, ``drag_smooth`` that with an ε 3.3 times as large."""
 INDICES: Final = (0.3, 0.5, 0.7, 1.0)
 BINGHAM: Final = (0.1, 1.0, 10.0, 30.0)
 GRID: Final = Grid(ahead=15, behind=25, aside=15, ball=0.08, near=0.3, far=4)
 COARSE: Final = Grid(ahead=15, behind=25, aside=15, ball=0.15, near=0.6, far=4)
 SMOOTHING: Final = (0.03, 0.005, 0.001, 0.0003)
-"""ε/√(1 + Bi), one after the other: the more plastic, the faster is the shear next to the ball."""
+"""Successive values of ε/√(1 + Bi); the scaling allows for the faster shear next to the ball at larger Bi."""
 PERMITTED: Final = 0.04
 """Greatest error of the law."""
-_ROUNDS: Final = 80
-_SETTLED: Final = 1e-7
-_SHORTEST: Final = 0.05
+_MAX_ITERATIONS: Final = 80
+_TOLERANCE: Final = 1e-7
+_MIN_DAMPING: Final = 0.05
 
 
 class YieldFlow(Flow):
@@ -65,36 +65,36 @@ class YieldFlow(Flow):
             forces = []
             for small in SMOOTHING:
                 smoothing.Set(small * math.sqrt(1 + value))
-                if not self._settles(form, flow):
+                if not self._solve(form, flow):
                     raise StudyError(f"no steady flow was found at n = {flow_index:g}, Bi = {value:g}")
                 form.Apply(flow.vec, residual)
-                forces.append(-2 * math.pi * ng.InnerProduct(residual, self._at_ball) / (3 * math.pi))
+                forces.append(-2 * math.pi * ng.InnerProduct(residual, self._ball_indicator) / (3 * math.pi))
             yield forces[-1], forces[-2]
 
-    def _settles(self, form: Any, flow: Any) -> bool:
+    def _solve(self, form: Any, flow: Any) -> bool:
         """Solve by a damped Newton method; return whether it converged."""
         ng = self._ng
-        free, residual, step, before, left = ng.Projector(self._free, True), *(self._zeros() for _ in range(4))
+        free, residual, step, before, free_residual = ng.Projector(self._free, True), *(self._zeros() for _ in range(4))
 
         def misfit() -> float:
             form.Apply(flow.vec, residual)
-            left.data = free * residual
-            return float(left.Norm())
+            free_residual.data = free * residual
+            return float(free_residual.Norm())
 
-        size = misfit()
-        for _ in range(_ROUNDS):
+        residual_size = misfit()
+        for _ in range(_MAX_ITERATIONS):
             form.AssembleLinearization(flow.vec)
             step.data = form.mat.Inverse(self._free, inverse="umfpack") * residual
             before.data = flow.vec
-            share = 1.0
+            damping = 1.0
             while True:
-                flow.vec.data = before - share * step
-                now = misfit()
-                if now < (1 - 0.1 * share) * size or share < _SHORTEST:
+                flow.vec.data = before - damping * step
+                new_residual = misfit()
+                if new_residual < (1 - 0.1 * damping) * residual_size or damping < _MIN_DAMPING:
                     break
-                share /= 2
-            size = now
-            if step.Norm() < _SETTLED * flow.vec.Norm():
+                damping /= 2
+            residual_size = new_residual
+            if step.Norm() < _TOLERANCE * flow.vec.Norm():
                 return True
         return False
 
@@ -107,12 +107,12 @@ def solve_materials(to: Path, executor: Executor, progress: Callable[[str], None
     StudyError
         NGSolve is not installed, no steady flow was found, or the file cannot be written.
     """
-    library()
+    import_ngsolve()
     make_folder(to, waits=False)
     rows: list[tuple[float, ...]] = []
-    for index, found in zip(INDICES, executor.map(_solve_flow, INDICES), strict=True):
-        rows += found
-        progress(f"n {index:g}: drag {', '.join(f'{row[2]:.4f}' for row in found)}")
+    for index, solved in zip(INDICES, executor.map(_solve_flow, INDICES), strict=True):
+        rows += solved
+        progress(f"n {index:g}: drag {', '.join(f'{row[2]:.4f}' for row in solved)}")
     notes = {
         "title": "drag on a sphere in creeping flow of Herschel–Bulkley liquids, divided by 3πD² K (U/D)^n",
         **provenance_notes(COMMAND),
@@ -125,8 +125,8 @@ def solve_materials(to: Path, executor: Executor, progress: Callable[[str], None
 def _solve_flow(flow_index: float) -> list[tuple[float, ...]]:
     fine, coarse = YieldFlow(GRID).drags(flow_index, BINGHAM), YieldFlow(COARSE).drags(flow_index, BINGHAM)
     return [
-        (flow_index, bingham, drag, rough, smooth)
-        for bingham, (drag, smooth), (rough, _) in zip(BINGHAM, fine, coarse, strict=True)
+        (flow_index, bingham, drag, coarse_drag, smooth)
+        for bingham, (drag, smooth), (coarse_drag, _) in zip(BINGHAM, fine, coarse, strict=True)
     ]
 
 
@@ -142,25 +142,25 @@ def errors(columns: dict[str, Floats]) -> Floats:
         for index, bingham in zip(columns["flow_index"].tolist(), columns["bingham"].tolist(), strict=True)
     ]
     drags = np.array([sum(creeping_n(liquid, 1.0, 1.0)) / (3 * math.pi) for liquid in liquids])
-    found: Floats = drags / columns["drag"] - 1
-    return found
+    relative_errors: Floats = drags / columns["drag"] - 1
+    return relative_errors
 
 
 def yield_flow_evidence(columns: dict[str, Floats]) -> Evidence:
     """Return the comparison as a table."""
-    wrong = errors(columns)
+    error = errors(columns)
     grid, smooth = (float(np.abs(columns[name] / columns["drag"] - 1).max()) for name in COLUMNS[3:])
     rows = [[f"{bingham:g}"] for bingham in BINGHAM]
     for row, bingham in zip(rows, BINGHAM, strict=True):
-        here = columns["bingham"] == bingham
-        pairs = zip(columns["drag"][here], wrong[here], strict=True)
-        row += [f"{drag:.3f} ({100 * error:+.1f} %)" for drag, error in pairs]
+        matches = columns["bingham"] == bingham
+        pairs = zip(columns["drag"][matches], error[matches], strict=True)
+        row += [f"{drag:.3f} ({100 * relative_error:+.1f} %)" for drag, relative_error in pairs]
     table = Table(("Bi", *(f"n {index:g}" for index in INDICES)), rows)
     text = (
         "Drag on a sphere in creeping flow of Herschel–Bulkley liquids, computed by the solver and divided by "
         "3πD² K (U/D)^n; the error of the law is in brackets.\n\n"
         f"{table.markdown()}\n\n"
-        f"The error of the law is at most {np.abs(wrong).max():.1%} (permitted: {PERMITTED:.0%}). Edges twice as long "
+        f"The error of the law is at most {np.abs(error).max():.1%} (permitted: {PERMITTED:.0%}). Edges twice as long "
         f"change the drag by at most {grid:.2%}; an ε 3.3 times as large changes it by at most {smooth:.2%}.\n"
     )
     return Evidence(text, {_COMPARISON_FILE: text})

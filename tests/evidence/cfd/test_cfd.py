@@ -234,7 +234,7 @@ def coarse():
 
 
 def test_a_coarse_flow_without_convection_is_the_exact_one(coarse):
-    times = STOPPING.moments(0.02)
+    times = STOPPING.solution_times(0.02)
     drag = coarse.unsteady(20.0, times, lambda t: float(STOPPING.speed(np.array(t))), convection=False)
     exact = STOPPING.linear_drags(times, 20.0)
     assert np.abs(drag - exact).max() < 0.05 * np.abs(exact).max()
