@@ -1,4 +1,4 @@
-"""Whether hard closed loops of liquid, servo, device and hand stay stable, and their maximum stable damping.
+"""Stability of hard closed loops of liquid, servo, device and hand, and their maximum stable damping.
 
 Reading order: stability_cases; bench, case_groups; damping_limits, force_delay, verdict, withheld_force;
 driver_loop, velocity; delivered_force, stability_report.

@@ -1,4 +1,4 @@
-"""What a case runs on: model, safety layer, handle and hand; and what is measured on the trace of a closed loop."""
+"""The closed loop in which a case runs (model, safety layer, handle and hand), and measures of its trace."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ from study_app.haptics.runtime.closed_loop import ARMS, ClosedLoop, empty_trace
 from study_app.haptics.runtime.offline import simulate
 
 MOVING_S: Final = 1.2
-_LASTS_S: Final = 1.8
-_FREE_S: Final = 1.2
-"""How long a handle that was let go is watched."""
+_DURATION_S: Final = 1.8
+_RELEASED_S: Final = 1.2
+"""Time for which a released handle is observed [s]."""
 _TREMOR_M: Final = 20e-6
 FORCE_LIMIT_N: Final = 8.0
 DIRECTION: Final = np.array([0.8, 0.0, 0.6])
-"""Of straight motions."""
+"""Direction of straight motions."""
 
 
 class Bench(ClosedLoop):
@@ -98,22 +98,22 @@ class Bench(ClosedLoop):
 
 def lasts_s(case: Case) -> float:
     """Return the duration of a case [s]."""
-    return max(_LASTS_S, case.release_s + _FREE_S) if case.hand == LETS_GO else _LASTS_S
+    return max(_DURATION_S, case.release_s + _RELEASED_S) if case.hand == LETS_GO else _DURATION_S
 
 
 def new_trace(case: Case, seconds: float | None = None) -> Any:
-    """Return an empty trace with room for a case, or for so many seconds of it."""
+    """Return an empty trace with room for a case, or for the given number of seconds."""
     return empty_trace(math.ceil(((seconds or lasts_s(case)) + 0.1) * case.rate_hz))
 
 
 def _dynamics_of(case: Case) -> Dynamics:
-    """Return the dynamics that the device reports: least mass and delay as believed, and velocity lag."""
-    least_kg = case.believed_kg or (min(case.mass_kg, case.other_kg) if case.other_kg else case.mass_kg)
+    """Return the dynamics that the device reports: the believed minimum mass and delay, and the velocity lag."""
+    reported_kg = case.believed_kg or (min(case.mass_kg, case.other_kg) if case.other_kg else case.mass_kg)
     lag_s = case.velocity_lag / case.rate_hz if case.estimator == DEVICE else None
     return Dynamics(
         delay_s=case.believed_delay / case.rate_hz,
         count_m=case.quantum_um * 1e-6,
-        mass_kg=least_kg,
+        mass_kg=reported_kg,
         velocity_lag_s=lag_s,
     )
 
@@ -163,7 +163,7 @@ def lowest_balance(trace: Any) -> tuple[float, float, float]:
 
 @kernel
 def given_out_j(trace: Any) -> float:
-    """Return the most energy that the acting force gave to the handle in excess of what it had taken before [J]."""
+    """Return the maximum net energy that the acting force has given to the handle [J]."""
     energy_j = most_j = 0.0
     for k in range(1, trace.shape[0]):
         for axis in range(3):
@@ -204,10 +204,10 @@ def fast_part(vectors: Any, rate_hz: float, corner_hz: float, first: int, last: 
     """
     squares = np.zeros(max(last - first, 1))
     _fast_squares(vectors, rate_hz, corner_hz, first, squares)
-    aside = min(int(aside_s * rate_hz), len(squares) - 1)
+    excluded = min(int(aside_s * rate_hz), len(squares) - 1)
     sums = np.concatenate([[0.0], np.cumsum(squares)])
-    strongest = (sums[aside:] - sums[: len(sums) - aside]).max()
-    return math.sqrt(max(sums[-1] - strongest, 0.0) / (len(squares) - aside))
+    strongest = (sums[excluded:] - sums[: len(sums) - excluded]).max()
+    return math.sqrt(max(sums[-1] - strongest, 0.0) / (len(squares) - excluded))
 
 
 @kernel

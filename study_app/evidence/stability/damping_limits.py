@@ -23,9 +23,9 @@ FREE_HANDLE_KG: Final = 0.1
 _FRICTION_NSPM: Final = 0.5
 
 _UNALTERED_NSPM: Final = 53.0
-"""Damping that is not limited at 1 kHz and up to one tick of delay, with "ewma" and "kalman". Light oil has a secant of
-55 N·s/m where it reaches 8 N at a scale of 10: the limit removes 4 % of this force only. With "ewma", it is 75 % of the
-greatest stable damping of a free handle of 0.1 kg."""
+"""Limit at 1 kHz and up to one tick of delay with "ewma" and "kalman", which hardly alters the shipped liquids. Light
+oil has a secant of 55 N·s/m where it reaches 8 N at a scale of 10, so the limit removes only 4 % of this force. With
+"ewma", the limit is 75 % of the greatest stable damping of a free handle of 0.1 kg."""
 _UNALTERED_SHARE: Final = 0.75
 """Greatest share of the stable damping under these conditions with another filter."""
 _UNALTERED_INERTIA_SHARE: Final = 0.85
@@ -35,11 +35,12 @@ _INERTIA_SHARE: Final = 0.3
 _SHARE: Final = 0.5
 """Share of the stable damping under other conditions: the slope of a quadratic law is twice its secant."""
 _FAST_SHARE: Final = 0.4
-"""The same above 1 kHz, where an encoder count is a greater speed and the slew limit permits a steeper force."""
+"""Share of the stable damping above 1 kHz, where an encoder count corresponds to a greater speed and the slew limit
+permits a steeper force."""
 _FAST_NSPM: Final = 40.0
 """Greatest limit above 1 kHz [N·s/m]."""
 _FAST_KALMAN_NSPM: Final = 22.0
-"""The same with "kalman", which lets more of a release pass while a wake breaks."""
+"""Greatest limit above 1 kHz with "kalman" [N·s/m], which passes more of a release while a wake breaks."""
 _KALMAN_SHARE: Final = 0.64
 """Share of the limits above with "kalman", up to 1 kHz, except where forces are not limited. With 1 and a delay one
 tick longer than assumed, a held handle was noisy in tar at 250 Hz, and a released one oscillated at 500 Hz; with 0.8, a
@@ -49,12 +50,12 @@ _COUNT_N: Final = 0.25
 _COUNT_M: Final = 38e-6
 NOMINAL_S: Final = 1e-3
 
-_SWING_MPS: Final = 0.04
-"""A handle that oscillates more slowly than this counts as at rest if the encoder has counts: they alone move it."""
+_REST_WITH_COUNTS_MPS: Final = 0.04
+"""Speed below which a handle counts as at rest if the encoder has counts, which alone cause such a motion [m/s]."""
 
 _THROWN_MPS = 0.02
 _DECAYED = 0.05
-_LASTS_S = 3.0
+_DURATION_S = 3.0
 _STEP = 1.01
 
 
@@ -76,7 +77,7 @@ def boundary_nspm(
     low, high = 0.1, 1e5
     while high / low > _STEP:
         middle = math.sqrt(low * high)
-        if _comes_to_rest(velocity, period_s, (delay, believed), middle, mass_kg, friction_nspm):
+        if _handle_comes_to_rest(velocity, period_s, (delay, believed), middle, mass_kg, friction_nspm):
             low = middle
         else:
             high = middle
@@ -105,8 +106,8 @@ def measure_limits(
 ) -> Iterator[Entry]:
     """Yield the table of limits, line by line, for all or some estimators; in parallel with an executor."""
     loops = itertools.product(velocities or measured_estimators(), PERIODS_S, DELAYS[1:])
-    in_turn = map if executor is None else executor.map
-    yield from in_turn(_entry, *zip(*loops, strict=True))
+    map_loops = map if executor is None else executor.map
+    yield from map_loops(_entry, *zip(*loops, strict=True))
 
 
 def _entry(velocity: Velocity, period_s: float, delay: int) -> Entry:
@@ -122,21 +123,23 @@ def _limit_nspm(velocity: Velocity, period_s: float, delay: int, *, unaltered: b
 
     The raw difference passes one encoder count on in full, EWMA according to `_weight`.
     """
-    fast = period_s < NOMINAL_S
-    share = _UNALTERED_SHARE if unaltered else _FAST_SHARE if fast else _SHARE
+    is_fast = period_s < NOMINAL_S
+    share = _UNALTERED_SHARE if unaltered else _FAST_SHARE if is_fast else _SHARE
     limits = [share * boundary_nspm(velocity, period_s, delay)]
     if unaltered:
         limits.append(_UNALTERED_NSPM)
-    if fast:
+    if is_fast:
         limits.append(_FAST_KALMAN_NSPM if isinstance(velocity, Kalman) else _FAST_NSPM)
     if not isinstance(velocity, Kalman):
         weight = _weight(velocity.alpha, period_s) if isinstance(velocity, Ewma) else 1.0
         limits.append(_COUNT_N * period_s / _COUNT_M / weight)
     else:
-        wrong = (it for it in (delay - 1, delay + 1) if it <= MOST_DELAY)
-        limits += [boundary_nspm(velocity, period_s, it, believed=delay) for it in wrong]
+        mistaken_delays = (mistaken_delay for mistaken_delay in (delay - 1, delay + 1) if mistaken_delay <= MOST_DELAY)
+        limits += [
+            boundary_nspm(velocity, period_s, mistaken_delay, believed=delay) for mistaken_delay in mistaken_delays
+        ]
         limits.append(_UNALTERED_SHARE * boundary_nspm(Ewma(), period_s, delay))
-        if not unaltered and not fast:
+        if not unaltered and not is_fast:
             return _KALMAN_SHARE * min(limits)
     return min(limits)
 
@@ -150,7 +153,7 @@ def _round_down(value: float) -> float:
     return math.floor(value * 10) / 10
 
 
-def _comes_to_rest(
+def _handle_comes_to_rest(
     velocity: Velocity,
     period_s: float,
     delays: tuple[int, int],
@@ -158,8 +161,8 @@ def _comes_to_rest(
     mass_kg: float,
     friction_nspm: float,
 ) -> bool:
-    """Return whether a handle thrown into a linear damper comes to rest; ``delays``: true and believed."""
-    counts = isinstance(velocity, Kalman)
+    """Return whether a handle thrown into a linear damper comes to rest; ``delays`` are (true, believed)."""
+    has_counts = isinstance(velocity, Kalman)
     case = Case(
         rate_hz=1.0 / period_s,
         delay=delays[0],
@@ -181,9 +184,11 @@ def _comes_to_rest(
     dynamics = Dynamics(delay_s=delays[1] * period_s, count_m=_COUNT_M, mass_kg=mass_kg)
     bench = Bench(case, safe=False, limits=limits, scene=scene, dynamics=dynamics)
     bench.loop.moving_s, bench.handle.motor_step_n = math.inf, 0.0
-    bench.handle.quantum_m = _COUNT_M if counts else 0.0
+    bench.handle.quantum_m = _COUNT_M if has_counts else 0.0
     bench.begin()
-    trace = empty_trace(round(_LASTS_S / period_s))
+    trace = empty_trace(round(_DURATION_S / period_s))
     bench.run(trace, 0, math.inf)
     speeds_mps = np.linalg.norm(trace.velocity_mps[-len(trace) // 10 :], axis=1)
-    return bool(not bench.loop.broken and speeds_mps.max() < (_SWING_MPS if counts else _DECAYED * _THROWN_MPS))
+    return bool(
+        not bench.loop.broken and speeds_mps.max() < (_REST_WITH_COUNTS_MPS if has_counts else _DECAYED * _THROWN_MPS)
+    )

@@ -33,28 +33,28 @@ from study_app.haptics.model.scene import Effect, Scene
 
 _HANDS: Final = ("light", "middle", "firm")
 _HANDLES_KG: Final = (0.1, 0.2, 0.5)
-_USUAL: Final = ("middle", 0.2)
+_STANDARD: Final = ("middle", 0.2)
 """The hand and the handle [kg] that strict limits apply to."""
 _FREQUENCIES_HZ: Final = (1.6, 3.0)
 DELAYS: Final = (1, 2, 3, 4)
 _REPORTED_KG: Final = 0.1
 """The least mass that the drivers report."""
-_LASTS_S: Final = 8.0
+_DURATION_S: Final = 8.0
 _SETTLED_S: Final = 3.0
 _TAPS: Final = (*range(200), *range(200, 1200, 40))
 """Ages [ticks] of the positions that the best linear estimator uses."""
 _REACH: Final = Stroke(0.03, reach_s=0.3)
-_EVERY: Final = 2
-"""Only every second row is fitted."""
+_ROW_STEP: Final = 2
+"""Interval between the rows that are fitted."""
 
 _Range = tuple[float, float]
 _ERROR: Final = {"water": 20.0, "olive_oil": 13.0, "gear_oil": 13.0, "glycerin": 13.0, "honey": 15.0}
 _THICK: Final = ("glycerin", "honey")
-_QUICK_ERROR: Final = 20.0
-_QUICK_HONEY: Final = 35.0
+_FAST_ERROR: Final = 20.0
+_FAST_HONEY: Final = 35.0
 _LIGHT_HONEY: Final = 30.0
-_OTHERS: Final = 1.5
-"""Other hands and handles may have so many times the error of the usual ones."""
+_OTHER_GRIPS_FACTOR: Final = 1.5
+"""Factor by which the error may be larger with other hands and handles than with the standard ones."""
 
 
 class Delivered(NamedTuple):
@@ -86,14 +86,14 @@ class Delivered(NamedTuple):
         case, name = self.case, self.case.liquid.removeprefix("physical2_")
         if case.estimator != "kalman" or name == case.liquid or name not in _ERROR:
             return {}
-        honey, quick = name == "honey", self.frequency_hz > WHOLE.frequency_hz
-        error = (_QUICK_HONEY if honey else _QUICK_ERROR) if quick else _ERROR[name]
-        if (case.hand, case.mass_kg) != _USUAL:
-            lightly = honey and not quick and (case.hand == "light" or case.mass_kg == min(_HANDLES_KG))
-            return {"sine": (0.0, _LIGHT_HONEY if lightly else _OTHERS * error)}
+        is_honey, is_fast = name == "honey", self.frequency_hz > WHOLE.frequency_hz
+        error = (_FAST_HONEY if is_honey else _FAST_ERROR) if is_fast else _ERROR[name]
+        if (case.hand, case.mass_kg) != _STANDARD:
+            is_light = is_honey and not is_fast and (case.hand == "light" or case.mass_kg == min(_HANDLES_KG))
+            return {"sine": (0.0, _LIGHT_HONEY if is_light else _OTHER_GRIPS_FACTOR * error)}
         limits = {"sine": (0.0, error)}
-        if quick:
-            limits["drag"] = (70.0, 130.0) if honey else (80.0, 120.0)
+        if is_fast:
+            limits["drag"] = (70.0, 130.0) if is_honey else (80.0, 120.0)
         else:
             limits |= {"inertia": (85.0, 115.0), "reach": (0.0, error)}
             if case.delay in {1, 3}:
@@ -108,13 +108,13 @@ class Delivered(NamedTuple):
 
 @cache
 def _shipped_liquids() -> tuple[str, ...]:
-    """Return the liquids of all shipped studies, of those with the same force the first."""
+    """Return the liquids of all shipped studies; of several with the same force only the first."""
     liquids: dict[str, str] = {}
     for name, scene in scenes().items():
         if name not in {"dense", DAMPER}:
-            alone = without_buoyancy(scene).model_dump(include={"scale", "rate_hz", "body", "knee", "liquids"})
-            alone["liquids"][0].pop("id")
-            liquids.setdefault(str(alone), name)
+            single = without_buoyancy(scene).model_dump(include={"scale", "rate_hz", "body", "knee", "liquids"})
+            single["liquids"][0].pop("id")
+            liquids.setdefault(str(single), name)
     return tuple(liquids.values())
 
 
@@ -125,14 +125,16 @@ def measure_delivered_force(*, whole: bool = False, executor: Executor | None = 
     """
     limited = tuple(f"physical2_{name}" for name in _ERROR)
     holds = [
-        hold for hold in itertools.product(_HANDS, _HANDLES_KG) if whole or hold[0] == _USUAL[0] or hold[1] == _USUAL[1]
+        hold
+        for hold in itertools.product(_HANDS, _HANDLES_KG)
+        if whole or hold[0] == _STANDARD[0] or hold[1] == _STANDARD[1]
     ]
     loops = [(liquid, "kalman", *hold) for liquid in limited for hold in holds]
     if whole:
         pairs = itertools.product(_shipped_liquids(), ("kalman", "ewma"))
-        loops += [(*pair, *_USUAL) for pair in pairs if (*pair, *_USUAL) not in loops]
-    planned = [(*loop, hz, delay) for loop in loops for hz in _FREQUENCIES_HZ for delay in DELAYS]
-    return run(delivered, planned, executor)
+        loops += [(*pair, *_STANDARD) for pair in pairs if (*pair, *_STANDARD) not in loops]
+    measured_loops = [(*loop, hz, delay) for loop in loops for hz in _FREQUENCIES_HZ for delay in DELAYS]
+    return run(delivered, measured_loops, executor)
 
 
 def delivered(
@@ -160,8 +162,8 @@ def case_of(
     estimator: str,
     delay: int,
     *,
-    hand: str = _USUAL[0],
-    mass_kg: float = _USUAL[1],
+    hand: str = _STANDARD[0],
+    mass_kg: float = _STANDARD[1],
     frequency_hz: float = WHOLE.frequency_hz,
 ) -> Case:
     """Return the loop in which a hand follows a sine of ±20 mm in a scene, at its scale and rate."""
@@ -192,7 +194,7 @@ def acting_on_random_motion(case: Case, scene: Scene, frequency_hz: float = WHOL
     """Return the error of the acting force of ``scene`` in the loop of ``case`` while the hand moves at random."""
     trace = Bench(case, scene=scene).follow(random_path(frequency_hz, case.rate_hz))
     law_n = law_along(scene, trace) @ DIRECTION
-    return OnRandomMotion(error=_error(trace, law_n), least=_least_error(trace, law_n, case.delay))
+    return OnRandomMotion(error=_rms_error(trace, law_n), least=_least_error(trace, law_n, case.delay))
 
 
 class Acting(NamedTuple):
@@ -205,16 +207,16 @@ class Acting(NamedTuple):
 
 def acting_on_sine(case: Case, scene: Scene, frequency_hz: float = WHOLE.frequency_hz) -> Acting:
     """Return the acting force of ``scene`` in the loop of ``case`` while the hand follows a sine of ±20 mm."""
-    path_m = sine_path(WHOLE.amplitude_m, 2 * math.pi * frequency_hz, _LASTS_S, case.rate_hz)
+    path_m = sine_path(WHOLE.amplitude_m, 2 * math.pi * frequency_hz, _DURATION_S, case.rate_hz)
     trace = Bench(case, scene=scene).follow(path_m)
-    counted = trace.t_s >= _SETTLED_S
-    parts_n = _parts(scene, trace)
-    courses = np.column_stack([part_n[counted] for part_n in parts_n.values()])
-    shares = np.linalg.lstsq(courses, (trace.acting_n @ DIRECTION)[counted], rcond=None)[0]
-    asked_n, sent_n = trace.asked_n[counted], trace.sent_n[counted]
-    withheld = float(np.linalg.norm(asked_n - sent_n, axis=1).sum() / np.linalg.norm(asked_n, axis=1).sum())
+    settled = trace.t_s >= _SETTLED_S
+    parts_n = _law_parts(scene, trace)
+    regressors = np.column_stack([part_n[settled] for part_n in parts_n.values()])
+    shares = np.linalg.lstsq(regressors, (trace.acting_n @ DIRECTION)[settled], rcond=None)[0]
+    model_n, sent_n = trace.asked_n[settled], trace.sent_n[settled]
+    withheld = float(np.linalg.norm(model_n - sent_n, axis=1).sum() / np.linalg.norm(model_n, axis=1).sum())
     return Acting(
-        error=_error(trace, law_along(scene, trace) @ DIRECTION),
+        error=_rms_error(trace, law_along(scene, trace) @ DIRECTION),
         parts={name: 100 * float(share) for name, share in zip(parts_n, shares, strict=True)},
         withheld=100 * withheld,
     )
@@ -222,20 +224,20 @@ def acting_on_sine(case: Case, scene: Scene, frequency_hz: float = WHOLE.frequen
 
 def error_in_reaches(case: Case, scene: Scene) -> float:
     """Return the error of the acting force [%] of ``scene`` while the hand reaches back and forth, with rests."""
-    t_s = np.arange(round(_LASTS_S * case.rate_hz)) / case.rate_hz
+    t_s = np.arange(round(_DURATION_S * case.rate_hz)) / case.rate_hz
     trace = Bench(case, scene=scene).follow(np.outer(_REACH.places_m(t_s), DIRECTION))
-    return _error(trace, law_along(scene, trace) @ DIRECTION)
+    return _rms_error(trace, law_along(scene, trace) @ DIRECTION)
 
 
-def _error(trace: Any, law_n: Floats) -> float:
+def _rms_error(trace: Any, law_n: Floats) -> float:
     """Return the RMS of acting force less law (n,) over the RMS of the law [%], along the motion."""
-    counted = trace.t_s >= _SETTLED_S
-    off_n = (trace.acting_n @ DIRECTION - law_n)[counted]
-    return 100 * math.sqrt(float(np.sum(off_n**2) / np.sum(law_n[counted] ** 2)))
+    settled = trace.t_s >= _SETTLED_S
+    error_n = (trace.acting_n @ DIRECTION - law_n)[settled]
+    return 100 * math.sqrt(float(np.sum(error_n**2) / np.sum(law_n[settled] ** 2)))
 
 
-def _parts(scene: Scene, trace: Any) -> Mapping[str, Floats]:
-    """Return drag, wake and inertia of the law (n,) [N] along the true motion; those that the scene has."""
+def _law_parts(scene: Scene, trace: Any) -> Mapping[str, Floats]:
+    """Return those of drag, wake and inertia that the scene has, along the true motion, each (n,) [N]."""
     liquid, effects = scene.liquids[0], scene.liquids[0].effects
     if "unsteady_drag" in effects:
         w_mps = scene.scale * trace.velocity_mps
@@ -268,12 +270,12 @@ def _parts(scene: Scene, trace: Any) -> Mapping[str, Floats]:
 
 def _least_error(trace: Any, law_n: Floats, delay: int) -> float:
     """Return the error [%] of the linear estimator of the law (n,) [N] that is best on this motion."""
-    seen_m = np.rint(trace.position_m / COUNT_M) @ DIRECTION * COUNT_M
-    rows = np.flatnonzero(trace.t_s >= _SETTLED_S)[::_EVERY]
-    courses = np.column_stack([seen_m[rows - delay - age] for age in _TAPS])
-    weights = np.linalg.solve(courses.T @ courses, courses.T @ law_n[rows])
-    off_n = courses @ weights - law_n[rows]
-    return 100 * math.sqrt(float(np.sum(off_n**2) / np.sum(law_n[rows] ** 2)))
+    counted_m = np.rint(trace.position_m / COUNT_M) @ DIRECTION * COUNT_M
+    rows = np.flatnonzero(trace.t_s >= _SETTLED_S)[::_ROW_STEP]
+    regressors = np.column_stack([counted_m[rows - delay - age] for age in _TAPS])
+    weights = np.linalg.solve(regressors.T @ regressors, regressors.T @ law_n[rows])
+    error_n = regressors @ weights - law_n[rows]
+    return 100 * math.sqrt(float(np.sum(error_n**2) / np.sum(law_n[rows] ** 2)))
 
 
 def delivered_force_evidence(found: Sequence[Delivered]) -> Evidence:
@@ -295,9 +297,9 @@ def _lines(found: Sequence[Delivered]) -> Iterator[str]:
     rows = []
     for row in found:
         case = row.case
-        described = (case.liquid, case.estimator, case.hand, f"{case.mass_kg:g}", f"{row.frequency_hz:g}", case.delay)
+        identity = (case.liquid, case.estimator, case.hand, f"{case.mass_kg:g}", f"{row.frequency_hz:g}", case.delay)
         cells = [_cell(name, row) for name in (*headings[6:], "inertia")]
-        rows.append((*described, *cells, f"{row.withheld:.0f}"))
+        rows.append((*identity, *cells, f"{row.withheld:.0f}"))
     yield Table((*headings, "inertia", "withheld"), rows, left=3).text()
     yield ""
 

@@ -1,8 +1,8 @@
-"""What the passivity controller leaves of a force that a study delays: per liquid, hand and delay.
+"""The share of a delayed force that the passivity controller passes, by liquid, hand and delay.
 
-A hand stirs a handle of 0.1 kg at 1 kHz and one tick of delay along a sine of ±30 mm and at most 0.2 m/s. The force of
-the liquid, within the slope limits, comes later to the passivity controller, as if the liquid were on another computer.
-Buoyancy is left out: it is constant. Counted is from the second second on.
+A hand moves a handle of 0.1 kg at 1 kHz and one tick of delay along a sine of ±30 mm and at most 0.2 m/s. The force of
+the liquid, within the slope limits, reaches the passivity controller later, as if the liquid were on another computer.
+Buoyancy is omitted because it is constant. The first second is not evaluated.
 
 - *left*: RMS of the force sent over RMS of the force as it came to the controller;
 - *withheld*: Σ|F_a - F_b| / Σ|F_a| of the two, as ``withheld_share`` of a trial.
@@ -33,7 +33,7 @@ _HANDS: Final = ("light", "middle", "firm")
 _DELAYS_MS: Final = (0, 1, 2, 5, 10, 20, 50, 100, 200)
 _AMPLITUDE_M: Final = 0.03
 _SPEED_MPS: Final = 0.2
-_LASTS_S: Final = 6.0
+_DURATION_S: Final = 6.0
 _SETTLED_S: Final = 1.0
 
 
@@ -53,19 +53,19 @@ def force_delay_evidence(entries: Sequence[Entry], file: str) -> Evidence:
 
     The table has one line per liquid, estimator and hand, and one column per delay.
     """
-    delays_ms = sorted({it.delay_ms for it in entries})
-    kept = {it[:4]: it.left_percent for it in entries}
+    delays_ms = sorted({entry.delay_ms for entry in entries})
+    left_by_case = {entry[:4]: entry.left_percent for entry in entries}
     lines = [f"{'remaining force [%], by delay [ms]':40}" + "".join(f"{delay:6g}" for delay in delays_ms)]
-    for liquid, estimator, hand in dict.fromkeys(it[:3] for it in entries):
-        shares = (kept.get((liquid, estimator, hand, delay), math.nan) for delay in delays_ms)
-        lines.append(f"{f'{liquid}, {estimator}, {hand}':40}" + "".join(f"{share:6.0f}" for share in shares))
+    for liquid, estimator, hand in dict.fromkeys(entry[:3] for entry in entries):
+        percentages = (left_by_case.get((liquid, estimator, hand, delay), math.nan) for delay in delays_ms)
+        lines.append(f"{f'{liquid}, {estimator}, {hand}':40}" + "".join(f"{share:6.0f}" for share in percentages))
     rows = [(*entry[:3], *(f"{value:g}" for value in entry[3:])) for entry in entries]
     return Evidence("\n".join(lines) + "\n", {file: Table(Entry._fields, rows).csv()})
 
 
 def delayed_trace(case: Case) -> Any:
     """Return the trace of a hand that stirs the case's liquid without buoyancy, with the case's force delay."""
-    path_m = sine_path(_AMPLITUDE_M, _SPEED_MPS / _AMPLITUDE_M, _LASTS_S, case.rate_hz)
+    path_m = sine_path(_AMPLITUDE_M, _SPEED_MPS / _AMPLITUDE_M, _DURATION_S, case.rate_hz)
     return Bench(case, scene=without_buoyancy(scene_of(case))).follow(path_m)
 
 

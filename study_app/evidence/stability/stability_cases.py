@@ -1,4 +1,4 @@
-"""The cases of the stability sweep: which liquid, loop, device and hand, each a line of words that reproduces it."""
+"""The cases of the stability sweep: liquid, loop, device and hand, with a line of text that reproduces each case."""
 
 import difflib
 import zlib
@@ -27,10 +27,10 @@ PLANTS: Final = (FIRST, SECOND)
 FALCON: Final = "falcon"
 
 DAMPER: Final = "damper"
-"""The strongest linear damper that a file may ask for."""
+"""The strongest linear damper that a file may contain."""
 
-_OF_SWEEP: Final = {"rek2024": "", "physical_liquids": "physical_"}
-"""Studies whose liquids the sweep presents, and what precedes their names."""
+_SWEEP_STUDIES: Final = {"rek2024": "", "physical_liquids": "physical_"}
+"""Studies whose liquids the sweep presents, and the prefix of their names."""
 
 THROWN: Final = "thrown"
 LETS_GO: Final = "lets-go"
@@ -41,11 +41,11 @@ _AVERAGE: Final = "average"
 _FIRST_ORDER: Final = "first-order"
 _LATE: Final = "late"
 FILTERS: Final = (_AVERAGE, _FIRST_ORDER, _LATE)
-"""Why the velocity of such a device lags: a mean over twice the lag, a filter of first order, or delay alone."""
-_OF_DEVICE: Final = ("velocity_lag", "velocity_filter", "velocity_noise_mmps", "velocity_count_mmps")
-"""Fields of cases with such a device, which the line of any other leaves out."""
-_OF_SOME: Final = ("swaps", "jump_mm", "outliers", "outlier_mm")
-"""Fields that a line leaves out where they are 0: the seed of a force link is that of the line."""
+"""Causes of the lag of such a velocity: a mean over twice the lag, a first-order filter, or pure delay."""
+_DEVICE_FIELDS: Final = ("velocity_lag", "velocity_filter", "velocity_noise_mmps", "velocity_count_mmps")
+"""Fields of cases with such a device; the line of any other case omits them."""
+_OPTIONAL_FIELDS: Final = ("swaps", "jump_mm", "outliers", "outlier_mm")
+"""Fields that a line omits if they are 0, since the seed of a force link is derived from the line."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -97,7 +97,7 @@ _RANGES: Final[Mapping[str, tuple[float, float]]] = {
     "outliers": (0.0, 0.5),
     "outlier_mm": (0.0, 100.0),
 }
-"""What a case may be made of; the sweep's own choices lie within."""
+"""Permitted ranges of a case's values, which include those of the sweep."""
 
 _ESTIMATORS: Final[Mapping[str, Any]] = {name: it.model() for name, it in ESTIMATORS.items() if it.of_device}
 
@@ -172,10 +172,10 @@ class Case:
         return self.believed_delay != self.delay or self.slows_to > self.delay
 
     def __str__(self) -> str:
-        unused = () if self.estimator == DEVICE else _OF_DEVICE
+        unused = () if self.estimator == DEVICE else _DEVICE_FIELDS
         names = [field.name for field in fields(self) if field.name not in unused]
-        names = [name for name in names if name not in _OF_SOME or getattr(self, name)]
-        return " ".join(f"{name}={_word(getattr(self, name))}" for name in names)
+        names = [name for name in names if name not in _OPTIONAL_FIELDS or getattr(self, name)]
+        return " ".join(f"{name}={_format_value(getattr(self, name))}" for name in names)
 
 
 def parse_case(line: str) -> Case:
@@ -186,17 +186,19 @@ def parse_case(line: str) -> Case:
     StudyError
         A word has another form, a name is unknown, or a value is not permitted.
     """
-    usual = Case()
-    kinds: dict[str, type] = {field.name: type(getattr(usual, field.name)) for field in fields(Case)}
+    defaults = Case()
+    kinds: dict[str, type] = {field.name: type(getattr(defaults, field.name)) for field in fields(Case)}
     values: dict[str, Any] = {}
     for word in line.split():
         name, separator, value = word.partition("=")
         if not separator:
             raise StudyError(f'a case consists of settings such as "scale=10", not {word!r}')
         if name not in kinds:
-            near = difflib.get_close_matches(name, kinds, n=1)
-            meant = f"did you mean {near[0]!r}? " if near else ""
-            raise StudyError(f"a case does not have a setting {name!r}: {meant}its settings are {', '.join(kinds)}")
+            similar = difflib.get_close_matches(name, kinds, n=1)
+            suggestion = f"did you mean {similar[0]!r}? " if similar else ""
+            raise StudyError(
+                f"a case does not have a setting {name!r}: {suggestion}its settings are {', '.join(kinds)}"
+            )
         try:
             values[name] = kinds[name](value)
         except ValueError as error:
@@ -229,26 +231,26 @@ def liquids() -> Mapping[str, Scene]:
     They are the liquids of the shipped studies, including tar, a far denser one, and the strongest permitted linear
     damper.
     """
-    named: dict[str, Scene] = {}
-    for protocol, prefix in _OF_SWEEP.items():
+    scenes_by_name: dict[str, Scene] = {}
+    for protocol, prefix in _SWEEP_STUDIES.items():
         study = load(shipped_file(protocol))
-        named |= {f"{prefix}{name}": study.scene_of(name) for name in study.liquids}
+        scenes_by_name |= {f"{prefix}{name}": study.scene_of(name) for name in study.liquids}
     damper = Liquid(id=DAMPER, density_kg_m3=1000, drag=Drag(law="linear", damping_nspm=DAMPING_NSPM[1]))
     for liquid in (Liquid(id="dense", density_kg_m3=10_000), damper):
-        named[liquid.id] = Scene(liquids=(liquid,))
-    return named
+        scenes_by_name[liquid.id] = Scene(liquids=(liquid,))
+    return scenes_by_name
 
 
 @cache
 def scenes() -> Mapping[str, Scene]:
     """Return all scenes that a case may present: those of the sweep, and the liquids of all other shipped studies."""
-    named = dict(liquids())
+    scenes_by_name = dict(liquids())
     for protocol in shipped():
-        if protocol in _OF_SWEEP:
+        if protocol in _SWEEP_STUDIES:
             continue
         study = load(shipped_file(protocol))
-        named |= {f"{protocol}_{name}": study.scene_of(name) for name in study.liquids}
-    return named
+        scenes_by_name |= {f"{protocol}_{name}": study.scene_of(name) for name in study.liquids}
+    return scenes_by_name
 
 
 @cache
@@ -258,8 +260,8 @@ def materials() -> tuple[str, ...]:
 
 
 @cache
-def of_physical2() -> tuple[str, ...]:
-    """Return the liquid names of physical2, which has unsteady drag where the Reynolds number permits it."""
+def physical2_liquids() -> tuple[str, ...]:
+    """Return the liquid names of physical2, which have unsteady drag if the Reynolds number permits it."""
     return tuple(name for name in scenes() if name.startswith("physical2_"))
 
 
@@ -267,8 +269,8 @@ def scene_of(case: Case) -> Scene:
     """Return the scene that the case presents."""
     velocity = _ESTIMATORS["ewma" if case.estimator == DEVICE else case.estimator]  # replaced by a device's own
     link = _link_of(case)
-    changed = {"scale": case.scale, "rate_hz": case.rate_hz, "velocity": velocity, "link": link}
-    return Scene.model_validate(scenes()[case.liquid].model_copy(update=changed).model_dump())
+    changes = {"scale": case.scale, "rate_hz": case.rate_hz, "velocity": velocity, "link": link}
+    return Scene.model_validate(scenes()[case.liquid].model_copy(update=changes).model_dump())
 
 
 def _link_of(case: Case) -> ForceLink:
@@ -281,5 +283,5 @@ def _link_of(case: Case) -> ForceLink:
     )
 
 
-def _word(value: object) -> str:
+def _format_value(value: object) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value)

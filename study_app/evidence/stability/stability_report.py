@@ -1,8 +1,8 @@
-"""The stability of hard cases: the sweep with the safety layer off and on, the other groups with it.
+"""The stability of hard cases: the sweep with the safety layer off and on, the other groups with it on.
 
-What a case is made of is said in `stability_cases`, which cases there are in `case_groups`, when one counts as unstable
-or noisy in `verdict`, the maximum stable damping in `damping_limits`. The map shows the limit of a free handle, what
-its friction proves, what limits allow, and what a sweep finds.
+`stability_cases` defines a case, `case_groups` lists the cases, `verdict` defines when one is unstable or noisy, and
+`damping_limits` measures the maximum stable damping. The map shows the boundary of a free handle, the passive limit
+that follows from its friction, the limits in use, and the results of a sweep.
 """
 
 import collections
@@ -81,10 +81,10 @@ def _draw_boundary(axes: Axes) -> None:
     for delay in _MAP_DELAYS:
         measured = [boundary_nspm(Ewma(), NOMINAL_S, delay, friction_nspm=b) for b in _FRICTIONS_NSPM]
         proved = [passive_nspm(b, NOMINAL_S, delay) for b in _FRICTIONS_NSPM]
-        look: dict[str, Any] = {"color": _COLOURS[delay]}
-        axes.plot(_FRICTIONS_NSPM, measured, marker=_MARKS[delay], markersize=3, label=str(delay), **look)
-        axes.plot(_FRICTIONS_NSPM, proved, linestyle=(0, (3, 2)), linewidth=0.9, **look)
-    _logarithmic(axes, _FRICTIONS_NSPM, (1, 10, 100))
+        line_style: dict[str, Any] = {"color": _COLOURS[delay]}
+        axes.plot(_FRICTIONS_NSPM, measured, marker=_MARKS[delay], markersize=3, label=str(delay), **line_style)
+        axes.plot(_FRICTIONS_NSPM, proved, linestyle=(0, (3, 2)), linewidth=0.9, **line_style)
+    _set_log_axes(axes, _FRICTIONS_NSPM, (1, 10, 100))
     axes.set_title(f"Maximum stable damping B [N·s/m]\nwith a {FREE_HANDLE_KG:g} kg handle at 1 kHz", pad=26)
     axes.set_xlabel("Friction b of the handle [N·s/m]", loc="right", labelpad=1)
     _name_curves(axes, 4)
@@ -95,11 +95,11 @@ def _draw_limits(axes: Axes) -> None:
     for delay in _LIMIT_DELAYS:
         measured = [boundary_nspm(Ewma(), period_s, delay) for period_s in PERIODS_S]
         allowed = [slope_limit(period_s, delay) for period_s in PERIODS_S]
-        look: dict[str, Any] = {"color": _COLOURS[delay]}
-        axes.plot(periods_ms, measured, marker=_MARKS[delay], markersize=3, label=str(delay), **look)
+        line_style: dict[str, Any] = {"color": _COLOURS[delay]}
+        axes.plot(periods_ms, measured, marker=_MARKS[delay], markersize=3, label=str(delay), **line_style)
         for period_ms, limit in zip(periods_ms, allowed, strict=True):
-            axes.plot((period_ms / 1.18, period_ms * 1.18), (limit, limit), linewidth=2.2, **look)
-    _logarithmic(axes, periods_ms, (3, 10, 30, 100))
+            axes.plot((period_ms / 1.18, period_ms * 1.18), (limit, limit), linewidth=2.2, **line_style)
+    _set_log_axes(axes, periods_ms, (3, 10, 30, 100))
     axes.set_title("Boundary and limit (bars)\nof B [N·s/m]", pad=26)
     axes.set_xlabel("Time between ticks [ms]", loc="right", labelpad=1)
     _name_curves(axes, 3)
@@ -125,7 +125,7 @@ def _draw_unstable_shares(axes: Axes, off: Sequence[Verdict]) -> None:
     axes.set_xlabel("Time between ticks [ms]", loc="right", labelpad=1)
 
 
-def _logarithmic(axes: Axes, x: Sequence[float], y: Sequence[float]) -> None:
+def _set_log_axes(axes: Axes, x: Sequence[float], y: Sequence[float]) -> None:
     axes.set_xscale("log")
     axes.set_yscale("log")
     for axis, places in ((axes.xaxis, x), (axes.yaxis, y)):
@@ -152,7 +152,7 @@ def _name_curves(axes: Axes, columns: int) -> None:
 
 
 LOOPS: Final = ((1000.0, 0), (1000.0, 1), (1000.0, 2), (1000.0, 4), (2000.0, 1), (500.0, 1), (250.0, 1))
-"""Ticks a second and ticks of delay; the first two are those of a study."""
+"""Ticks per second and ticks of delay; the first two loops are those of a study."""
 _MOTIONS: Final = (REACHES, CIRCLES, STROKE)
 _SPEEDS_MPS: Final = (0.1, 0.3, 0.6, 1.0)
 _RELATIVE: Final = 0.05
@@ -204,12 +204,12 @@ def fidelities(
 
 def _worst_fidelity(liquid: str, loop: tuple[float, int]) -> Fidelity:
     """Return the fidelity of the motion that exceeds its target most."""
-    measured = list(_motions(liquid, *loop))
+    measured = list(_measure_motions(liquid, *loop))
     beyond = max(fidelity.beyond for fidelity in measured)
-    return max(measured, key=lambda one: one.difference_n / one.target_n)._replace(beyond=beyond)
+    return max(measured, key=lambda fidelity: fidelity.difference_n / fidelity.target_n)._replace(beyond=beyond)
 
 
-def _motions(liquid: str, rate_hz: float, delay: int) -> Iterator[Fidelity]:
+def _measure_motions(liquid: str, rate_hz: float, delay: int) -> Iterator[Fidelity]:
     scene = liquids()[liquid]
     for motion, speed_mps in itertools.product(_MOTIONS, _SPEEDS_MPS):
         case = Case(
@@ -225,22 +225,22 @@ def _motions(liquid: str, rate_hz: float, delay: int) -> Iterator[Fidelity]:
         bench.begin()
         trace = trace[: bench.run(trace, 0, lasts_s(case))]
         trace = trace[(trace.t_s > _SETTLED_S) & (trace.t_s < _MOVING_S)]
-        yield _compare(case, trace)
+        yield _compare_forces(case, trace)
 
 
-def _compare(case: Case, trace: Any) -> Fidelity:
+def _compare_forces(case: Case, trace: Any) -> Fidelity:
     """Compare the force sent with the model's force, clamped in the same direction."""
-    asked_n = np.linalg.norm(trace.asked_n, axis=1)
-    clamped_n = trace.asked_n * np.minimum(1.0, FORCE_LIMIT_N / np.maximum(asked_n, 1e-12))[:, None]
+    model_n = np.linalg.norm(trace.asked_n, axis=1)
+    clamped_n = trace.asked_n * np.minimum(1.0, FORCE_LIMIT_N / np.maximum(model_n, 1e-12))[:, None]
     force_n = np.linalg.norm(clamped_n, axis=1)
-    off_n = np.linalg.norm(trace.sent_n - clamped_n, axis=1)
+    error_n = np.linalg.norm(trace.sent_n - clamped_n, axis=1)
     return Fidelity(
         liquid=case.liquid,
         rate_hz=case.rate_hz,
         delay=case.delay,
-        difference_n=float(np.sqrt(np.mean(off_n**2))),
+        difference_n=float(np.sqrt(np.mean(error_n**2))),
         force_n=float(np.sqrt(np.mean(force_n**2))),
-        beyond=float(np.mean(off_n > np.maximum(_RELATIVE * force_n, _ABSOLUTE_N))),
+        beyond=float(np.mean(error_n > np.maximum(_RELATIVE * force_n, _ABSOLUTE_N))),
     )
 
 
@@ -249,7 +249,7 @@ _MEASURES: Final = ("balance_j", "permitted_j", "swing_mps", "fast_n", "played_n
 
 
 @dataclass(frozen=True, slots=True)
-class _Judged:
+class _JudgedGroup:
     """The verdicts on a group of cases with safety on."""
 
     name: str
@@ -266,7 +266,7 @@ class Swept:
     off: tuple[Verdict, ...]
     on: tuple[Verdict, ...]
     took_s: float
-    others: tuple[_Judged, ...] = ()
+    others: tuple[_JudgedGroup, ...] = ()
 
     def of_grade(self, grade: str) -> tuple[Verdict, ...]:
         """Return the verdicts of a grade among those with safety on."""
@@ -279,9 +279,9 @@ class Swept:
         return bool(self.of_grade(UNSTABLE)) or len(self.of_grade(NOISY)) > _NOISY_SHARE * judged
 
     @property
-    def groups(self) -> tuple[_Judged, ...]:
+    def groups(self) -> tuple[_JudgedGroup, ...]:
         """All groups; the sweep with safety on, if it was judged, comes first."""
-        return (*([_Judged("first plant", self.on)] if self.on else []), *self.others)
+        return (*([_JudgedGroup("first plant", self.on)] if self.on else []), *self.others)
 
 
 def run_sweep(
@@ -299,7 +299,7 @@ def run_sweep(
     planned += [(case, True) for group in others for case in group.cases]
     verdicts = iter(run(_judge, planned, executor, lambda done: progress(done, len(planned))))
     off, on = [tuple(itertools.islice(verdicts, len(cases))) for _ in range(2)]
-    judged = [_Judged(group.name, tuple(itertools.islice(verdicts, len(group.cases)))) for group in others]
+    judged = [_JudgedGroup(group.name, tuple(itertools.islice(verdicts, len(group.cases)))) for group in others]
     return Swept(off, on, time.perf_counter() - began, tuple(judged))
 
 
@@ -314,26 +314,32 @@ def _judge(case: Case, safe: bool) -> Verdict:
 
 def verdict_text(verdict: Verdict) -> str:
     """Return a verdict as a sentence."""
-    said = f"safety {'on' if verdict.safe else 'off'}: "
-    said += f"{verdict.grade} ({', '.join(verdict.reasons)})" if verdict.reasons else verdict.grade
+    text = f"safety {'on' if verdict.safe else 'off'}: "
+    text += f"{verdict.grade} ({', '.join(verdict.reasons)})" if verdict.reasons else verdict.grade
     if verdict.reasons == ("not finite",):
-        return said
+        return text
     reference = "with the scripted device" if verdict.case.plant == FALCON else "without feedback"
-    said += (
+    text += (
         f"; the energy balance of hand and liquid falls to {1e3 * verdict.balance_j:.2f} mJ "
         f"({1e3 * verdict.permitted_j:.2f} mJ permitted), the handle oscillates at {1e3 * verdict.swing_mps:.0f} mm/s, "
         f"the force above 40 Hz is {verdict.fast_n:.2f} N ({verdict.played_n:.2f} N {reference})"
     )
-    acted = [f"{name} {share:.1%}" for name, share in zip(LIMITER_NAMES, verdict.acted, strict=True) if share]
-    return f"{said}; proportion of ticks on which each limiter was active: {', '.join(acted)}" if acted else said
+    limiter_shares = [f"{name} {share:.1%}" for name, share in zip(LIMITER_NAMES, verdict.acted, strict=True) if share]
+    return (
+        f"{text}; proportion of ticks on which each limiter was active: {', '.join(limiter_shares)}"
+        if limiter_shares
+        else text
+    )
 
 
 def summary(swept: Swept, fidelities: Sequence[Fidelity]) -> str:
     """Return a summary as text: the number of unstable cases and why, the active limiters, and the force withheld."""
-    return "\n".join((*_counts(swept), "", group_table(swept), "", *_limiters(swept), "", *_fidelity(fidelities)))
+    return "\n".join(
+        (*_count_lines(swept), "", group_table(swept), "", *_limiter_lines(swept), "", *_fidelity_lines(fidelities))
+    )
 
 
-def _counts(swept: Swept) -> Iterator[str]:
+def _count_lines(swept: Swept) -> Iterator[str]:
     cases, others = len(swept.on), sum(len(other.verdicts) for other in swept.others)
     yield f"{cases} cases with safety off and on, {others} other cases with safety on, {swept.took_s:.0f} s"
     yield f"{'':24} safety off   safety on"
@@ -372,11 +378,11 @@ def _group_lines(swept: Swept) -> Iterator[str]:
         unstable, noisy = [len(group.of_grade(grade)) for grade in (UNSTABLE, NOISY)]
         counts = f"{len(group.verdicts):7} {unstable:9} {noisy:7} {1e3 * given_j:11.2f} {1e3 * beyond_j:11.2f}"
         reasons = collections.Counter(reason for verdict in group.verdicts for reason in verdict.reasons)
-        why = ", ".join(f"{reason} {count}" for reason, count in reasons.items())
-        yield f"  {group.name:{width}} {counts}   {why}".rstrip()
+        reasons_text = ", ".join(f"{reason} {count}" for reason, count in reasons.items())
+        yield f"  {group.name:{width}} {counts}   {reasons_text}".rstrip()
 
 
-def _limiters(swept: Swept) -> Iterator[str]:
+def _limiter_lines(swept: Swept) -> Iterator[str]:
     cases = len(swept.on)
     yield f"{'with safety on':24}   in cases    in ticks"
     for k, name in enumerate(LIMITER_NAMES):
@@ -385,12 +391,12 @@ def _limiters(swept: Swept) -> Iterator[str]:
             yield f"  {name:22} {sum(share > 0 for share in shares) / cases:10.1%}  {sum(shares) / cases:10.2%}"
 
 
-def _fidelity(fidelities: Sequence[Fidelity]) -> Iterator[str]:
+def _fidelity_lines(fidelities: Sequence[Fidelity]) -> Iterator[str]:
     yield "RMS difference between the sent force and the model force clamped to 8 N, with the hand attached (worst of"
     yield "twelve motions), as a percentage of the RMS force; * marks more than 5 % and 0.05 N. The second number is"
     yield "the largest proportion of ticks with such a difference."
     yield f"{'rate, ticks of delay':22}" + "".join(f"{f'{rate_hz:g} Hz, {delay}':>16}" for rate_hz, delay in LOOPS)
-    for liquid, row in itertools.groupby(fidelities, key=lambda one: one.liquid):
+    for liquid, row in itertools.groupby(fidelities, key=lambda fidelity: fidelity.liquid):
         cells = (f"{f'{fidelity.share:.1%}' + ' *'[not fidelity.within]} {fidelity.beyond:6.1%}" for fidelity in row)
         yield f"  {liquid:20}" + "".join(f"{cell:>16}" for cell in cells)
 

@@ -1,10 +1,11 @@
-"""The share of each liquid's force that passivity controller and slew limit withhold in quick motion, and after it.
+"""The share of each liquid's force that passivity controller and slew limit withhold during and after fast motion.
 
-The share is Σ|F_a - F_b| / Σ|F_a|, F_a the force after slope limit, fades and norm clamp, F_b the force sent. A handle
-is moved along straight strokes A cos 2πft, which begin at rest; and along one second each of four of slow stirring
-after 0.9 s of such a stroke, in circles of the radius 30 mm. Each motion is imposed three times: on the position
-itself, whatever the force; by a hand that holds the handle firmly enough to follow a stroke of 8 Hz; and on a hand that
-holds it through the tissue of its fingers, in which it swings, so that strokes have no goal.
+The share is Σ|F_a - F_b| / Σ|F_a|, where F_a is the force after slope limit, fades and norm clamp, and F_b the force
+sent. A handle is moved along straight strokes A cos 2πft, which begin at rest; and along 0.9 s of such a stroke
+followed by four seconds of slow stirring in circles of radius 30 mm, each second of which is evaluated. Each motion is
+imposed three times: on the position itself, whatever the force; by a hand that holds the handle firmly enough to follow
+a stroke of 8 Hz; and on a hand that holds it through the tissue of its fingers, in which it swings, so that strokes
+have no goal.
 """
 
 import itertools
@@ -38,7 +39,7 @@ STROKES: Final = _SLOW + QUICK
 SHOWN_SHAKE: Final = QUICK[2]
 _RATE_HZ: Final = 1000.0
 _STROKE_S: Final = 3.0
-_SHAKE_S: Final = 0.9
+_SHAKE_DURATION_S: Final = 0.9
 _STIRRING_MPS: Final = 0.2
 _STIRRING_M: Final = 0.03
 SECONDS: Final = 4
@@ -48,17 +49,17 @@ _HAND_NPM: Final = 2000.0
 _HAND_NSPM: Final = 60.0
 """Mass of the middle grip, with stiffness and damping that keep the handle on its path at 8 Hz. [choice]"""
 _HANDLE_KG: Final = 0.1
-_SHAKEN_KG: Final = 0.2
-"""In tissue: with `ewma`, one of 0.1 kg swings in physical honey by itself."""
+_SHAKEN_HANDLE_KG: Final = 0.2
+"""Mass of a handle held through tissue [kg], since one of 0.1 kg swings by itself in physical honey with `ewma`."""
 
-_MOST: Final = 0.05
-_MOST_REVERSED: Final = 0.08
+_MAX_SHARE: Final = 0.05
+_MAX_REVERSED_SHARE: Final = 0.08
 _REVERSED: Final = ("physical_honey", "kalman")
 """Its force reverses from +8 N to −8 N (the force limit), which takes the slew limit 13 ms. [choice]"""
 MOST_AFTER: Final = 0.005
 _EXEMPT: Final = ("physical_tar",)
 _ESTIMATORS: Final = ("ewma", "kalman")
-"""Those that studies use."""
+"""The estimators that studies use."""
 _IMPOSED: Final = "position imposed"
 _HELD: Final = "handle held"
 SHAKEN: Final = "hand shaken"
@@ -81,7 +82,7 @@ class Withheld(NamedTuple):
 
     @property
     def most(self) -> float:
-        return _MOST_REVERSED if (self.liquid, self.estimator) == _REVERSED else _MOST
+        return _MAX_REVERSED_SHARE if (self.liquid, self.estimator) == _REVERSED else _MAX_SHARE
 
     @property
     def lasting(self) -> float:
@@ -110,7 +111,7 @@ def measure_withheld_force(
                 scale=liquids()[liquid].scale,
                 delay=delay,
                 estimator=estimator,
-                mass_kg=_SHAKEN_KG if mode == SHAKEN else _HANDLE_KG,
+                mass_kg=_SHAKEN_HANDLE_KG if mode == SHAKEN else _HANDLE_KG,
             ),
             mode,
         )
@@ -127,7 +128,7 @@ def withheld_force_evidence(found: Sequence[Withheld]) -> Evidence:
 
 def _lines(found: Sequence[Withheld]) -> Iterator[str]:
     yield "force held back by the passivity controller and the slew limit, Σ|F_a - F_b| / Σ|F_a| [%]; strokes in mm"
-    for (estimator, mode), rows in itertools.groupby(found, key=lambda one: (one.estimator, one.mode)):
+    for (estimator, mode), rows in itertools.groupby(found, key=lambda withheld: (withheld.estimator, withheld.mode)):
         yield ""
         strokes = "".join(f"{stroke!s:>11}" for stroke in STROKES)
         after = f"   in seconds 1 to {SECONDS} after {SHOWN_SHAKE}; maximum after the first second"
@@ -137,30 +138,30 @@ def _lines(found: Sequence[Withheld]) -> Iterator[str]:
             goals = "no goal" if row.liquid in _EXEMPT else "met" if row.met else "not met"
             strokes = "".join(f"{100 * share:11.1f}" for share in row.strokes)
             yield f"  {row.liquid:19}{strokes}  {after}{100 * row.lasting:10.1f}   {goals}"
-    counted = [withheld for withheld in found if withheld.liquid not in _EXEMPT]
-    lasting = max(withheld.lasting for withheld in counted)
+    with_limits = [withheld for withheld in found if withheld.liquid not in _EXEMPT]
+    lasting = max(withheld.lasting for withheld in with_limits)
     yield ""
-    for most in sorted({withheld.most for withheld in counted}):
-        quick = max(withheld.quick for withheld in counted if withheld.most == most)
-        which = "except in tar" if most == _MOST else f"in {' with '.join(_REVERSED)}"
-        yield f"at most {most:.0%} held back in every stroke, {which}: {_goal(quick <= most)} ({quick:.1%})"
-    met = _goal(lasting < MOST_AFTER)
+    for most in sorted({withheld.most for withheld in with_limits}):
+        quick = max(withheld.quick for withheld in with_limits if withheld.most == most)
+        where = "except in tar" if most == _MAX_SHARE else f"in {' with '.join(_REVERSED)}"
+        yield f"at most {most:.0%} held back in every stroke, {where}: {_goal_text(quick <= most)} ({quick:.1%})"
+    met = _goal_text(lasting < MOST_AFTER)
     after = f"less than {MOST_AFTER:.1%} held back from one second after a shake onwards, except in tar"
     yield f"{after}: {met} ({lasting:.1%})"
 
 
-def _goal(met: bool) -> str:
+def _goal_text(met: bool) -> str:
     return "met" if met else "not met"
 
 
 def _measure_withheld(case: Case, mode: str) -> Withheld:
-    strokes = tuple(_share(_play_path(case, _stroke_m(stroke, _STROKE_S), mode)) for stroke in STROKES)
+    strokes = tuple(_withheld_share(_play_path(case, _stroke_m(stroke, _STROKE_S), mode)) for stroke in STROKES)
     after = []
     for shake in QUICK:
-        shaken_m = _stroke_m(shake, _SHAKE_S)
+        shaken_m = _stroke_m(shake, _SHAKE_DURATION_S)
         trace = _play_path(case, np.concatenate([shaken_m, _stirring_m(shaken_m[-1])]), mode)
         seconds = np.split(trace[len(shaken_m) :], SECONDS)
-        after.append(tuple(_share(second) for second in seconds))
+        after.append(tuple(_withheld_share(second) for second in seconds))
     return Withheld(liquid=case.liquid, estimator=case.estimator, mode=mode, strokes=strokes, after=tuple(after))
 
 
@@ -186,6 +187,6 @@ def _play_path(case: Case, path_m: NDArray[np.float64], mode: str) -> Any:
     return bench.follow(path_m, rigid=mode == _IMPOSED)
 
 
-def _share(trace: Any) -> float:
+def _withheld_share(trace: Any) -> float:
     permitted_n = float(trace.permitted_n.sum())
     return float(trace.withheld_n.sum()) / permitted_n if permitted_n > 0.0 else 0.0

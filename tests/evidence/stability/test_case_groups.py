@@ -8,7 +8,7 @@ import pytest
 
 from study_app.evidence.stability.bench import Bench, new_trace
 from study_app.evidence.stability.case_groups import groups
-from study_app.evidence.stability.stability_cases import materials, of_physical2, parse_case
+from study_app.evidence.stability.stability_cases import materials, parse_case, physical2_liquids
 from study_app.evidence.stability.verdict import MISJUDGED_ALLOWANCE_J, judge
 from study_app.haptics.model.slope_limits import delayed_force_fault, refusal_reason
 from tests.haptics.scenes import COMPILED
@@ -17,7 +17,7 @@ pytestmark = [pytest.mark.nightly, pytest.mark.slow]
 
 compiled = pytest.mark.skipif(not COMPILED, reason="many thousands of ticks")
 
-OTHER_LIQUIDS = {"non-Newtonian liquids": materials, "liquids of physical2": of_physical2}
+OTHER_LIQUIDS = {"non-Newtonian liquids": materials, "liquids of physical2": physical2_liquids}
 
 
 @compiled

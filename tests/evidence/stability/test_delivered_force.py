@@ -44,7 +44,7 @@ def test_the_parts_of_the_law_on_the_true_motion_are_the_law() -> None:
         case = Case(liquid=liquid, scale=delivered_force.scenes()[liquid].scale, plant="arm", mass_kg=0.2)
         scene = delivered_force.without_buoyancy(delivered_force.scene_of(case))
         trace = delivered_force.Bench(case, scene=scene).follow(delivered_force.random_path(1.6, 1000.0)[:4000])
-        parts_n = delivered_force._parts(scene, trace)
+        parts_n = delivered_force._law_parts(scene, trace)
         law_n = delivered_force.law_along(scene, trace) @ delivered_force.DIRECTION
         assert tuple(parts_n) == names
         assert sum(parts_n.values()) == pytest.approx(law_n, abs=1e-9)

@@ -26,7 +26,7 @@ def test_no_filter_of_counted_positions_finds_the_velocity_better(count_m: float
     turns, power_m2 = bounds._spectrum(1000.0)
     phase = np.random.default_rng(7).uniform(0, 2 * np.pi, len(turns))
     x_m = np.sqrt(2 * power_m2) * np.exp(1j * phase)
-    places_m, speeds_mps = bounds._course(x_m), bounds._course(turns * x_m)
+    places_m, speeds_mps = bounds._signal(x_m), bounds._signal(turns * x_m)
     seen_m = np.rint(places_m / count_m) * count_m
     rows = np.arange(300, len(seen_m) - delay)
     past_m = np.column_stack([seen_m[rows - k] for k in range(300)])
