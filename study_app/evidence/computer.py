@@ -1,6 +1,6 @@
-"""The computer on which times are measured: its description, and what else it does meanwhile.
+"""The computer on which times are measured: its description, and the load during a measurement.
 
-Windows are lent by ``app.delay_session``.
+``app.delay_session`` provides the windows.
 """
 
 import os
@@ -36,7 +36,7 @@ import os, sys, threading
 threading.Thread(target=lambda: (sys.stdin.read(), os._exit(0)), daemon=True).start()
 while True:
     sum(range(100_000))
-"""  # ends when this program closes the pipe, or ends: the parent's ID of a process never changes on Windows
+"""  # ends when this program closes the pipe or ends; on Windows a process cannot detect that by its parent's ID
 
 
 class Windows(Protocol):
@@ -66,11 +66,11 @@ def under_load(load: LoadName, windows: Windows | None, work: Callable[[], _T]) 
 def busy_cores(count: int | None = None) -> Iterator[None]:
     """Keep every core busy with a Python process; the processes end when this one does."""
     command = [sys.executable, "-S", "-c", _BUSY]
-    busy = [subprocess.Popen(command, stdin=subprocess.PIPE) for _ in range(count or os.cpu_count() or 1)]  # noqa: S603 - our own words
+    processes = [subprocess.Popen(command, stdin=subprocess.PIPE) for _ in range(count or os.cpu_count() or 1)]  # noqa: S603 - a fixed command
     try:
         yield
     finally:
-        for process in busy:
+        for process in processes:
             process.terminate()
-        for one in busy:
-            one.communicate()
+        for process in processes:
+            process.communicate()

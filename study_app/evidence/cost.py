@@ -1,4 +1,4 @@
-"""The computation time of a scene: nanoseconds per tick of the servo's own code, in total and of each effect."""
+"""The computation time of a scene: nanoseconds per tick of the servo's own code, in total and per effect."""
 
 import statistics
 import time
@@ -35,15 +35,21 @@ def measure(scene: Scene, *, batches: int = _BATCHES) -> Cost:
     """Measure a scene and its variants in alternating batches, so that other load affects all alike."""
     scene = resolve(scene)
     rest = scene.model_copy(update={"liquids": ()})
-    pairs = _pairs(scene)
+    pairs = _scene_pairs(scene)
     benches = {
-        it: TickTimer(it) for it in dict.fromkeys([scene, rest, *(it for pair in pairs.values() for it in pair)])
+        measured_scene: TickTimer(measured_scene)
+        for measured_scene in dict.fromkeys(
+            [scene, rest, *(measured_scene for pair in pairs.values() for measured_scene in pair)]
+        )
     }
     for _ in range(batches):
         for bench in benches.values():
-            bench.batch()
-    cost_ns = {it: statistics.median(bench.costs_ns) for it, bench in benches.items()}
-    effects_ns = {effect: cost_ns[having] - cost_ns[lacking] for effect, (having, lacking) in pairs.items()}
+            bench.run_batch()
+    cost_ns = {measured_scene: statistics.median(bench.costs_ns) for measured_scene, bench in benches.items()}
+    effects_ns = {
+        effect: cost_ns[with_effect] - cost_ns[without_effect]
+        for effect, (with_effect, without_effect) in pairs.items()
+    }
     return Cost(cost_ns[scene], cost_ns[rest], effects_ns)
 
 
@@ -51,8 +57,8 @@ def report(scene: Scene, *, batches: int = _BATCHES) -> str:
     """Return the effects of a scene, with reasons and computation times, as text."""
     cost = measure(scene, batches=batches)
     percent = 100 * cost.scene_ns * 1e-9 * scene.rate_hz
-    whole = f"one tick: {cost.scene_ns:.0f} ns, {percent:.2f} % of the tick period"
-    return "\n".join((*describe_gate(scene, cost.effects_ns), "", f"{whole}; without liquids, {cost.rest_ns:.0f} ns"))
+    total = f"one tick: {cost.scene_ns:.0f} ns, {percent:.2f} % of the tick period"
+    return "\n".join((*describe_gate(scene, cost.effects_ns), "", f"{total}; without liquids, {cost.rest_ns:.0f} ns"))
 
 
 def hand_motion(ticks: int = _WARM_UP) -> Floats:
@@ -73,7 +79,7 @@ class TickTimer:
         self.costs_ns: list[float] = []
         self.run(_WARM_UP)
 
-    def batch(self) -> None:
+    def run_batch(self) -> None:
         began = time.perf_counter_ns()
         self.run(_BATCH)
         self.costs_ns.append((time.perf_counter_ns() - began) / _BATCH)
@@ -83,7 +89,7 @@ class TickTimer:
         self._ticks += ticks
 
 
-def _pairs(scene: Scene) -> dict[tuple[str, Effect], tuple[Scene, Scene]]:
+def _scene_pairs(scene: Scene) -> dict[tuple[str, Effect], tuple[Scene, Scene]]:
     """Return, for each effect, a scene with it and one without it."""
     pairs: dict[tuple[str, Effect], tuple[Scene, Scene]] = {}
     liquids = {liquid.id: liquid for liquid in scene.liquids}

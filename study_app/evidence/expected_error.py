@@ -1,7 +1,7 @@
-"""The expected result of a scene's choice of effects: its time per tick, and its force error during strokes of a hand.
+"""The expected result of a scene's choice of effects: the time per tick, and the force error during strokes of a hand.
 
-The hand makes back-and-forth strokes with the greatest speed and acceleration of the scene's motion, quantised to
-encoder counts, with the scene's velocity estimator. The force is the one sent, after limits.
+The hand makes back-and-forth strokes with the greatest speed and acceleration of the scene's motion. Positions are
+quantised to encoder counts, velocities come from the scene's estimator, and the force is the one sent, after limits.
 """
 
 import itertools
@@ -44,15 +44,15 @@ from study_app.lab.identify.measured_force import vectors_x
 from study_app.number_text import counted
 
 _SETTLED: Final = 2 / 3
-"""After this share of the strokes the flow no longer depends on their start."""
+"""Share of the strokes after which the flow no longer depends on their start."""
 
 
 class Causes(NamedTuple):
     """The change in force due to each cause along the same strokes: RMS of the change over RMS of the reference.
 
-    The causes lead from the reference to the force sent, one step each: the scene's effects with exact velocities
-    (``law``), smoothed dw/dt (``acceleration``), velocities estimated from encoder counts (``velocity``), and the
-    safety layer for a device with this delay (``limits``).
+    The causes are added one after the other, from the reference to the force sent: the scene's effects with exact
+    velocities (``law``), smoothed dw/dt (``acceleration``), velocities estimated from encoder counts (``velocity``),
+    and the safety layer for a device with this delay (``limits``).
     """
 
     velocity: float = 0.0
@@ -84,17 +84,19 @@ def expected(scene: Scene, delay_ticks: int = ASSUMED_TICKS) -> Expected:
 def error_report(scene: Scene, delay_ticks: int = ASSUMED_TICKS) -> str:
     """Return the expected error on a device with a delay as one line of text."""
     error_share, error_n, causes, against = _errors(resolve(scene), delay_ticks)
-    split = (f"{name} {f'{100 * it:.2g} %' if it > ROUNDING else 'none'}" for name, it in causes._asdict().items())
+    shares = (
+        f"{name} {f'{100 * share:.2g} %' if share > ROUNDING else 'none'}" for name, share in causes._asdict().items()
+    )
     return (
         f"expected error in the fastest strokes with a delay of {counted(delay_ticks, 'tick')}: {error_n:.2g} N, "
-        f"{100 * error_share:.2g} % of the force; causes: {', '.join(split)}; reference: {against}"
+        f"{100 * error_share:.2g} % of the force; causes: {', '.join(shares)}; reference: {against}"
     )
 
 
 def acting_report(scene: Scene) -> str:
-    """Return, for each liquid, how much of each part of its force acts on the hand at two and three ticks of delay.
+    """Return, for each liquid, the share of each part of its force that acts on the hand after two and three ticks.
 
-    If ``kalman`` would have a smaller error than the scene's estimator, its values follow.
+    If ``kalman`` would have a smaller error than the scene's estimator, its shares are added.
     """
     lines: list[str] = []
     if scene.velocity.kind == "given":
@@ -102,15 +104,15 @@ def acting_report(scene: Scene) -> str:
     for liquid in resolve(scene).liquids:
         if not set(liquid.effects) - {"buoyancy", "current", "surface"}:
             continue
-        alone = _alone(scene, liquid)
-        own, of_kalman = (_acting_by_delay(alone, velocity) for velocity in (scene.velocity, Kalman()))
-        better = [ticks for ticks in _LATE_TICKS if of_kalman[ticks].error < own[ticks].error]
+        single = _single_liquid_scene(scene, liquid)
+        current, kalman = (_acting_by_delay(single, velocity) for velocity in (scene.velocity, Kalman()))
+        better_ticks = [ticks for ticks in _LATE_TICKS if kalman[ticks].error < current[ticks].error]
         lines.append(
             f"delivered force of {liquid.id} (hand: medium grip, 0.2 kg, {WHOLE}; estimator {scene.velocity.kind}): "
-            f"{_acting_text(own)}"
+            f"{_acting_text(current)}"
         )
-        if better:
-            lines.append(f'  with velocity = {{ kind = "kalman" }}: {_acting_text(of_kalman)}')
+        if better_ticks:
+            lines.append(f'  with velocity = {{ kind = "kalman" }}: {_acting_text(kalman)}')
     return "\n".join(lines)
 
 
@@ -118,7 +120,7 @@ _LATE_TICKS: Final = (2, 3)
 
 
 def _acting_by_delay(scene: Scene, velocity: Velocity) -> dict[int, Acting]:
-    """Return what acts of a scene's force with an estimator, by ticks of delay."""
+    """Return the force that acts on the hand with an estimator, by ticks of delay."""
     scene = without_buoyancy(scene.model_copy(update={"velocity": velocity}))
     return {ticks: acting_on_sine(case_of(scene, velocity.kind, ticks), scene) for ticks in _LATE_TICKS}
 
@@ -132,56 +134,60 @@ def _acting_text(by_ticks: Mapping[int, Acting]) -> str:
     )
 
 
-def _alone(scene: Scene, liquid: Liquid) -> Scene:
+def _single_liquid_scene(scene: Scene, liquid: Liquid) -> Scene:
     """Return a scene that the liquid fills, without a current and a surface."""
-    whole = liquid.model_copy(update={"region": Everywhere(), "current": None})
-    named: tuple[Effect, ...] = () if liquid.effects == "auto" else liquid.effects
-    kept = tuple(it for it in named if it not in {"current", "surface"})
-    return with_effects(scene.model_copy(update={"liquids": (whole,)}), *kept)
+    filling = liquid.model_copy(update={"region": Everywhere(), "current": None})
+    effects: tuple[Effect, ...] = () if liquid.effects == "auto" else liquid.effects
+    kept_effects = tuple(effect for effect in effects if effect not in {"current", "surface"})
+    return with_effects(scene.model_copy(update={"liquids": (filling,)}), *kept_effects)
 
 
 def _errors(scene: Scene, delay_ticks: int) -> tuple[float, float, Causes, str]:
     if not scene.liquids:
         return 0.0, 0.0, Causes(), "a scene without liquids"
-    return max((_of_one(scene, index, delay_ticks) for index in range(len(scene.liquids))), key=lambda it: it[1])
+    return max(
+        (_liquid_errors(scene, index, delay_ticks) for index in range(len(scene.liquids))), key=lambda errors: errors[1]
+    )
 
 
-def _of_one(scene: Scene, index: int, delay_ticks: int) -> tuple[float, float, Causes, str]:
+def _liquid_errors(scene: Scene, index: int, delay_ticks: int) -> tuple[float, float, Causes, str]:
     """Return the errors of one liquid, as if it filled the scene without a current."""
-    alone = _alone(scene, scene.liquids[index])
-    liquid = alone.liquids[0]
-    kept: tuple[Effect, ...] = () if liquid.effects == "auto" else liquid.effects
-    box = alone.motion_in(liquid)
-    speed_mps, rate_per_s = box.speed_mps or math.nan, reference_solutions.strokes_per_s(alone)
-    motion = stroke_motion(speed_mps, rate_per_s, CYCLES, alone.rate_hz)
-    if "unsteady_drag" in kept:
-        even_s = np.full(len(motion.t_s), 1 / alone.rate_hz)
-        lift_n = np.array([0.0, _lift_n(alone), 0.0])
+    single = _single_liquid_scene(scene, scene.liquids[index])
+    liquid = single.liquids[0]
+    effects: tuple[Effect, ...] = () if liquid.effects == "auto" else liquid.effects
+    motion_range = single.motion_in(liquid)
+    speed_mps, rate_per_s = motion_range.speed_mps or math.nan, reference_solutions.strokes_per_s(single)
+    motion = stroke_motion(speed_mps, rate_per_s, CYCLES, single.rate_hz)
+    if "unsteady_drag" in effects:
+        intervals_s = np.full(len(motion.t_s), 1 / single.rate_hz)
+        lift_n = np.array([0.0, _lift_n(single), 0.0])
         v, dv = _stroke(speed_mps, rate_per_s, motion.t_s)
-        true_n = unsteady_n(alone, vectors_x(v), vectors_x(dv), even_s) + lift_n
+        reference_n = unsteady_n(single, vectors_x(v), vectors_x(dv), intervals_s) + lift_n
         against = "the law of unsteady drag, which is within 8 % of a fluid solver at Re 0.3 to 100, and buoyancy"
-    elif "non_newtonian" in kept:
-        true_n = _non_newtonian_n(alone, motion, speed_mps, rate_per_s)
+    elif "non_newtonian" in effects:
+        reference_n = _non_newtonian_n(single, motion, speed_mps, rate_per_s)
         against = f"the {liquid.non_newtonian.kind} law (no reference in unsteady flow), added mass and buoyancy"
-    elif liquid.viscosity_pa_s is not None and liquid.drag.law != "linear" and not {"wake", "local_wake"} & set(kept):
-        true_n = physical_n(alone, speed_mps, rate_per_s, motion.t_s)
+    elif (
+        liquid.viscosity_pa_s is not None and liquid.drag.law != "linear" and not {"wake", "local_wake"} & set(effects)
+    ):
+        reference_n = physical_n(single, speed_mps, rate_per_s, motion.t_s)
         against = "experimental drag, added mass, buoyancy and the history force of creeping flow (an upper bound)"
     else:
-        kept = tuple(it for it in kept if it in {"drag", "wake", "local_wake"})
-        alone = with_effects(alone, *kept)
-        true_n = _defined_n(alone, motion)
-        against = f"the definition of {' and '.join(kept).replace('_', ' ') or 'nothing'}"
-    if not true_n.any():
+        effects = tuple(effect for effect in effects if effect in {"drag", "wake", "local_wake"})
+        single = with_effects(single, *effects)
+        reference_n = _defined_n(single, motion)
+        against = f"the definition of {' and '.join(effects).replace('_', ' ') or 'nothing'}"
+    if not reference_n.any():
         return 0.0, 0.0, Causes(), against
-    truth = Truth(name="", source="", cases=(Case(motion, true_n, motion.t_s >= _SETTLED * motion.t_s[-1]),))
-    steps_n = [true_n, *_forces(alone, motion, Dynamics(delay_ticks / alone.rate_hz, COUNT_M))]
+    truth = Truth(name="", source="", cases=(Case(motion, reference_n, motion.t_s >= _SETTLED * motion.t_s[-1]),))
+    steps_n = [reference_n, *_forces(single, motion, Dynamics(delay_ticks / single.rate_hz, COUNT_M))]
     law, acceleration, velocity, limits = (
-        error_of([true_n + after_n - before_n], truth).rms for before_n, after_n in itertools.pairwise(steps_n)
+        error_of([reference_n + after_n - before_n], truth).rms for before_n, after_n in itertools.pairwise(steps_n)
     )
-    whole = error_of(steps_n[-1:], truth)
+    total = error_of(steps_n[-1:], truth)
     return (
-        whole.rms,
-        whole.rms_n,
+        total.rms,
+        total.rms_n,
         Causes(velocity=velocity, acceleration=acceleration, limits=limits, law=law),
         against,
     )
@@ -192,12 +198,12 @@ def _forces(scene: Scene, motion: Motion, dynamics: Dynamics) -> Iterator[Floats
     yield samples_along(scene, motion, dynamics).force_n
     yield samples_along(scene, motion, dynamics, smooths=True).force_n
     step_m = dynamics.count_m * scene.scale
-    seen = (
+    measured = (
         motion if scene.velocity.kind == "given" else Motion(motion.t_s, np.rint(motion.position_m / step_m) * step_m)
     )
-    felt = samples_along(scene, seen, dynamics)
-    yield felt.force_n
-    yield felt.device_force_n
+    samples = samples_along(scene, measured, dynamics)
+    yield samples.force_n
+    yield samples.device_force_n
 
 
 def physical_n(scene: Scene, speed_mps: float, rate_per_s: float, t_s: Floats) -> Floats:
@@ -250,9 +256,9 @@ def _defined_n(scene: Scene, motion: Motion) -> Floats:
 
 
 def _local_wake(scene: Scene, wake: LocalWake, v: Floats, motion: Motion) -> Floats:
-    upright = 1.0 if wake.axes == "xyz" else 0.0
-    found: Floats = local_wakes(
-        v * np.array([1.0, upright, 1.0]),
+    vertical = 1.0 if wake.axes == "xyz" else 0.0
+    wake_mps: Floats = local_wakes(
+        v * np.array([1.0, vertical, 1.0]),
         motion.position_m,
         np.full(len(v), 1 / scene.rate_hz),
         max(1, math.floor(wake.length * scene.rate_hz / 1000)),
@@ -262,4 +268,4 @@ def _local_wake(scene: Scene, wake: LocalWake, v: Floats, motion: Motion) -> Flo
         wake.reach_m or scene.body.diameter_m,
         wake.spreading_m2ps,
     )
-    return found
+    return wake_mps

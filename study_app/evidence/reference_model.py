@@ -1,10 +1,10 @@
 """The force by its literal definition: slow, simple, and the reference for the program.
 
-Every element of the wake is stored as it was, with its segment and the time; every wake sums all elements again, each
-decayed by its age, with compensation of rounding errors (Neumaier 1974, ZAMM 54:39). Unsteady drag is written from the
-law's equations, with exact exponentials for every step, and with the acceleration and the constants given. The steady
-force of non-Newtonian drag is that of ``haptics.model.laws``; its states are integrated in many steps per
-tick. Nothing shares code or constants with ``haptics.kernels.effects``.
+Every element of the wake is stored unchanged, with its segment and time. Every wake is the sum of all elements, each
+decayed by its age, with compensation of rounding errors (Neumaier 1974, ZAMM 54:39). Unsteady drag follows the
+equations of the law, with exact exponentials for every step, from a given acceleration and given constants. The steady
+force of non-Newtonian drag is that of ``haptics.model.laws``, and its states are integrated in many steps per tick. No
+code or constants are shared with ``haptics.kernels.effects``.
 """
 
 import math
@@ -35,9 +35,9 @@ def respond(scene: Scene, motion: Motion) -> Response:
     liquid = scene.liquids[0]
     interval_s = np.clip(np.diff(motion.t_s, prepend=motion.t_s[0] - 1 / scene.rate_hz), 0.2e-3, 20e-3)
     interval_s[0] = 1 / scene.rate_hz
-    given = motion.velocity_mps if motion.velocity_mps is not None else _filter_velocity(scene, motion, interval_s)
+    scene_mps = motion.velocity_mps if motion.velocity_mps is not None else _filter_velocity(scene, motion, interval_s)
     velocity_mps = (
-        given if liquid.drag.law == "linear" else np.array([compress_speed(row, scene.knee) for row in given])
+        scene_mps if liquid.drag.law == "linear" else np.array([compress_speed(row, scene.knee) for row in scene_mps])
     )
     wake_mps: Floats = np.zeros_like(velocity_mps)
     size_mps: Floats = np.zeros(len(velocity_mps))
@@ -62,11 +62,11 @@ def resistance_nspm(scene: Scene, speed_mps: float) -> float:
     reynolds = liquid.density_kg_m3 * speed_mps * diameter_m / viscosity_pa_s
     if reynolds < 1e-12:
         return 3 * math.pi * viscosity_pa_s * diameter_m
-    held = min(reynolds, 2e5)
+    clipped = min(reynolds, 2e5)
     coefficient = {
-        "schiller-naumann": max(24 / held * (1 + 0.15 * held**0.687), 0.44),
-        "haider-levenspiel": 24 / held * (1 + 0.1806 * held**0.6459) + 0.4251 / (1 + 6880.95 / held),
-        "brown-lawler": 24 / held * (1 + 0.150 * held**0.681) + 0.407 / (1 + 8710 / held),
+        "schiller-naumann": max(24 / clipped * (1 + 0.15 * clipped**0.687), 0.44),
+        "haider-levenspiel": 24 / clipped * (1 + 0.1806 * clipped**0.6459) + 0.4251 / (1 + 6880.95 / clipped),
+        "brown-lawler": 24 / clipped * (1 + 0.150 * clipped**0.681) + 0.407 / (1 + 8710 / clipped),
     }[liquid.drag.law]
     return float(pressure_kg_m * coefficient * speed_mps)
 
@@ -89,8 +89,8 @@ def compress_speed(velocity_mps: Floats, knee: Knee) -> Floats:
     excess = speed - knee.threshold_mps
     if excess <= 0 or knee.law == "none":
         return velocity_mps
-    wanted = knee.threshold_mps + (math.sqrt(1 + 2 * excess) - 1 if knee.law == "sqrt" else excess**2)
-    return velocity_mps * (wanted / speed)
+    compressed = knee.threshold_mps + (math.sqrt(1 + 2 * excess) - 1 if knee.law == "sqrt" else excess**2)
+    return velocity_mps * (compressed / speed)
 
 
 _WAKE_LIST = np.dtype(
@@ -127,12 +127,12 @@ _REST_MPS: Final = 1e-3
 
 def new_wake_list(wake: Wake, rate_hz: float) -> tuple[Any, Any]:
     """Return an empty wake list: `_WAKE_LIST` (1,) and its elements (N,) `_ELEMENT`."""
-    made, length = records(_WAKE_LIST, 1), max(1, math.floor(wake.length * rate_hz / 1000))
-    made.length, made.scaling = length, max(wake.scaling * rate_hz / 1000, length)
-    made.exponent, made.resolution_m = wake.exponent, wake.resolution_m
-    made.breaking_cosine = math.cos(math.radians(wake.breaking_angle_deg))
-    made.breaking_span_m, made.log_decay_pns = wake.breaking_span_m, math.log(wake.decay) * 1e-6
-    return made, records(_ELEMENT, length)
+    wake_list, length = records(_WAKE_LIST, 1), max(1, math.floor(wake.length * rate_hz / 1000))
+    wake_list.length, wake_list.scaling = length, max(wake.scaling * rate_hz / 1000, length)
+    wake_list.exponent, wake_list.resolution_m = wake.exponent, wake.resolution_m
+    wake_list.breaking_cosine = math.cos(math.radians(wake.breaking_angle_deg))
+    wake_list.breaking_span_m, wake_list.log_decay_pns = wake.breaking_span_m, math.log(wake.decay) * 1e-6
+    return wake_list, records(_ELEMENT, length)
 
 
 def wakes(
@@ -140,8 +140,8 @@ def wakes(
 ) -> tuple[Floats, Floats]:
     """Return v_wake (n, 3) used by each tick's drag, and Σ|e|/S (n,), for velocities (n, 3) of the tail."""
     wake_mps, size_mps = np.zeros_like(h_mps), np.zeros(len(h_mps))
-    made, elements = new_wake_list(wake, rate_hz)
-    _wakes(made[0], elements, h_mps, position_m, np.rint(interval_s * 1e9).astype(np.int64), wake_mps, size_mps)
+    wake_list, elements = new_wake_list(wake, rate_hz)
+    _wakes(wake_list[0], elements, h_mps, position_m, np.rint(interval_s * 1e9).astype(np.int64), wake_mps, size_mps)
     return wake_mps, size_mps
 
 
@@ -156,14 +156,14 @@ def _wakes(
 
 @kernel
 def store_element(wake: Any, elements: Any, h_mps: Any, position_m: Any, interval_ns: int) -> None:
-    """Let time pass, and store the velocity ``h_mps`` (3,) at ``position_m`` (3,) if the rules require it."""
+    """Advance the time, and store the velocity ``h_mps`` (3,) at ``position_m`` (3,) if the rules require it."""
     speed_mps = norm(h_mps)
     wake.age_ns += interval_ns
     wake.arc_m += speed_mps * (interval_ns * 1e-9)
     rests = speed_mps < _REST_MPS
     if not rests and wake.stored > 0 and distance(position_m, wake.stored_at_m) < wake.resolution_m:
         return
-    if not rests and _breaks(wake, elements, h_mps, speed_mps):
+    if not rests and _begins_segment(wake, elements, h_mps, speed_mps):
         wake.segment += 1
     element = elements[wake.stored % wake.length]
     copy(h_mps, element.velocity_mps)
@@ -175,7 +175,7 @@ def store_element(wake: Any, elements: Any, h_mps: Any, position_m: Any, interva
 
 
 @kernel
-def _breaks(wake: Any, elements: Any, h_mps: Any, speed_mps: float) -> bool:
+def _begins_segment(wake: Any, elements: Any, h_mps: Any, speed_mps: float) -> bool:
     """Return whether a velocity begins a new segment; the search starts at the newest element."""
     reference = -1
     for number in range(wake.stored - 1, wake.stored - wake.held - 1, -1):
@@ -271,14 +271,14 @@ def local_wakes(
         for j in range(k - 1, max(k - 1 - length, -1), -1):
             speed = math.sqrt(np.sum(h_mps[j] ** 2))
             if speed >= 1e-3:
-                wide_m2 = reach_m**2 + 2 * spreading_m2ps * age_s
-                fades = decay ** (age_s / 1e-3)
-                felt = (reach_m**2 / wide_m2) ** 1.5 * math.exp(
-                    -0.5 * np.sum((position_m[k] - position_m[j]) ** 2) / wide_m2
+                spread_m2 = reach_m**2 + 2 * spreading_m2ps * age_s
+                decayed = decay ** (age_s / 1e-3)
+                proximity = (reach_m**2 / spread_m2) ** 1.5 * math.exp(
+                    -0.5 * np.sum((position_m[k] - position_m[j]) ** 2) / spread_m2
                 )
-                tail += felt * fades * h_mps[j] / scaling
-                speeds += felt * fades * speed
-                squares += felt * (fades * speed) ** 2
+                tail += proximity * decayed * h_mps[j] / scaling
+                speeds += proximity * decayed * speed
+                squares += proximity * (decayed * speed) ** 2
             age_s += interval_s[j]
         if speeds > 0.0:
             wake_mps[k] = tail * _gain(math.sqrt(np.sum(tail**2)) * speeds / squares, exponent)
@@ -336,7 +336,12 @@ def unsteady_n(
 
 @evidence_kernel
 def late_mps(
-    w_mps: Floats, acceleration_mps2: Floats, interval_s: Floats, diameter_m: float, nu_m2ps: float, of: Constants
+    w_mps: Floats,
+    acceleration_mps2: Floats,
+    interval_s: Floats,
+    diameter_m: float,
+    nu_m2ps: float,
+    constants: Constants,
 ) -> Floats:
     """Return y + h (n, d) [m/s], excess drag and history over the Stokes drag per unit speed, in d dimensions."""
     result = np.empty_like(w_mps)
@@ -350,14 +355,14 @@ def late_mps(
         overtaking = min(max(1 - (w * z).sum() / z2, 0.0), 1.0) if z2 > 0 else 0.0
         back = min(max(-(w * s).sum() / s2, 0.0), 1.0) if s2 > 0 else 0.0
         re_u = u_mps * diameter_m / nu_m2ps
-        e = w - re_u / (re_u + of.r_0) * (of.beta * overtaking * z + back * s)
+        e = w - re_u / (re_u + constants.r_0) * (constants.beta * overtaking * z + back * s)
         phi = over_stokes(math.sqrt((e**2).sum()) * diameter_m / nu_m2ps)
-        y = y - math.expm1(-of.c_y * u_mps / diameter_m * dt) * (phi * e - w - y)
-        z = z - math.expm1(-of.c_z * u_mps / diameter_m * dt) * (w - z)
-        s = s - math.expm1(-of.c_s * u_mps / diameter_m * dt) * (w - s)
+        y = y - math.expm1(-constants.c_y * u_mps / diameter_m * dt) * (phi * e - w - y)
+        z = z - math.expm1(-constants.c_z * u_mps / diameter_m * dt) * (w - z)
+        s = s - math.expm1(-constants.c_s * u_mps / diameter_m * dt) * (w - s)
         remembered = 2 * math.sqrt(dt) * dw
         for i in range(len(_RATES_PER_S)):
-            decay_per_s = _RATES_PER_S[i] + of.c_m * u_mps / diameter_m
+            decay_per_s = _RATES_PER_S[i] + constants.c_m * u_mps / diameter_m
             gained_s = -math.expm1(-decay_per_s * dt) / decay_per_s
             m[i] = math.exp(-decay_per_s * dt) * m[i] + gained_s * dw
             remembered = remembered + _WEIGHTS_RPS[i] * (m[i] - gained_s * dw)
@@ -366,7 +371,7 @@ def late_mps(
 
 
 _STEPS: Final = 50
-"""Of the elastic state, in a tick."""
+"""Integration steps of the elastic state per tick."""
 
 
 def non_newtonian_n(scene: Scene, w_mps: Floats, interval_s: Floats, *, slack_m: float = 0.0) -> Floats:
@@ -379,16 +384,16 @@ def non_newtonian_n(scene: Scene, w_mps: Floats, interval_s: Floats, *, slack_m:
     law = liquid.non_newtonian
     speeds_mps = np.linalg.norm(w_mps, axis=1)
     if isinstance(law, Maxwell):
-        met_mps = _relax_velocity(w_mps, interval_s, law.relaxation_time_s)
-        held, speeds_mps = np.zeros_like(w_mps), np.linalg.norm(met_mps, axis=1)
+        viscous_mps = _relax_velocity(w_mps, interval_s, law.relaxation_time_s)
+        held, speeds_mps = np.zeros_like(w_mps), np.linalg.norm(viscous_mps, axis=1)
     else:
-        met_mps, held = w_mps, np.zeros_like(w_mps)
+        viscous_mps, held = w_mps, np.zeros_like(w_mps)
         if (yield_n := laws.yield_n(law, diameter_m)) > 0:
             per_m = STIFFNESS_NPM / scene.scale / yield_n
             held = _strains(w_mps, interval_s, per_m, slack_m)
     parts_n = [laws.steady_force_n(law, liquid.density_kg_m3, diameter_m, float(speed)) for speed in speeds_mps]
     held_n, viscous_n = np.array(parts_n).T
-    directions = met_mps / np.maximum(speeds_mps, math.ulp(0.0))[:, np.newaxis]
+    directions = viscous_mps / np.maximum(speeds_mps, math.ulp(0.0))[:, np.newaxis]
     force_n: Floats = -(held_n[:, np.newaxis] * held + viscous_n[:, np.newaxis] * directions)
     return force_n
 
@@ -397,8 +402,8 @@ def _relax_velocity(w_mps: Floats, interval_s: Floats, relaxation_s: float) -> F
     """Return v (n, 3) [m/s] that solves v' = (w − v)/λ, exact for a constant velocity in each tick."""
     v = np.zeros_like(w_mps)
     for k, w in enumerate(w_mps):
-        before = v[k - 1] if k else np.zeros(3)
-        v[k] = w + (before - w) * math.exp(-interval_s[k] / relaxation_s)
+        previous = v[k - 1] if k else np.zeros(3)
+        v[k] = w + (previous - w) * math.exp(-interval_s[k] / relaxation_s)
     return v
 
 

@@ -48,24 +48,24 @@ def stirring_motion(scale: float, rate_hz: float) -> Motion:
     Each segment has minimum jerk (Flash & Hogan 1985) with a small vertical motion: up to 0.18 m/s at the hand. In the
     scene, it is ``scale`` times as large.
     """
-    each_s = _STIRRING_S + _REST_S
-    t_s = np.arange(round(_STRETCHES * each_s * rate_hz) + 1) / rate_hz
-    stretch = np.minimum(np.floor(t_s / each_s + 1e-9), _STRETCHES - 1)
-    phase = np.clip((t_s - stretch * each_s) / _STIRRING_S, 0.0, 1.0)
-    forth = np.where(stretch % 2 == 0, 1.0, -1.0)
-    angle = 2 * math.pi * _TURNS * (phase**3 * (10 - 15 * phase + 6 * phase**2) * forth + (forth < 0))
-    angular_per_s = 2 * math.pi * _TURNS * forth * 30 * phase**2 * (1 - phase) ** 2 / _STIRRING_S
+    stretch_s = _STIRRING_S + _REST_S
+    t_s = np.arange(round(_STRETCHES * stretch_s * rate_hz) + 1) / rate_hz
+    stretch = np.minimum(np.floor(t_s / stretch_s + 1e-9), _STRETCHES - 1)
+    phase = np.clip((t_s - stretch * stretch_s) / _STIRRING_S, 0.0, 1.0)
+    direction = np.where(stretch % 2 == 0, 1.0, -1.0)
+    angle = 2 * math.pi * _TURNS * (phase**3 * (10 - 15 * phase + 6 * phase**2) * direction + (direction < 0))
+    angular_per_s = 2 * math.pi * _TURNS * direction * 30 * phase**2 * (1 - phase) ** 2 / _STIRRING_S
     radius_m = scale * _RADIUS_M
     position_m = radius_m * np.column_stack([np.cos(angle), 0.1 * np.cos(2 * angle), np.sin(angle)])
-    along = radius_m * np.column_stack([-np.sin(angle), -0.2 * np.sin(2 * angle), np.cos(angle)])
-    return Motion(t_s, position_m, velocity_mps=along * angular_per_s[:, np.newaxis])
+    tangent = radius_m * np.column_stack([-np.sin(angle), -0.2 * np.sin(2 * angle), np.cos(angle)])
+    return Motion(t_s, position_m, velocity_mps=tangent * angular_per_s[:, np.newaxis])
 
 
 def stroke_motion(speed_mps: float, rate_per_s: float, cycles: int, rate_hz: float) -> Motion:
     """Return back-and-forth strokes along x, v = speed · sin ωt with ω = ``rate_per_s``."""
     t_s = np.arange(round(cycles * 2 * math.pi / rate_per_s * rate_hz) + 1) / rate_hz
-    way_m = speed_mps / rate_per_s * (1 - np.cos(rate_per_s * t_s))
-    return along_x(t_s, way_m, speed_mps * np.sin(rate_per_s * t_s))
+    position_m = speed_mps / rate_per_s * (1 - np.cos(rate_per_s * t_s))
+    return along_x(t_s, position_m, speed_mps * np.sin(rate_per_s * t_s))
 
 
 def with_velocity(motion: Motion) -> Motion:
@@ -75,9 +75,9 @@ def with_velocity(motion: Motion) -> Motion:
     return Motion(motion.t_s, motion.position_m, velocity_mps=np.gradient(motion.position_m, motion.t_s, axis=0))
 
 
-def along_x(t_s: Floats, way_m: Floats, velocity_mps: Floats) -> Motion:
-    """Return a motion along x."""
-    return Motion(t_s, vectors_x(way_m), velocity_mps=vectors_x(velocity_mps))
+def along_x(t_s: Floats, x_m: Floats, velocity_mps: Floats) -> Motion:
+    """Return a motion along x from times [s], positions [m] and velocities [m/s], each (n,)."""
+    return Motion(t_s, vectors_x(x_m), velocity_mps=vectors_x(velocity_mps))
 
 
 COUNT_M: Final = 38e-6
@@ -108,9 +108,9 @@ DRAG_POINTS: Final = (
     (2.317e5, 0.4046),
 )
 """(Re, C_d) of smooth spheres by experiment, below the drag crisis: CalcDEMma drag laboratory, Indiana University of
-Pennsylvania. Its lowest point (Re 0.0588, C_d 492) is left out: it is 20 % above Stokes, which is exact there. The next
-two are still 8 to 9 % above Oseen's law, and those around Re 1 to 2 some 4 to 7 % above the fluid solver: differences
-between laws of the Reynolds number that are as small cannot be separated from the scatter of the experiments."""
+Pennsylvania. Its lowest point (Re 0.0588, C_d 492) is omitted because it is 20 % above Stokes' law, which is exact
+there. The next two are still 8 to 9 % above Oseen's law, and those at Re 1 to 2 some 4 to 7 % above the fluid solver.
+Equally small differences between drag laws therefore cannot be distinguished from the scatter of the experiments."""
 
 _OSEEN_REYNOLDS: Final = 0.5
 _CREEPING_REYNOLDS: Final = 0.01
@@ -158,24 +158,24 @@ def measured_drag_n(liquid: Liquid, diameter_m: float, speed_mps: Floats) -> Flo
     Between the points, log C_d is a smooth monotonic interpolation over log Re (Fritsch & Carlson 1980); below them the
     force is proportional to the speed, above them to its square.
     """
-    per_mps = liquid.density_kg_m3 * diameter_m / (liquid.viscosity_pa_s or math.nan)
+    reynolds_per_mps = liquid.density_kg_m3 * diameter_m / (liquid.viscosity_pa_s or math.nan)
     points = np.log(np.array(DRAG_POINTS))
     least, most = DRAG_POINTS[0][0], DRAG_POINTS[-1][0]
-    reynolds = speed_mps * per_mps
-    held = np.clip(reynolds, least, most)
-    coefficient = np.exp(PchipInterpolator(points[:, 0], points[:, 1])(np.log(held)))
+    reynolds = speed_mps * reynolds_per_mps
+    clipped = np.clip(reynolds, least, most)
+    coefficient = np.exp(PchipInterpolator(points[:, 0], points[:, 1])(np.log(clipped)))
     pressure_kg_m = 0.5 * liquid.density_kg_m3 * math.pi * (diameter_m / 2) ** 2
-    force_n: Floats = pressure_kg_m * coefficient * speed_mps * np.maximum(speed_mps, least / per_mps)
+    force_n: Floats = pressure_kg_m * coefficient * speed_mps * np.maximum(speed_mps, least / reynolds_per_mps)
     return force_n
 
 
 def steady_truth(scene: Scene) -> Truth | None:
     """Return measured steady drag up to the scene's greatest speed, or None if all measurements are at higher Re."""
     liquid, diameter_m = scene.liquids[0], scene.body.diameter_m
-    per_mps = liquid.density_kg_m3 * diameter_m / (liquid.viscosity_pa_s or math.nan)
+    reynolds_per_mps = liquid.density_kg_m3 * diameter_m / (liquid.viscosity_pa_s or math.nan)
     fastest_mps = scene.motion_in(liquid).speed_mps or 0.0
     speeds = np.linspace(0, fastest_mps, _SPEEDS + 1)[1:]
-    known = speeds[(speeds * per_mps >= DRAG_POINTS[0][0]) & (speeds * per_mps <= DRAG_POINTS[-1][0])]
+    known = speeds[(speeds * reynolds_per_mps >= DRAG_POINTS[0][0]) & (speeds * reynolds_per_mps <= DRAG_POINTS[-1][0])]
     if len(known) == 0:
         return None
     forces = measured_drag_n(liquid, diameter_m, known)
@@ -184,11 +184,11 @@ def steady_truth(scene: Scene) -> Truth | None:
         t_s = np.arange(2) / scene.rate_hz
         motion = along_x(t_s, t_s * speed_mps, np.full(2, speed_mps))
         cases.append(Case(motion, vectors_x(np.full(2, -force_n)), np.array([False, True])))
-    between = f"Re {known[0] * per_mps:.2g} to {known[-1] * per_mps:.2g}"
+    between = f"Re {known[0] * reynolds_per_mps:.2g} to {known[-1] * reynolds_per_mps:.2g}"
     slow = [(reynolds, drag) for reynolds, drag in DRAG_POINTS if reynolds < _OSEEN_REYNOLDS]
     above = max(drag * reynolds / 24 / (1 + 3 / 16 * reynolds) - 1 for reynolds, drag in slow)  # C_d of Oseen 1910
     scatter = f", which lie up to {100 * above:.0f} % above Oseen's law for slow flow"
-    low = scatter if known[0] * per_mps < _OSEEN_REYNOLDS else ""
+    low = scatter if known[0] * reynolds_per_mps < _OSEEN_REYNOLDS else ""
     return Truth(name="steady drag", source=f"experiments with spheres, {between}{low}", cases=tuple(cases))
 
 
@@ -239,8 +239,8 @@ def creeping_mps(scene: Scene) -> float:
 
 def strokes_per_s(scene: Scene) -> float:
     """Return the angular frequency ω [1/s] of a stroke with the scene's greatest speed and acceleration."""
-    box = scene.motion_in(scene.liquids[0])
-    return (box.acceleration_mps2 or math.nan) / (box.speed_mps or math.nan)
+    motion_range = scene.motion_in(scene.liquids[0])
+    return (motion_range.acceleration_mps2 or math.nan) / (motion_range.speed_mps or math.nan)
 
 
 RELATIVE: Final = 0.05
@@ -267,14 +267,14 @@ class Error(NamedTuple):
 def error_of(forces_n: Sequence[Floats], truth: Truth) -> Error:
     """Return the errors of forces, one (n, 3) array per case of the reference."""
     true_n = np.concatenate([case.force_n[case.counted] for case in truth.cases])
-    felt_n = np.concatenate([force[case.counted] for force, case in zip(forces_n, truth.cases, strict=True)])
-    sizes_n = np.linalg.norm(true_n, axis=1)
-    wrong_n = np.linalg.norm(felt_n - true_n, axis=1)
-    true_rms_n, true_most_n = _rms(sizes_n), float(sizes_n.max())
-    rms_n, most_n = _rms(wrong_n), float(wrong_n.max())
-    counts = (sizes_n >= min(PERCEPTIBLE_N, RELATIVE * true_most_n)) & (np.linalg.norm(felt_n, axis=1) > 0)
-    cross = np.linalg.norm(np.cross(felt_n[counts], true_n[counts]), axis=1)
-    angles = np.degrees(np.arctan2(cross, (felt_n[counts] * true_n[counts]).sum(axis=1)))
+    actual_n = np.concatenate([force[case.counted] for force, case in zip(forces_n, truth.cases, strict=True)])
+    magnitudes_n = np.linalg.norm(true_n, axis=1)
+    error_n = np.linalg.norm(actual_n - true_n, axis=1)
+    true_rms_n, true_most_n = _rms(magnitudes_n), float(magnitudes_n.max())
+    rms_n, most_n = _rms(error_n), float(error_n.max())
+    perceptible = (magnitudes_n >= min(PERCEPTIBLE_N, RELATIVE * true_most_n)) & (np.linalg.norm(actual_n, axis=1) > 0)
+    cross = np.linalg.norm(np.cross(actual_n[perceptible], true_n[perceptible]), axis=1)
+    angles = np.degrees(np.arctan2(cross, (actual_n[perceptible] * true_n[perceptible]).sum(axis=1)))
     target = max(RELATIVE, PERCEPTIBLE_N / true_rms_n)
     direction_deg = _rms(angles) if len(angles) else math.nan
     return Error(

@@ -1,4 +1,4 @@
-"""The form of all evidence: a table in three forms, what a command prints and writes, and loops that take turns."""
+"""Common parts of all evidence: tables, the output of a command, and measurements that alternate."""
 
 import threading
 import time
@@ -15,17 +15,17 @@ from study_app.figure_style import PLOT_SETTINGS, file_bytes
 from study_app.store.files import csv_text_of, write_files
 
 TURN_S: Final = 0.25
-"""How long a loop runs until it is another's turn."""
-_LEAST_S: Final = 0.5
-_MOST_S: Final = 3600.0
+"""Duration of a turn of each loop [s]."""
+_MIN_S: Final = 0.5
+_MAX_S: Final = 3600.0
 
 _Arm = TypeVar("_Arm")
-_Found = TypeVar("_Found")
+_Result = TypeVar("_Result")
 
 
 @dataclass(frozen=True)
 class Table:
-    """Rows of cells below headings; the first ``left`` columns, or those named, are text, the others numbers."""
+    """Rows of cells below headings; the first ``left`` columns, or those with these indices, are text, left-aligned."""
 
     headings: Sequence[str]
     rows: Sequence[Sequence[object]]
@@ -34,20 +34,22 @@ class Table:
     def text(self) -> str:
         cells = [[str(cell) for cell in row] for row in (self.headings, *self.rows)]
         widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
-        aligned = [f"{'<' if words else '>'}{width}" for words, width in zip(self._words(), widths, strict=True)]
+        aligned = [
+            f"{'<' if is_text else '>'}{width}" for is_text, width in zip(self._are_text_columns(), widths, strict=True)
+        ]
         lines = ("  ".join(map(format, row, aligned)).rstrip() for row in cells)
         return "\n".join(lines)
 
     def markdown(self) -> str:
-        marks = ["---" if words else "--:" for words in self._words()]
+        marks = ["---" if is_text else "--:" for is_text in self._are_text_columns()]
         return "\n".join(f"| {' | '.join(map(str, row))} |" for row in (self.headings, marks, *self.rows))
 
     def csv(self) -> str:
         return csv_text_of([self.headings, *self.rows])
 
-    def _words(self) -> list[bool]:
-        words = range(self.left) if isinstance(self.left, int) else self.left
-        return [k in words for k in range(len(self.headings))]
+    def _are_text_columns(self) -> list[bool]:
+        text_columns = range(self.left) if isinstance(self.left, int) else self.left
+        return [k in text_columns for k in range(len(self.headings))]
 
 
 @dataclass(frozen=True)
@@ -76,11 +78,11 @@ class Evidence:
         return write_files(to, {**contents, **self.figures()})
 
 
-def plot_files(name: str, title: str, draw: Callable[..., Figure], *of: Any) -> Callable[[], Mapping[str, bytes]]:
+def plot_files(name: str, title: str, draw: Callable[..., Figure], *data: Any) -> Callable[[], Mapping[str, bytes]]:
     """Return a function that draws a figure as ``name.png`` and ``name.svg``."""
 
     def files() -> Mapping[str, bytes]:
-        figure = draw(*of)
+        figure = draw(*data)
         return {f"{name}.{kind}": file_bytes(figure, kind, title, PLOT_SETTINGS) for kind in ("png", "svg")}
 
     return files
@@ -95,23 +97,23 @@ def duration(ns: float) -> str:
 
 
 def run(
-    measure: Callable[..., _Found],
+    measure: Callable[..., _Result],
     cases: Iterable[Sequence[Any]],
     executor: Executor | None = None,
     progress: Callable[[int], object] = lambda _done: None,
-) -> tuple[_Found, ...]:
+) -> tuple[_Result, ...]:
     """Return the results of ``measure`` for each case; in parallel with an executor.
 
     ``progress`` is called with the number of finished cases.
     """
-    rows: list[_Found] = []
+    rows: list[_Result] = []
     for row in (map if executor is None else executor.map)(measure, *zip(*cases, strict=True)):
         rows.append(row)
         progress(len(rows))
     return tuple(rows)
 
 
-def check_seconds(seconds: float, what: str) -> None:
+def check_seconds(seconds: float, subject: str) -> None:
     """Raise an error if a duration is out of range.
 
     Raises
@@ -119,23 +121,23 @@ def check_seconds(seconds: float, what: str) -> None:
     StudyError
         The duration is out of range.
     """
-    if not _LEAST_S <= seconds <= _MOST_S:
-        raise StudyError(f"{what} for {_LEAST_S:g} to {_MOST_S:g} s, not {seconds:g}")
+    if not _MIN_S <= seconds <= _MAX_S:
+        raise StudyError(f"{subject} for {_MIN_S:g} to {_MAX_S:g} s, not {seconds:g}")
 
 
 def take_turns(
-    arms: Mapping[_Arm, Callable[[int], _Found]],
+    arms: Mapping[_Arm, Callable[[int], _Result]],
     rounds: int,
     *,
     ending: threading.Event,
     progress: Callable[[str], object] = lambda _line: None,
     alternating: bool = False,
-) -> dict[_Arm, list[_Found]]:
+) -> dict[_Arm, list[_Result]]:
     """Run each arm once per round, so that other load affects all alike; return the results by arm.
 
     An arm is called with the number of the round; with ``alternating``, every second round is in reverse order.
     """
-    rows: dict[_Arm, list[_Found]] = {arm: [] for arm in arms}
+    rows: dict[_Arm, list[_Result]] = {arm: [] for arm in arms}
     for number in range(rounds):
         for arm in reversed(tuple(arms)) if alternating and number % 2 else arms:
             if ending.is_set():

@@ -1,8 +1,8 @@
-"""Figures 3 to 8 of the thesis drawn anew: force over time per axis, by the servo's own tick.
+"""Figures 3 to 8 of the thesis, redrawn: force over time per axis, computed by the servo's own tick.
 
-They are programmed motions through the default liquid of its evaluation (Rek 2024, §5.1): density 1000 kg/m³, a ball of
-68 mm, N = S = 5000, y = 1, λ = 0.999975, breaking angle 45° between neighbouring elements; motions at 1 m/s with their
-exact velocity.
+They show programmed motions through the default liquid of the thesis' evaluation (Rek 2024, §5.1): density 1000 kg/m³,
+a ball of 68 mm, N = S = 5000, y = 1, λ = 0.999975, breaking angle 45° between neighbouring elements. The speed is 1
+m/s, and velocities are exact.
 """
 
 import textwrap
@@ -27,7 +27,7 @@ from study_app.store.files import make_folder, write_files
 _RATE_HZ: Final = 1000.0
 LENGTH: Final = 5000
 _RESOLUTIONS_M: Final = (0.0, 1.5e-3, 3.5e-3)
-"""Of Fig. 7: at 1 m/s every tick, every second and every fourth one leaves an element."""
+"""Resolutions in Fig. 7 [m]: at 1 m/s every tick, every second tick and every fourth tick stores an element."""
 EXPONENTS: Final = (0.25, 0.5, 1.0, 2.0, 4.0)
 
 
@@ -158,8 +158,8 @@ FIGURES: Final[tuple[Callable[[], ThesisFigure], ...]] = (figure_3, figure_4, fi
 
 def _stop_s(motion: Motion) -> float:
     """Return the time of the first tick after which the body is at rest [s]."""
-    rests = ~np.diff(motion.position_m, axis=0).any(axis=1)
-    return float(motion.t_s[int(np.argmax(rests))])
+    is_resting = ~np.diff(motion.position_m, axis=0).any(axis=1)
+    return float(motion.t_s[int(np.argmax(is_resting))])
 
 
 _PLOT_PT: Final = 128.0
@@ -188,72 +188,72 @@ def figures(to: Path) -> tuple[Path, ...]:
     make_folder(to, waits=False)
     files: dict[str, bytes] = {}
     for make in FIGURES:
-        shown = make()
-        drawn = draw(shown)
-        title = f"Fig. {shown.number}: {shown.title}"
+        thesis_figure = make()
+        figure = draw(thesis_figure)
+        title = f"Fig. {thesis_figure.number}: {thesis_figure.title}"
         for kind in style.FORMATS:
-            files[f"{shown.name}.{kind}"] = style.file_bytes(drawn, kind, title, style.PLOT_SETTINGS)
-        files[f"{shown.name}.txt"] = f"{title}. {shown.caption}\n".encode()
+            files[f"{thesis_figure.name}.{kind}"] = style.file_bytes(figure, kind, title, style.PLOT_SETTINGS)
+        files[f"{thesis_figure.name}.txt"] = f"{title}. {thesis_figure.caption}\n".encode()
     return write_files(to, files)
 
 
 @style.own_settings(style.PLOT_SETTINGS)
-def draw(shown: ThesisFigure) -> Figure:
+def draw(thesis_figure: ThesisFigure) -> Figure:
     """Draw one figure: title, force over time, the path or the liquid's speed, and caption."""
-    caption = textwrap.wrap(shown.caption, _CAPTION_LETTERS)
+    caption = textwrap.wrap(thesis_figure.caption, _CAPTION_LETTERS)
     height_pt = _TOP_PT + _PLOT_PT + _FOOT_PT + _LINE_PT * len(caption)
     figure = Figure(figsize=(style.PAGE_WIDTH_PT / 72, height_pt / 72), facecolor="white")
 
-    def write(left_pt: float, down_pt: float, text: str, **look: Any) -> None:
-        figure.text(left_pt / style.PAGE_WIDTH_PT, 1 - down_pt / height_pt, text, va="top", **look)
+    def write(left_pt: float, down_pt: float, text: str, **text_style: Any) -> None:
+        figure.text(left_pt / style.PAGE_WIDTH_PT, 1 - down_pt / height_pt, text, va="top", **text_style)
 
-    def place(left_pt: float, width_pt: float) -> Axes:
+    def add_axes(left_pt: float, width_pt: float) -> Axes:
         bottom = 1 - (_TOP_PT + _PLOT_PT) / height_pt
         return figure.add_axes(
             (left_pt / style.PAGE_WIDTH_PT, bottom, width_pt / style.PAGE_WIDTH_PT, _PLOT_PT / height_pt)
         )
 
-    write(_SIDE_PT, 6, f"Fig. {shown.number}", fontsize=9, fontweight="bold")
-    write(_SIDE_PT + 38, 6, shown.title, fontsize=9)
+    write(_SIDE_PT, 6, f"Fig. {thesis_figure.number}", fontsize=9, fontweight="bold")
+    write(_SIDE_PT + 38, 6, thesis_figure.title, fontsize=9)
     write(_SIDE_PT, _TOP_PT + _PLOT_PT + _FOOT_PT - 6, "\n".join(caption), color=style.TEXT_SOFT, linespacing=1.25)
-    if len(shown.runs) > 2:
-        _compare(place, shown)
+    if len(thesis_figure.runs) > 2:
+        _draw_comparison(add_axes, thesis_figure)
     else:
-        _take_apart(place, shown)
+        _draw_each_run(add_axes, thesis_figure)
     return figure
 
 
-def _take_apart(place: Callable[[float, float], Axes], shown: ThesisFigure) -> None:
+def _draw_each_run(add_axes: Callable[[float, float], Axes], thesis_figure: ThesisFigure) -> None:
     """Draw the force of each run in its own plot, and their common path."""
     path_pt = _PLOT_PT
-    width_pt = (style.PAGE_WIDTH_PT - _SIDE_PT - path_pt - _RIGHT_PT) / len(shown.runs) - _GAP_PT
+    width_pt = (style.PAGE_WIDTH_PT - _SIDE_PT - path_pt - _RIGHT_PT) / len(thesis_figure.runs) - _GAP_PT
     plots = []
-    for number, run in enumerate(shown.runs):
-        plots.append(place(_SIDE_PT + number * (width_pt + _GAP_PT), width_pt))
-        _components(plots[-1], run, shown.events, several=len(shown.runs) > 1)
+    for number, run in enumerate(thesis_figure.runs):
+        plots.append(add_axes(_SIDE_PT + number * (width_pt + _GAP_PT), width_pt))
+        _draw_components(plots[-1], run, thesis_figure.events, several=len(thesis_figure.runs) > 1)
     limits = np.array([plot.get_ylim() for plot in plots])
     for plot in plots:
         plot.set_ylim(limits[:, 0].min() * 1.08, limits[:, 1].max() * 1.08)
-    _path(place(style.PAGE_WIDTH_PT - _RIGHT_PT - path_pt, path_pt), shown.runs[0])
+    _draw_path(add_axes(style.PAGE_WIDTH_PT - _RIGHT_PT - path_pt, path_pt), thesis_figure.runs[0])
 
 
-def _compare(place: Callable[[float, float], Axes], shown: ThesisFigure) -> None:
+def _draw_comparison(add_axes: Callable[[float, float], Axes], thesis_figure: ThesisFigure) -> None:
     """Draw the force of all runs along the straight motion, and the fraction of its speed that the liquid reaches."""
     width_pt = (style.PAGE_WIDTH_PT - _SIDE_PT - _GAP_PT - _RIGHT_PT) / 2
-    force, liquid = place(_SIDE_PT, width_pt), place(_SIDE_PT + width_pt + _GAP_PT, width_pt)
-    colours = style.STEPS if len(shown.runs) == len(style.STEPS) else style.STEPS[::2]
-    for run, colour in zip(shown.runs, colours, strict=True):
+    force, liquid = add_axes(_SIDE_PT, width_pt), add_axes(_SIDE_PT + width_pt + _GAP_PT, width_pt)
+    colours = style.STEPS if len(thesis_figure.runs) == len(style.STEPS) else style.STEPS[::2]
+    for run, colour in zip(thesis_figure.runs, colours, strict=True):
         table = run.table
         force.plot(table.t_s, table.fx_n, color=colour, label=run.label)
         liquid.plot(table.t_s, table.wake_x_mps / table.vx_mps, color=colour, label=run.label)
     headings = ("Force along x [N]; along y and z it is zero", "Speed of the liquid relative to the body's speed")
     for axes, heading in zip((force, liquid), headings, strict=True):
-        _time_axis(axes, float(shown.runs[0].table.t_s[-1]))
+        _set_up_time_axis(axes, float(thesis_figure.runs[0].table.t_s[-1]))
         axes.set_title(heading, pad=_HEADING_PT)
-        _name_curves(axes, shorter=len(shown.runs) > 3)
+        _draw_legend(axes, shorter=len(thesis_figure.runs) > 3)
 
 
-def _time_axis(axes: Axes, until_s: float) -> None:
+def _set_up_time_axis(axes: Axes, until_s: float) -> None:
     axes.set_xlim(0, until_s)
     axes.set_xlabel("Time [s]", loc="right", labelpad=1)
     axes.xaxis.set_major_locator(MaxNLocator(6, integer=True))
@@ -261,7 +261,7 @@ def _time_axis(axes: Axes, until_s: float) -> None:
     axes.axhline(0, color=style.ZERO, linewidth=0.6, zorder=1)
 
 
-def _name_curves(axes: Axes, *, shorter: bool = False) -> None:
+def _draw_legend(axes: Axes, *, shorter: bool = False) -> None:
     """Draw the legend in a row below the heading, so that it never covers data."""
     handles, labels = axes.get_legend_handles_labels()
     axes.legend(
@@ -279,31 +279,31 @@ def _name_curves(axes: Axes, *, shorter: bool = False) -> None:
     )
 
 
-def _components(axes: Axes, run: _Run, events: Sequence[tuple[float, str]], *, several: bool) -> None:
+def _draw_components(axes: Axes, run: _Run, events: Sequence[tuple[float, str]], *, several: bool) -> None:
     """Draw the force of one run, one line per axis."""
     table = run.table
-    _time_axis(axes, float(table.t_s[-1]))
+    _set_up_time_axis(axes, float(table.t_s[-1]))
     axes.set_title(f"Force [N], {run.label}" if several else "Force [N]", pad=_HEADING_PT)
     for name, (column, meaning) in _COMPONENTS.items():
         label = name if several else f"{name} ({meaning})"
         axes.plot(table.t_s, table[column], **style.AXES[name], label=label)
-    _name_curves(axes)
+    _draw_legend(axes)
     for time_s, word in events:
         axes.axvline(time_s, color=style.AXIS, linewidth=0.7, linestyle=(0, (3, 2)))
         at_foot: dict[str, Any] = {"xycoords": ("data", "axes fraction"), "textcoords": "offset points"}
         axes.annotate(word, (time_s, 0), xytext=(3, 3), color=style.TEXT_SOFT, **at_foot)
 
 
-def _path(axes: Axes, run: _Run) -> None:
+def _draw_path(axes: Axes, run: _Run) -> None:
     colour = style.TEXT_SOFT
     x_m, z_m = run.motion.position_m[:, 0], run.motion.position_m[:, 2]
     axes.set_title("Path from above [m]", pad=_HEADING_PT)
     axes.plot(x_m, z_m, color=colour, linewidth=1.1)
     axes.plot(x_m[0], z_m[0], "o", color=style.TEXT, markersize=4)
     axes.annotate("start", (x_m[0], z_m[0]), xytext=(5, 0), textcoords="offset points", va="center", color=colour)
-    at = int(np.searchsorted(run.motion.t_s, _ARROW_S))
+    arrow_row = int(np.searchsorted(run.motion.t_s, _ARROW_S))
     arrow = {"arrowstyle": "-|>", "color": colour, "linewidth": 1.1, "shrinkA": 0, "shrinkB": 0}
-    axes.annotate("", (x_m[at + 40], z_m[at + 40]), (x_m[at], z_m[at]), arrowprops=arrow)
+    axes.annotate("", (x_m[arrow_row + 40], z_m[arrow_row + 40]), (x_m[arrow_row], z_m[arrow_row]), arrowprops=arrow)
     axes.set_aspect("equal", adjustable="datalim")
     axes.invert_yaxis()
     axes.margins(0.18)

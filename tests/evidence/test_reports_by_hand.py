@@ -22,7 +22,7 @@ from study_app.evidence.stability.stability_report import (
     LOOPS,
     Fidelity,
     Swept,
-    _Judged,
+    _JudgedGroup,
     stability_evidence,
     verdict_text,
 )
@@ -111,7 +111,7 @@ ON = (
 )
 SWEPT = Swept(
     off=OFF, on=ON, took_s=12.4,
-    others=(_Judged("late forces", (
+    others=(_JudgedGroup("late forces", (
         replace(verdict("noise"), fast_n=2.0, played_n=1.9), replace(verdict(), balance_j=-0.0005),
         replace(verdict("not finite"), balance_j=math.nan),
     )),),
@@ -169,7 +169,7 @@ def reports() -> Iterator[tuple[str, Evidence]]:
     yield "stability", stability_evidence(SWEPT, FIDELITIES, "5")
     yield (
         "stability, groups",
-        stability_evidence(replace(SWEPT, off=(), on=(), others=(_Judged("calm", (verdict(),)),)), (), "6"),
+        stability_evidence(replace(SWEPT, off=(), on=(), others=(_JudgedGroup("calm", (verdict(),)),)), (), "6"),
     )
     yield "force delay", force_delay_evidence(ENTRIES, "late.csv")
     yield "velocity", velocity_evidence(ROWS)

@@ -1,4 +1,4 @@
-"""The evidence about outlets: what arrives in another process, and its cost to the servo."""
+"""The evidence about outlets: the data received by another process, and the effect on the servo."""
 
 from study_app.evidence.outlets.localhost import localhost_only
 from study_app.evidence.outlets.streams import compare_streams, measure_streams, streams_evidence

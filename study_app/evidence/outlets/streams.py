@@ -20,7 +20,7 @@ from study_app.devices.simulated import PlayedHand
 from study_app.errors import WorkerError
 from study_app.evidence.cost import hand_motion
 from study_app.evidence.table import TURN_S, Evidence, paced_steps, take_turns
-from study_app.evidence.timing.measurement import FULL, PERIOD_NS, ServoLoop, granted
+from study_app.evidence.timing.measurement import FULL, PERIOD_NS, ServoLoop, granted_classes
 from study_app.haptics.runtime.servo import Servo
 from study_app.outlets.markers import Marker, SinkThread, marker_of
 from study_app.outlets.session_outlets import open_sink
@@ -30,10 +30,10 @@ PATIENCE_S: Final = 60.0
 
 
 class Listener:
-    """The process that runs ``outlets.listener``; used as a context manager, it is ended on exit."""
+    """The process that runs ``outlets.listener``; leaving its context ends it."""
 
     def __init__(self, *arguments: str, pass_fds: Sequence[int] = ()) -> None:
-        self._process = subprocess.Popen(  # noqa: S603 - our own words
+        self._process = subprocess.Popen(  # noqa: S603 - a fixed command
             [sys.executable, "-m", "study_app.evidence.outlets.listener", *arguments],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
@@ -42,16 +42,16 @@ class Listener:
             pass_fds=pass_fds,
         )
 
-    def ready(self) -> None:
-        assert self._process.stdout is not None  # noqa: S101 - asked for above
+    def wait_until_ready(self) -> None:
+        assert self._process.stdout is not None  # noqa: S101 - a pipe
         if self._process.stdout.readline() != "ready\n":
             raise WorkerError(f"the listener does not receive anything: {self._process.communicate()[1].strip()}")
 
-    def end(self) -> Any:
-        said, error = self._process.communicate(timeout=PATIENCE_S)
+    def collect(self) -> Any:
+        output, error = self._process.communicate(timeout=PATIENCE_S)
         if self._process.returncode != 0:
             raise WorkerError(f"the listener ended: {error.strip()}")
-        return json.loads(said)
+        return json.loads(output)
 
     def __enter__(self) -> Self:
         return self
@@ -62,7 +62,7 @@ class Listener:
 
 
 class _MeasuredStream(SampleStream):
-    """A sample stream that hashes what it sends (SHA-256), and sends nothing while it is held."""
+    """A sample stream that hashes the sent samples (SHA-256), and sends nothing while it is held."""
 
     def __init__(self, telemetry: Any, rate_hz: float, now_ns: Callable[[], int]) -> None:
         self.hashed = hashlib.sha256()
@@ -85,8 +85,8 @@ class _MeasuredStream(SampleStream):
         super().close()
 
 
-_MOST_ERROR_MS: Final = 1.0
-_MARKER_EVERY_S: Final = 0.05
+_MAX_ERROR_MS: Final = 1.0
+_MARKER_PERIOD_S: Final = 0.05
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -115,7 +115,7 @@ class Streamed:
     @property
     def met(self) -> bool:
         """Whether no data were lost and the marker times are accurate."""
-        return self.samples_lost == self.markers_lost == 0 and self.intact and self.error_p99_ms <= _MOST_ERROR_MS
+        return self.samples_lost == self.markers_lost == 0 and self.intact and self.error_p99_ms <= _MAX_ERROR_MS
 
 
 def measure_streams(
@@ -129,12 +129,12 @@ def measure_streams(
     sent: list[Marker] = []
     try:
         with Listener() as listener:
-            listener.ready()
+            listener.wait_until_ready()
             origin_ns = servo.now_ns()
             servo.start()
             try:
                 servo.load(FULL)
-                for number in paced_steps(seconds, _MARKER_EVERY_S, ending=ending, progress=progress):
+                for number in paced_steps(seconds, _MARKER_PERIOD_S, ending=ending, progress=progress):
                     servo.check()
                     sent.append(_trial_marker(number, servo.now_ns(), origin_ns))
                     sink.mark(sent[-1])
@@ -142,7 +142,7 @@ def measure_streams(
                 servo.stop()
             samples.close()
             sink.close()
-            received = listener.end()
+            received = listener.collect()
     finally:
         samples.close()
         sink.close()
@@ -159,8 +159,8 @@ def _trial_marker(number: int, now_ns: int, origin_ns: int) -> Marker:
 def _stream_result(seconds: float, samples: _MeasuredStream, sent: list[Marker], received: dict[str, Any]) -> Streamed:
     times_ns = {marker.text: marker.time_ns for marker in sent}
     markers = received["markers"]
-    since_ns = [[it[key] - times_ns[it["text"]] for key in ("time_ns", "arrived_ns")] for it in markers]
-    errors_ns, took_ns = np.array(since_ns, np.float64).reshape(-1, 2).T
+    delays_ns = [[marker[key] - times_ns[marker["text"]] for key in ("time_ns", "arrived_ns")] for marker in markers]
+    errors_ns, arrivals_ns = np.array(delays_ns, np.float64).reshape(-1, 2).T
     return Streamed(
         seconds=seconds,
         samples_sent=samples.sent,
@@ -168,13 +168,13 @@ def _stream_result(seconds: float, samples: _MeasuredStream, sent: list[Marker],
         intact=received["sha256"] == samples.hashed.hexdigest() and not samples.lost,
         worst_gap_ms=received["worst_gap_ms"],
         markers_sent=len(sent),
-        markers_lost=len(sent) - len({json.loads(it["text"])["trial"] for it in markers}),
+        markers_lost=len(sent) - len({json.loads(marker["text"])["trial"] for marker in markers}),
         errors_us=np.abs(errors_ns) * 1e-3,
-        arrivals_ms=took_ns * 1e-6,
+        arrivals_ms=arrivals_ns * 1e-6,
     )
 
 
-_MOST_RATIO: Final = 1.10
+_MAX_RATIO: Final = 1.10
 _DRAWS: Final = 2000
 
 
@@ -194,9 +194,9 @@ class Ratio:
 
     @property
     def verdict(self) -> str:
-        if self.high <= _MOST_RATIO:
+        if self.high <= _MAX_RATIO:
             return "met"
-        return "missed" if self.low > _MOST_RATIO else "undecided: measure for longer"
+        return "missed" if self.low > _MAX_RATIO else "undecided: measure for longer"
 
 
 def compare_streams(
@@ -207,35 +207,35 @@ def compare_streams(
     With outlets, a stream of samples and twenty markers per second go to a listener in another process; without them,
     its thread is idle. Pairs of segments alternate which condition comes first.
     """
-    grants = granted()
+    grants = granted_classes()
     loop = ServoLoop(grants.best or grants.normal, real_time=True, spin_us=None)
-    servo, ticks = loop.servo, round(TURN_S * 1e9) // PERIOD_NS
+    servo, ticks_per_turn = loop.servo, round(TURN_S * 1e9) // PERIOD_NS
     sink = SinkThread(open_sink("lsl", servo.now_ns))
     samples = _MeasuredStream(servo.telemetry, servo.rate_hz, servo.now_ns)
-    marking, over = threading.Event(), threading.Event()
+    marking, is_over = threading.Event(), threading.Event()
 
     def mark() -> None:
         for number in itertools.count():
             marking.wait()
-            if over.is_set():
+            if is_over.is_set():
                 return
             sink.mark(_trial_marker(number, servo.now_ns(), 0))
-            time.sleep(_MARKER_EVERY_S)
+            time.sleep(_MARKER_PERIOD_S)
 
     def lateness_ns(active: bool, _round: int) -> NDArray[np.int64]:
         for switch in (samples.running, marking):
             (switch.set if active else switch.clear)()
-        return loop.run(ticks).lateness_ns
+        return loop.run(ticks_per_turn).lateness_ns
 
     arms = {active: partial(lateness_ns, active) for active in (False, True)}
     rounds = max(round(seconds / TURN_S), 2)
     try:
         with Listener() as listener:
-            listener.ready()
+            listener.wait_until_ready()
             threading.Thread(target=mark, name="markers", daemon=True).start()
             late_ns = take_turns(arms, rounds, ending=ending, progress=progress, alternating=True)
     finally:
-        over.set()
+        is_over.set()
         marking.set()
         samples.close()
         sink.close()
@@ -245,16 +245,16 @@ def compare_streams(
 def _ratio_of(active: Sequence[NDArray[np.int64]], rest: Sequence[NDArray[np.int64]], percentile: int) -> Ratio:
     """Return the ratio of a percentile of the lateness [ns] over segments (n,), with to without outlets."""
     rng = np.random.default_rng(1)
-    own = np.array([np.percentile(segment, percentile) for segment in active])
-    other = np.array([np.percentile(segment, percentile) for segment in rest])
-    logs = np.log(own) - np.log(other)
-    draws = [float(np.mean(logs[rng.integers(0, len(logs), len(logs))])) for _ in range(_DRAWS)]
+    active_ns = np.array([np.percentile(segment, percentile) for segment in active])
+    rest_ns = np.array([np.percentile(segment, percentile) for segment in rest])
+    log_ratios = np.log(active_ns) - np.log(rest_ns)
+    draws = [float(np.mean(log_ratios[rng.integers(0, len(log_ratios), len(log_ratios))])) for _ in range(_DRAWS)]
     low, high = np.exp(np.percentile(draws, [2.5, 97.5]))
     return Ratio(
         percentile=percentile,
-        with_us=1e-3 * float(np.median(own)),
-        without_us=1e-3 * float(np.median(other)),
-        ratio=float(np.exp(logs.mean())),
+        with_us=1e-3 * float(np.median(active_ns)),
+        without_us=1e-3 * float(np.median(rest_ns)),
+        ratio=float(np.exp(log_ratios.mean())),
         low=float(low),
         high=float(high),
     )
@@ -273,14 +273,14 @@ def streams_evidence(streams: Streamed, ratios: Sequence[Ratio]) -> Evidence:
         f"  longest gap between their times: {streams.worst_gap_ms:.2f} ms",
         f"  markers: {streams.markers_sent} sent, {streams.markers_lost} lost",
         f"  difference between marker time and servo clock: p50 {p50_us:.1f} us, p99 {1e3 * streams.error_p99_ms:.1f} "
-        f"us, limit {1e3 * _MOST_ERROR_MS:g} us",
+        f"us, limit {1e3 * _MAX_ERROR_MS:g} us",
         f"  from event to arrival: p50 {p50_ms:.2f} ms, p99 {p99_ms:.2f} ms",
         f"  {'met' if streams.met else 'missed'}",
         "servo lateness with and without both streams, alternating every 0.25 s",
     ]
     lines += [
         f"  p{ratio.percentile}: {ratio.with_us:.0f} us with, {ratio.without_us:.0f} us without, ratio "
-        f"{ratio.ratio:.3f} ({ratio.low:.3f} to {ratio.high:.3f}), limit {_MOST_RATIO:g}: {ratio.verdict}"
+        f"{ratio.ratio:.3f} ({ratio.low:.3f} to {ratio.high:.3f}), limit {_MAX_RATIO:g}: {ratio.verdict}"
         for ratio in ratios
     ]
     text = "\n".join(lines) + "\n"

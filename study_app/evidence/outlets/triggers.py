@@ -1,4 +1,4 @@
-"""The delay from an event to its byte on a port."""
+"""The delay from an event to its trigger byte on a port."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from study_app.outlets.markers import CODES, HIGH_S, SinkThread, TriggerSink, ma
 from study_app.outlets.session_outlets import open_sink
 
 VIRTUAL: Final = "virtual"
-_EVERY_S: Final = 0.05
+_EVENT_PERIOD_S: Final = 0.05
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,7 +40,7 @@ class TriggerDelays:
 
 
 class _VirtualPort:
-    """A pair of virtual ports: one has an ``address`` to send to, another process reads the other."""
+    """A pair of virtual ports: codes are sent to the ``address`` of one, and another process reads the other."""
 
     def __init__(self) -> None:
         if not hasattr(os, "openpty"):
@@ -49,22 +49,22 @@ class _VirtualPort:
             )
         import tty  # noqa: PLC0415 - not on Windows
 
-        ours, self._theirs = os.openpty()
-        tty.setraw(self._theirs)
-        self.address = f"serial:{os.ttyname(self._theirs)}"
-        self._listener = Listener(str(ours), pass_fds=(ours,))
-        os.close(ours)
-        self._listener.ready()
+        reading_end, self._sending_end = os.openpty()
+        tty.setraw(self._sending_end)
+        self.address = f"serial:{os.ttyname(self._sending_end)}"
+        self._listener = Listener(str(reading_end), pass_fds=(reading_end,))
+        os.close(reading_end)
+        self._listener.wait_until_ready()
 
     def unplug(self) -> list[tuple[int, int]]:
         """End the reader as if an adapter were unplugged; return the bytes, each with its reading time [ns]."""
         self.close()
-        return [(byte, at_ns) for byte, at_ns in self._listener.end()]
+        return [(byte, at_ns) for byte, at_ns in self._listener.collect()]
 
     def close(self) -> None:
         """Close this end of the port, which also ends the reader."""
         with suppress(OSError):
-            os.close(self._theirs)
+            os.close(self._sending_end)
 
     def __enter__(self) -> _VirtualPort:
         return self
@@ -87,12 +87,12 @@ def measure_triggers(
         The port cannot be opened, or failed.
     """
     if port != VIRTUAL:
-        return TriggerDelays(port=port, written_us=_written_us(_send(port, seconds, ending, progress)[1]))
+        return TriggerDelays(port=port, written_us=_written_us(_send_codes(port, seconds, ending, progress)[1]))
     with _VirtualPort() as virtual:
-        sent, sink = _send(virtual.address, seconds, ending, progress)
-        came = virtual.unplug()
-    codes = [one for one in came if one[0]]
-    idle_ns = [at_ns for byte, at_ns in came[1:] if not byte]  # the first 0 is from opening the port
+        sent, sink = _send_codes(virtual.address, seconds, ending, progress)
+        received = virtual.unplug()
+    codes = [(byte, at_ns) for byte, at_ns in received if byte]
+    idle_ns = [at_ns for byte, at_ns in received[1:] if not byte]  # the first 0 is from opening the port
     pairs = list(zip(codes, sent, strict=False))
     return TriggerDelays(
         port=f"{virtual.address} (virtual)",
@@ -107,7 +107,7 @@ def _written_us(sink: TriggerSink) -> NDArray[np.float64]:
     return np.array(sink.delays_ns, np.float64) * 1e-3
 
 
-def _send(
+def _send_codes(
     address: str, seconds: float, ending: threading.Event, progress: Callable[[str], object]
 ) -> tuple[list[tuple[int, int]], TriggerSink]:
     """Send the codes in turn; return each with the time of its event [ns], and the sink."""
@@ -118,7 +118,7 @@ def _send(
     thread = SinkThread(sink)
     sent: list[tuple[int, int]] = []
     events = list(CODES)
-    for number in paced_steps(seconds, _EVERY_S, ending=ending, progress=progress):
+    for number in paced_steps(seconds, _EVENT_PERIOD_S, ending=ending, progress=progress):
         if thread.lost:
             break
         marker = marker_of(events[number % len(events)], 1e-9 * now_ns(), 0, {})

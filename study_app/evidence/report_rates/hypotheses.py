@@ -1,7 +1,7 @@
-"""How often verdicts on hypotheses, recognition, equivalence and trends are wrong, on numbers that are drawn directly.
+"""Error rates of verdicts on hypotheses, recognition, equivalence and trends, from directly drawn numbers.
 
-Each trial draws one study whose truth is known and calls the statistic that the report calls: who is in it, how it is
-worded and where it stands is covered by tests.
+Each trial draws one study whose truth is known, and calls the same statistic as the report. The selection of
+participants, the wording and the layout of the report are covered by tests.
 """
 
 from __future__ import annotations
@@ -37,12 +37,12 @@ _ALPHA: Final = 0.05
 
 Trial: TypeAlias = Callable[[np.random.Generator], bool]
 Drawn: TypeAlias = Callable[[np.random.Generator, int], Array]
-"""Draws the numbers of so many participants."""
+"""A function that draws one number for each of ``n`` participants."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DrawnStudies:
-    """Simulated studies with ``participants``; ``trial`` simulates one and tells whether it makes the ``claim``."""
+    """Simulated studies of one kind; ``trial`` simulates one and returns whether the report makes the ``claim``."""
 
     name: str
     participants: int
@@ -69,11 +69,11 @@ def true_claims() -> Iterator[DrawnStudies]:
         name="thresholds in two blocks, ratio 1.5 : 1, 3-down-1-up, 60 trials",
         participants=12,
         claim=_SHOWN,
-        trial=_compares_thresholds(12, 1.5),
+        trial=_threshold_trial(12, 1.5),
     )
 
 
-def _shows(*samples: Array, alternative: str = "two-sided") -> bool:
+def _is_difference_shown(*samples: Array, alternative: str = "two-sided") -> bool:
     """Return whether the test of a contrast shows a difference from 0, or between two groups."""
     means, *others = (means_of(sample[None], group=group) for group, sample in enumerate(samples))
     for other in others:
@@ -91,22 +91,22 @@ def _thresholds() -> Iterator[DrawnStudies]:
         name="thresholds in two blocks, equal, 3-down-1-up, 60 trials",
         participants=12,
         claim=_SHOWN,
-        trial=_compares_thresholds(12, 1.0),
+        trial=_threshold_trial(12, 1.0),
     )
 
 
-def _compares_thresholds(n: int, ratio: float) -> Trial:
+def _threshold_trial(n: int, ratio: float) -> Trial:
     """Return a trial that compares thresholds in two blocks; the first block's are ``ratio`` times higher."""
     plan = ThresholdPlan(Stimulus(vary="damping_nspm", levels=_LEVELS), DESIGN, METHOD, catch=0, standards=1)
 
     def trial(rng: np.random.Generator) -> bool:
         middle = sum(plan.stimulus.domain) / 2
         spread = math.log10(BETWEEN_PEOPLE) / math.sqrt(2)  # the difference has the standard deviation of `power`
-        own = middle + spread * rng.normal(size=n)
+        thresholds = middle + spread * rng.normal(size=n)
         fits = [
             fit
             for shift in (math.log10(ratio), 0.0)
-            for fit in plan.fits(plan.answers(own + spread * rng.normal(size=n) + shift, rng))
+            for fit in plan.fits(plan.answers(thresholds + spread * rng.normal(size=n) + shift, rng))
         ]
         estimates = plan.grouped(fits, 2 * n)  # both blocks have a common width
         values, variances = (
@@ -128,25 +128,28 @@ def _recognition() -> Iterator[DrawnStudies]:
         for share in (0.5, 0.8):
             name = f"honey recognised; water and oil named “water” in {100 * share:.0f} %, otherwise “oil”"
             yield DrawnStudies(
-                name=name, participants=n, claim="water or oil recognised", trial=_recognises(n, share, known=(1,))
+                name=name,
+                participants=n,
+                claim="water or oil recognised",
+                trial=_recognition_trial(n, share, known=(1,)),
             )
         yield DrawnStudies(
             name="all three liquids named at random",
             participants=n,
             claim="a liquid recognised",
-            trial=_recognises(n, 0.5, known=()),
+            trial=_recognition_trial(n, 0.5, known=()),
         )
 
 
-def _recognises(n: int, share: float, known: tuple[int, ...]) -> Trial:
+def _recognition_trial(n: int, share: float, known: tuple[int, ...]) -> Trial:
     """Return a trial in which liquids are named at random, except those that are ``known``."""
 
     def trial(rng: np.random.Generator) -> bool:
         names = np.where(rng.random((n, 3)) < share, 0, 2) if known else rng.integers(0, 3, (n, 3))
         names[:, list(known)] = known
-        found = recognition(names, [0, 1, 2], 3, seed=None)
-        verdict: Verdict = "shown" if found.p is not None and found.p <= _ALPHA else "not shown"
-        named = RecognitionResult(LIQUIDS, LIQUIDS, LIQUIDS, found, verdict)
+        result = recognition(names, [0, 1, 2], 3, seed=None)
+        verdict: Verdict = "shown" if result.p is not None and result.p <= _ALPHA else "not shown"
+        named = RecognitionResult(LIQUIDS, LIQUIDS, LIQUIDS, result, verdict)
         return bool({*recognised(named, _ALPHA)} - {*known})
 
     return trial
@@ -155,21 +158,30 @@ def _recognises(n: int, share: float, known: tuple[int, ...]) -> Trial:
 def _equivalence() -> Iterator[DrawnStudies]:
     for bound in (0.5, 1.0):
         share = bound / STEPS
-        for words, others in (("0", (0.0,)), ("−1, 0 or 1", (-1.0, 0.0, 0.0, 1.0))):
-            name = f"one participant in {1 / share:.0f} differs by 6 points, the others by {words}, bound {bound:g}"
+        for description, other_differences in (("0", (0.0,)), ("−1, 0 or 1", (-1.0, 0.0, 0.0, 1.0))):
+            name = (
+                f"one participant in {1 / share:.0f} differs by 6 points, the others by {description}, bound {bound:g}"
+            )
             for n in (14, 20, 30, 40):
-                yield DrawnStudies(name=name, participants=n, claim=_EQUIVALENT, trial=_misses(n, share, others, bound))
+                yield DrawnStudies(
+                    name=name,
+                    participants=n,
+                    claim=_EQUIVALENT,
+                    trial=_outlier_trial(n, share, other_differences, bound),
+                )
     for members in (1, 4, 6):
-        words = "one hypothesis" if members == 1 else f"{members} hypotheses"
+        description = "one hypothesis" if members == 1 else f"{members} hypotheses"
         yield DrawnStudies(
-            name=f"{words} with the true difference at the bound, normal",
+            name=f"{description} with the true difference at the bound, normal",
             participants=20,
             claim=f"any {_EQUIVALENT}",
-            trial=_calls_equivalent(20, members),
+            trial=_at_bound_trial(20, members),
         )
 
 
-def _misses(n: int, share: float, others: tuple[float, ...], bound: float) -> Trial:
+def _outlier_trial(n: int, share: float, others: tuple[float, ...], bound: float) -> Trial:
+    """Return a trial in which a ``share`` of participants differs by `STEPS`, the others by values from ``others``."""
+
     def trial(rng: np.random.Generator) -> bool:
         differences = np.where(rng.random(n) < share, STEPS, rng.choice(others, n))
         return tost(differences, bound).verdict == "equivalent"
@@ -177,7 +189,9 @@ def _misses(n: int, share: float, others: tuple[float, ...], bound: float) -> Tr
     return trial
 
 
-def _calls_equivalent(n: int, members: int) -> Trial:
+def _at_bound_trial(n: int, members: int) -> Trial:
+    """Return a trial with ``members`` hypotheses whose true difference is at the equivalence bound."""
+
     def trial(rng: np.random.Generator) -> bool:
         means = means_of(rng.normal(1.0, 1.0, (members, n)))
         ps = holm(p_equivalent(means, 1.0, n, STEPS).tolist())
@@ -191,29 +205,29 @@ def _contrasts() -> Iterator[DrawnStudies]:
         for ratio in (1, 3, 6):
             name = f"two groups, sizes 1 : 2, SDs {ratio} : 1"
             yield DrawnStudies(
-                name=name, participants=n, claim=_SHOWN, trial=_compares_groups(round(n / 3), n - round(n / 3), ratio)
+                name=name, participants=n, claim=_SHOWN, trial=_groups_trial(round(n / 3), n - round(n / 3), ratio)
             )
     for n in (8, 12, 20, 30):
         yield DrawnStudies(
             name="paired, one participant in six 5 points higher, the others 1 lower",
             participants=n,
             claim=_SHOWN,
-            trial=_compares_pairs(n, _one_in_six),
+            trial=_pairs_trial(n, _one_in_six),
         )
         yield DrawnStudies(
             name="paired, exponential",
             participants=n,
             claim=_SHOWN,
-            trial=_compares_pairs(n, lambda rng, count: rng.exponential(size=count) - 1),
+            trial=_pairs_trial(n, lambda rng, count: rng.exponential(size=count) - 1),
         )
 
 
-def _compares_groups(n: int, other: int, ratio: float) -> Trial:
-    return lambda rng: _shows(ratio * rng.normal(size=n), rng.normal(size=other))
+def _groups_trial(n: int, other: int, ratio: float) -> Trial:
+    return lambda rng: _is_difference_shown(ratio * rng.normal(size=n), rng.normal(size=other))
 
 
-def _compares_pairs(n: int, drawn: Drawn) -> Trial:
-    return lambda rng: _shows(drawn(rng, n))
+def _pairs_trial(n: int, drawn: Drawn) -> Trial:
+    return lambda rng: _is_difference_shown(drawn(rng, n))
 
 
 def _one_in_six(rng: np.random.Generator, n: int) -> Array:
@@ -223,7 +237,7 @@ def _one_in_six(rng: np.random.Generator, n: int) -> Array:
 DELAYS: Final = np.linspace(-1.0, 1.0, 7)
 _SLOPE: Final = 1.2
 _NOISE: Final = 0.7
-_MANY: Final = 20_000
+_LARGE_SAMPLE: Final = 20_000
 
 
 def _trends() -> Iterator[DrawnStudies]:
@@ -233,19 +247,19 @@ def _trends() -> Iterator[DrawnStudies]:
             name="individual trends, skewed with mean 0, so that ranks decrease",
             participants=n,
             claim="an increase shown",
-            trial=_follows(n, 0.0, "rise"),
+            trial=_trend_trial(n, 0.0, "rise"),
         )
         name = "individual trends, skewed, mean rank correlation 0"
         yield DrawnStudies(
-            name=name, participants=n, claim="a trend shown", trial=_follows(n, _shift_without_trend(), "either")
+            name=name, participants=n, claim="a trend shown", trial=_trend_trial(n, _shift_without_trend(), "either")
         )
 
 
-def _follows(n: int, shift: float, claim: str) -> Trial:
+def _trend_trial(n: int, shift: float, claim: str) -> Trial:
     def trial(rng: np.random.Generator) -> bool:
-        found = trend(_answers(rng, n, shift), None, seed=None)
-        claimed = found.p is not None and found.p <= _ALPHA
-        return claimed and (claim == "either" or (found.effect or 0.0) > 0)
+        result = trend(_answers(rng, n, shift), None, seed=None)
+        claimed = result.p is not None and result.p <= _ALPHA
+        return claimed and (claim == "either" or (result.effect or 0.0) > 0)
 
     return trial
 
@@ -261,6 +275,6 @@ def _shift_without_trend() -> float:
     """Return the mean of skewed slopes at which the mean rank correlation is 0, from a large sample."""
 
     def correlation(shift: float) -> float:
-        return trend(_answers(np.random.default_rng(0), _MANY, shift), None, seed=None).effect or 0.0
+        return trend(_answers(np.random.default_rng(0), _LARGE_SAMPLE, shift), None, seed=None).effect or 0.0
 
     return float(brentq(correlation, 0.0, 1.0, xtol=1e-3))

@@ -1,10 +1,10 @@
 """Error rates of the report's verdicts on simulated studies, counted and compared with limits.
 
-The truth of a study is known. One generator is the answer model of rehearsals, the other an ordinal probit model with
-random effects of people, which shares nothing with it. In an empty study no setting differs from another; in one of own
-trends people have trends over the delay and opinions of the liquids of their own, whose means are zero; in a partial
-one the last liquid equals the first, and delays of the lower half equal the shortest; a full one has all effects.
-Batches of the cells alternate, so that partial results are balanced.
+The truth of a study is known. One generator is the answer model of rehearsals, the other an independent ordinal probit
+model with random effects of people. In an "empty" study no setting differs from another. In one with "own trends" each
+person has individual trends over the delay and opinions of the liquids, whose means are zero. In a "partial" one the
+last liquid equals the first, and the delays of the lower half equal the shortest. A "full" one has all effects. Batches
+of the cells alternate, so that partial results are balanced.
 """
 
 from __future__ import annotations
@@ -51,23 +51,23 @@ _Extent: TypeAlias = Literal["empty", "own trends", "partial", "full"]
 GENERATORS: Final[tuple[Generator, ...]] = get_args(Generator)
 EXTENTS: Final[tuple[_Extent, ...]] = get_args(_Extent)
 _NO_EFFECT: Final[tuple[_Extent, ...]] = ("empty", "own trends")
-"""No setting differs from another in the mean over all people."""
+"""Extents in which no setting differs from another in the mean over all people."""
 
 _LEVELS: Final = np.array([-2.0, -1.2, -0.4, 0.4, 1.2, 2.0])
-"""Where the latent answer of the probit model goes from one of the seven levels to the next."""
+"""Thresholds of the latent answer between the seven levels of the probit model."""
 
 PEOPLE: Final = REHEARSED.model_copy(update={"lapse_rate": 0.1})
-"""Who answers as the answer model says."""
-_LEANING: Final = 0.7
-_SLOPE: Final = 0.3
-"""Standard deviations between people: of their response bias, and of their sensitivity to an effect."""
+"""The people of the answer model."""
+_BIAS_SD: Final = 0.7
+_SLOPE_SD: Final = 0.3
+"""Standard deviations between people of the response bias, and of the sensitivity to an effect."""
 
 TRUTH: Final = 4000
-"""The true differences of means are those of so many simulated people."""
+"""Number of simulated people from whom the true differences of means are computed."""
 
 
 def _equal_settings(block: Block, extent: _Extent) -> Mapping[int, int]:
-    """Return, for each condition that is truly equal to an earlier one, the index of that one."""
+    """Return a map from the index of each condition that equals an earlier one to the earlier index."""
     k = len(block.settings)
     if extent in _NO_EFFECT:
         return dict.fromkeys(range(1, k), 0)
@@ -88,34 +88,34 @@ def simulate_answers(
             for block, opinions in zip(simulation.blocks, thought, strict=True)
         )
     rng = np.random.default_rng([seed, study])
-    leaning, slope = _LEANING * rng.normal(size=participants), 1 + _SLOPE * rng.normal(size=participants)
-    return tuple(_probit(simulation, block, extent, leaning, slope, rng) for block in simulation.blocks)
+    bias, slope = _BIAS_SD * rng.normal(size=participants), 1 + _SLOPE_SD * rng.normal(size=participants)
+    return tuple(_simulate_probit(simulation, block, extent, bias, slope, rng) for block in simulation.blocks)
 
 
 def _simulate_answers(block: Block, opinions: Opinions, extent: _Extent, rng: np.random.Generator) -> Array:
     """Return the answers of the answer model; equal conditions have equal effects."""
     if extent == "empty":
         return opinions.answers(0.0, PEOPLE)
-    thought = opinions.thought.copy()
+    values = opinions.thought.copy()
     if extent == "own trends":
-        own = _draw_individual_effects(block, (len(thought), *thought.shape[2:]), rng)
-        return replace(opinions, thought=thought.mean(axis=2, keepdims=True) + own[:, None]).answers(1.0, PEOPLE)
-    for place, other in _equal_settings(block, extent).items():
-        thought[:, :, place] = thought[:, :, other]
-    return replace(opinions, thought=thought).answers(1.0, PEOPLE)
+        effects = _draw_individual_effects(block, (len(values), *values.shape[2:]), rng)
+        return replace(opinions, thought=values.mean(axis=2, keepdims=True) + effects[:, None]).answers(1.0, PEOPLE)
+    for index, equal_index in _equal_settings(block, extent).items():
+        values[:, :, index] = values[:, :, equal_index]
+    return replace(opinions, thought=values).answers(1.0, PEOPLE)
 
 
-def _probit(
-    simulation: Plan, block: Block, extent: _Extent, leaning: Array, slope: Array, rng: np.random.Generator
+def _simulate_probit(
+    simulation: Plan, block: Block, extent: _Extent, bias: Array, slope: Array, rng: np.random.Generator
 ) -> Array:
-    effects = _effects(simulation, block)
+    effects = _latent_effects(simulation, block)
     if extent == "own trends":
-        latent = leaning[:, None, None] + _draw_individual_effects(block, (len(leaning), *effects.shape), rng)
+        latent = bias[:, None, None] + _draw_individual_effects(block, (len(bias), *effects.shape), rng)
         latent += rng.normal(size=latent.shape)
         return np.add(np.searchsorted(_LEVELS, latent), 1, dtype=np.float64)
-    for place, other in _equal_settings(block, extent).items():
-        effects[place] = effects[other]
-    latent = leaning[:, None, None] + slope[:, None, None] * effects + rng.normal(size=(len(leaning), *effects.shape))
+    for index, equal_index in _equal_settings(block, extent).items():
+        effects[index] = effects[equal_index]
+    latent = bias[:, None, None] + slope[:, None, None] * effects + rng.normal(size=(len(bias), *effects.shape))
     return np.add(np.searchsorted(_LEVELS, latent), 1, dtype=np.float64)
 
 
@@ -127,32 +127,32 @@ def _draw_individual_effects(block: Block, shape: tuple[int, ...], rng: np.rando
     return rng.normal(size=shape)
 
 
-def _effects(simulation: Plan, block: Block) -> Array:
+def _latent_effects(simulation: Plan, block: Block) -> Array:
     """Return the latent effect of each condition on each item (settings, items)."""
     k, items = len(block.settings), len(block.items)
     if block.kind == "delays":
         signs = [
-            {"increasing": 1.0, "decreasing": -1.0, None: 0.0}[simulation.decided.direction(it.id)]
-            for it in block.items
+            {"increasing": 1.0, "decreasing": -1.0, None: 0.0}[simulation.decided.direction(item.id)]
+            for item in block.items
         ]
         return np.outer(np.linspace(-1.0, 1.0, k), signs)
-    found = np.outer(np.resize([0.0, 1.5, -0.8], k), np.resize([1.0, -1.0], items))
+    effects = np.outer(np.resize([0.0, 1.5, -0.8], k), np.resize([1.0, -1.0], items))
     for place, setting in enumerate(block.settings):
         for column, item in enumerate(block.items):
             if item.id in simulation.decided.names:
-                found[place, column] = 1.0 if setting.label == item.id else -1.0
-    return np.asarray(found)
+                effects[place, column] = 1.0 if setting.label == item.id else -1.0
+    return np.asarray(effects)
 
 
 def _true_differences(simulation: Plan, generator: Generator, extent: _Extent) -> tuple[Array, ...]:
     """Return the true mean differences from the first condition (settings, items), block by block."""
     differences = []
-    for block, given in zip(
+    for block, answers in zip(
         simulation.blocks, simulate_answers(simulation, generator, extent, TRUTH, 0, 0), strict=True
     ):
-        means = given.mean(axis=0)
-        for place, other in _equal_settings(block, extent).items():
-            means[place] = means[other]
+        means = answers.mean(axis=0)
+        for index, equal_index in _equal_settings(block, extent).items():
+            means[index] = means[equal_index]
         differences.append(np.asarray(means - means[0]))
     return tuple(differences)
 
@@ -161,26 +161,26 @@ _Limit: TypeAlias = Literal["none", "at most 5 %", "at least 93 %", "60 to 80 %"
 
 _Verdict: TypeAlias = Literal["yes", "no", "too few studies", "counted"]
 
-_COMPARED: Final = 400
-"""More rates than are compared with limits."""
+_MAX_COMPARED_RATES: Final = 400
+"""Upper bound on the number of rates that are compared with limits."""
 
-_SURE: Final = 1 - 0.05 / _COMPARED
-"""Confidence of the interval that must lie beyond a limit to say that a rate does not keep to it.
+_CONFIDENCE: Final = 1 - 0.05 / _MAX_COMPARED_RATES
+"""Confidence of the interval that must lie beyond a limit for a rate to count as exceeding it.
 
-Of so many rates that are exactly at their limits none exceeds it by chance in 95 % of runs (Bonferroni).
+If all rates are exactly at their limits, none exceeds its limit by chance in 95 % of runs (Bonferroni).
 """
 
-_ALLOWED: Final[dict[_Limit, tuple[float, float, float, float]]] = {
+_PERMITTED_RANGES: Final[dict[_Limit, tuple[float, float, float, float]]] = {
     "at most 5 %": (0.0, 0.05, 0.0, 0.075),
     "at least 93 %": (0.93, 1.0, 0.905, 1.0),
     "60 to 80 %": (0.6, 0.8, 0.0, 1.0),
 }
-"""Of each limit the range that the interval of a rate must touch, and the range that it must not leave."""
+"""For each limit, the range that the interval of a rate must overlap, and the range that it must not leave."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rate:
-    """Number of ``hits`` among ``of`` simulated studies in one cell."""
+    """Number of ``hits`` among the simulated ``studies`` of one cell; ``what`` names the counted event."""
 
     cell: str
     participants: int
@@ -213,9 +213,9 @@ class Rate:
     def holds(self) -> _Verdict:
         """Whether the rate meets its limit.
 
-        "no" if the interval with confidence `_SURE` lies beyond the limit: of a hundred rates exactly at their limit,
-        some 95 % intervals miss it by chance. "yes" if the 95 % interval lies within the limit; otherwise there are too
-        few studies.
+        "no" if the interval with confidence `_CONFIDENCE` lies beyond the limit, since among a hundred rates exactly at
+        their limit some 95 % intervals miss it by chance. "yes" if the 95 % interval lies within the limit; otherwise
+        there are too few studies.
         """
         if self.limit == "counted":
             return "counted"
@@ -223,8 +223,8 @@ class Rate:
             return "no" if self.hits else "yes"
         if not self.studies:
             return "too few studies"
-        lowest, highest, least, most = _ALLOWED[self.limit]
-        low, high = binomtest(self.hits, self.studies).proportion_ci(_SURE, method="wilson")
+        lowest, highest, least, most = _PERMITTED_RANGES[self.limit]
+        low, high = binomtest(self.hits, self.studies).proportion_ci(_CONFIDENCE, method="wilson")
         if high < lowest or low > highest:
             return "no"
         low, high = self.interval
@@ -264,13 +264,13 @@ def report_rates_evidence(rates: Sequence[Rate], heading: str) -> Evidence:
 
 _BATCH: Final = 25
 _DRAWS: Final = 999
-"""Of the test over all statements: its error rate holds with any number."""
+"""Number of permutations in the test over all statements, whose error rate does not depend on it."""
 
 Event: TypeAlias = tuple[str, _Limit]
-"""What is counted, and its limit."""
+"""The name of a counted event, and its limit."""
 
 _Truth: TypeAlias = tuple[Array, ...]
-"""True differences of means to the first setting (settings, items), of each block."""
+"""The true differences of means from the first setting (settings, items), for each block."""
 
 LOST: Final[Event] = ("part of the report is missing", "none")
 CLAIMED: Final = "the first page claims an effect"
@@ -302,7 +302,7 @@ def count_studies(simulation: Plan, cell: Cell, truth: _Truth, seed: int, batch:
     """Return the rates in the studies of one batch of a cell."""
     events: dict[Event, int] = {}
     for study in range(batch * _BATCH, batch * _BATCH + studies):
-        for event, happened in _study(simulation, cell, truth, seed, study).items():
+        for event, happened in _simulate_study(simulation, cell, truth, seed, study).items():
             events[event] = events.get(event, 0) + happened
     return tuple(
         Rate(cell=cell.name, participants=cell.participants, what=what, limit=limit, hits=hits, studies=studies)
@@ -310,42 +310,43 @@ def count_studies(simulation: Plan, cell: Cell, truth: _Truth, seed: int, batch:
     )
 
 
-def _study(simulation: Plan, cell: Cell, truth: _Truth, seed: int, study: int) -> dict[Event, bool]:
+def _simulate_study(simulation: Plan, cell: Cell, truth: _Truth, seed: int, study: int) -> dict[Event, bool]:
     failures = Failures()
-    given = simulate_answers(simulation, cell.generator, cell.extent, cell.participants, seed, study)
+    answers = simulate_answers(simulation, cell.generator, cell.extent, cell.participants, seed, study)
     if cell.looks:
         planned = replace(simulation.decided, looks=cell.looks, spending=cell.spending)
-        seen = (
-            report(simulation, planned.at(n), [values[:n] for values in given], study, failures)[1] for n in cell.looks
+        results_by_look = (
+            report(simulation, planned.at(n), [values[:n] for values in answers], study, failures)[1]
+            for n in cell.looks
         )
-        claimed = any(any(map(_claims, results)) for results in seen)
+        claimed = any(any(map(_claims, results)) for results in results_by_look)
         return {(f"{_ANYWHERE}, at any look", "at most 5 %"): claimed, LOST: bool(failures.found)}
-    decided = simulation.decided if cell.extent != "partial" else replace(simulation.decided, noticed=None)
-    asked, results = report(simulation, decided, given, study, failures)
+    decisions = simulation.decided if cell.extent != "partial" else replace(simulation.decided, noticed=None)
+    answers_by_block, results = report(simulation, decisions, answers, study, failures)
     events: dict[Event, bool] = {}
-    for place, (block, result) in enumerate(zip(simulation.blocks, results, strict=True)):
-        judged = _delay_events if block.kind == "delays" else _liquid_events
-        for (what, at_most), hit in judged(asked[place], result, cell, truth[place]):
-            events[f"{what} ({block.kind})", at_most] = hit
+    for index, (block, result) in enumerate(zip(simulation.blocks, results, strict=True)):
+        events_of = _delay_events if block.kind == "delays" else _liquid_events
+        for (name, at_most), hit in events_of(answers_by_block[index], result, cell, truth[index]):
+            events[f"{name} ({block.kind})", at_most] = hit
         if cell.extent == "empty":
-            overall = OverAll.of(result)
-            differs = overall is not None and (overall.p or 1.0) <= simulation.decided.alpha
+            test = OverAll.of(result)
+            differs = test is not None and (test.p or 1.0) <= simulation.decided.alpha
             events[f"test over all statements ({block.kind})", "at most 5 %"] = differs
     events[LOST] = bool(failures.found)
     if cell.extent != "partial":
-        people = asked[0].people
-        whole = Results(simulation.decided, people, results, delivered=(), orders={}, performance=None, seed=1)
+        people = answers_by_block[0].people
+        all_results = Results(simulation.decided, people, results, delivered=(), orders={}, performance=None, seed=1)
         limit: _Limit = "counted" if cell.extent == "full" else "at most 5 %"
-        events[CLAIMED, limit] = any(answer.claims for answer in answered(whole))
+        events[CLAIMED, limit] = any(answer.claims for answer in answered(all_results))
         events[_ANYWHERE, limit] = any(map(_claims, results))
     return events
 
 
 def report(
-    simulation: Plan, decided: Decided, given: Sequence[Array], study: int, failures: Failures
+    simulation: Plan, decided: Decided, answers: Sequence[Array], study: int, failures: Failures
 ) -> tuple[list[BlockAnswers], tuple[BlockResult, ...]]:
     """Return the answers of each block, and the findings that the report derives from them."""
-    people = tuple(f"P{number:03d}" for number in range(len(given[0])))
+    people = tuple(f"P{number:03d}" for number in range(len(answers[0])))
     tables = [
         of_tables(
             block,
@@ -356,10 +357,10 @@ def report(
             failures=failures,
             verdicts_only=True,
         )
-        for block, values in zip(simulation.blocks, given, strict=True)
+        for block, values in zip(simulation.blocks, answers, strict=True)
     ]
-    asked = [replace(answers, seed=1) for answers in with_gates(tables, _DRAWS)]
-    return asked, tuple(evaluate_block(None, answers) for answers in asked)
+    gated = [replace(answers, seed=1) for answers in with_gates(tables, _DRAWS)]
+    return gated, tuple(evaluate_block(None, answers) for answers in gated)
 
 
 def _claims(result: BlockResult) -> bool:
@@ -404,26 +405,28 @@ def _recognised(result: BlockResult) -> bool:
 
 def _equal_pairs(block: Block, extent: _Extent) -> set[tuple[str, str]]:
     """Return the pairs of codes whose conditions are truly equal."""
-    like = _equal_settings(block, extent)
+    equal_index = _equal_settings(block, extent)
     codes = block.codes
     return {
         (first, second)
-        for one, first in enumerate(codes)
-        for other, second in enumerate(codes)
-        if one < other and like.get(one, one) == like.get(other, other)
+        for first_index, first in enumerate(codes)
+        for second_index, second in enumerate(codes)
+        if first_index < second_index
+        and equal_index.get(first_index, first_index) == equal_index.get(second_index, second_index)
     }
 
 
 def _delay_events(asked: BlockAnswers, result: BlockResult, cell: Cell, truth: Array) -> Iterator[tuple[Event, bool]]:
     block = asked.block
-    null = [block.settings[at].delay_ms or 0.0 for at in _equal_settings(block, cell.extent)]
+    equal_delays_ms = [block.settings[index].delay_ms or 0.0 for index in _equal_settings(block, cell.extent)]
     if cell.extent in _NO_EFFECT:
         yield ("trend in a statement", "at most 5 %"), any(test.verdict in FOUND for test in DelayTrend.of(result))
         yield ("detection threshold printed", "at most 5 %"), _has_threshold(result)
         yield from _mean_test_events(result)
-    if null:
+    if equal_delays_ms:
         low = any(
-            lowest.over_all_ms is not None and lowest.over_all_ms <= max(null) for lowest in LowestDelay.of(result)
+            lowest.over_all_ms is not None and lowest.over_all_ms <= max(equal_delays_ms)
+            for lowest in LowestDelay.of(result)
         )
         yield ("stated shortest delay with a trend is too short", "at most 5 %"), low
     if cell.extent not in _NO_EFFECT:
@@ -446,33 +449,33 @@ def _equivalence(asked: BlockAnswers, result: BlockResult, truth: Array) -> Iter
     bound = asked.decided.equivalence_bound
     if bound is None or not ContrastsWithControl.of(result):
         return
-    beyond = {
-        (item.id, setting.delay_ms or 0.0): float(away)
+    truly_different = {
+        (item.id, setting.delay_ms or 0.0): float(difference)
         for setting, row in zip(asked.block.settings, np.abs(truth), strict=True)
-        for item, away in zip(asked.block.items, row, strict=True)
-        if away >= bound
+        for item, difference in zip(asked.block.items, row, strict=True)
+        if difference >= bound
     }
-    if not beyond:
+    if not truly_different:
         return
-    nearest = min(beyond, key=beyond.__getitem__)
-    called = {
+    nearest = min(truly_different, key=truly_different.__getitem__)
+    is_called_equivalent = {
         (tested.item, tested.delay_ms): tested.verdict == "equivalent" for tested in ContrastsWithControl.of(result)
     }
-    yield ("smallest difference beyond the bound called equivalent", "at most 5 %"), called[nearest]
-    up_to = common_ms(result)
-    too_far = up_to is not None and any(delay <= up_to for _, delay in beyond)
-    yield ("“unchanged up to” states too long a delay", "at most 5 %"), too_far
+    yield ("smallest difference beyond the bound called equivalent", "at most 5 %"), is_called_equivalent[nearest]
+    longest_ms = common_ms(result)
+    is_too_long = longest_ms is not None and any(delay <= longest_ms for _, delay in truly_different)
+    yield ("“unchanged up to” states too long a delay", "at most 5 %"), is_too_long
 
 
 _Case: TypeAlias = tuple[str, int]
-"""What is simulated, and how many participants take part."""
+"""The name of the simulated case, and its number of participants."""
 
 Trial: TypeAlias = Callable[[np.random.Generator], float | None]
-"""Simulates one study; returns 1 for a hit, 0 for none, of an interval the error over its half; None: it has none."""
+"""Simulate one study: return 1 for a hit, else 0; for an interval its error over its half width, None without one."""
 
 COVERS: Final = "interval covers the threshold, if one is printed"
 HALF: Final = "interval of half the width covers the threshold"
-"""Of a normal distribution 67 %; 51 % where intervals are 30 % narrower, 80 % where they are 30 % wider."""
+"""67 % for a normal distribution; 51 % if intervals are 30 % too narrow, 80 % if they are 30 % too wide."""
 PRINTED: Final = "threshold printed, with its interval"
 
 _BOUND: Final = 1.0
@@ -491,7 +494,7 @@ def _single_tests() -> Mapping[_Case, tuple[_Limit, str, Trial]]:
             tests[f"one participant in five differs by 5 points, the others by {words}", n] = (
                 "at most 5 %",
                 "called equivalent",
-                _leaning(n, most),
+                _outlier_trial(n, most),
             )
     for n, spread_ms, never, words in (
         (5, 0.0, 0.0, "the same threshold for all"),
@@ -513,19 +516,21 @@ def count_single(case: _Case, seed: int, batch: int, studies: int) -> tuple[Rate
     limit, what, trial = _single_tests()[case]
     number = list(_single_tests()).index(case)
     rng = np.random.default_rng([seed, number, batch])
-    p_values = [one for _ in range(studies) if (one := trial(rng)) is not None]
+    p_values = [result for _ in range(studies) if (result := trial(rng)) is not None]
     rate = partial(Rate, cell=case[0], participants=case[1])
     if what != COVERS:
         return (rate(what=what, limit=limit, hits=sum(map(bool, p_values)), studies=len(p_values)),)
-    half: _Limit = "counted" if case[1] == _SIZES[0] else "60 to 80 %"  # with five participants t intervals are wide
+    half_limit: _Limit = (
+        "counted" if case[1] == _SIZES[0] else "60 to 80 %"
+    )  # with five participants t intervals are wide
     return (
         rate(what=PRINTED, limit="at least 93 %", hits=len(p_values), studies=studies),
-        rate(what=what, limit=limit, hits=sum(one <= 1.0 for one in p_values), studies=len(p_values)),
-        rate(what=HALF, limit=half, hits=sum(one <= 0.5 for one in p_values), studies=len(p_values)),
+        rate(what=what, limit=limit, hits=sum(result <= 1.0 for result in p_values), studies=len(p_values)),
+        rate(what=HALF, limit=half_limit, hits=sum(result <= 0.5 for result in p_values), studies=len(p_values)),
     )
 
 
-def _leaning(n: int, most: tuple[float, ...]) -> Trial:
+def _outlier_trial(n: int, most: tuple[float, ...]) -> Trial:
     def trial(rng: np.random.Generator) -> bool:
         return tost(np.where(rng.random(n) < 0.2, 5.0, rng.choice(most, n)), _BOUND).verdict == "equivalent"
 
@@ -534,7 +539,7 @@ def _leaning(n: int, most: tuple[float, ...]) -> Trial:
 
 def _new_coverage_trial(n: int, spread_ms: float, never: float) -> Trial:
     def trial(rng: np.random.Generator) -> float | None:
-        threshold = noticed(_people(rng, n, spread_ms, never), _LEVELS_MS.tolist())
+        threshold = noticed(_draw_answers(rng, n, spread_ms, never), _LEVELS_MS.tolist())
         if threshold.interval is None or threshold.effect is None:
             return None
         error = _TRUE_MS - threshold.effect
@@ -544,10 +549,10 @@ def _new_coverage_trial(n: int, spread_ms: float, never: float) -> Trial:
     return trial
 
 
-def _people(rng: np.random.Generator, n: int, spread_ms: float, never: float) -> Array:
+def _draw_answers(rng: np.random.Generator, n: int, spread_ms: float, never: float) -> Array:
     """Return answers (n, levels), 6 for noticed and 2 otherwise, of participants with varying thresholds."""
-    at = _TRUE_MS + spread_ms * rng.normal(size=(n, 1))
-    chance = _LAPSE + (1 - 2 * _LAPSE) * expit(2 * np.log(19) * (_LEVELS_MS - at) / _WIDTH_MS)
+    threshold_ms = _TRUE_MS + spread_ms * rng.normal(size=(n, 1))
+    chance = _LAPSE + (1 - 2 * _LAPSE) * expit(2 * np.log(19) * (_LEVELS_MS - threshold_ms) / _WIDTH_MS)
     chance[rng.random(n) < never] = _LAPSE
     return np.where(rng.random(chance.shape) < chance, 6.0, 2.0)
 
@@ -556,20 +561,20 @@ _SIZES: Final = (5, 12, 24)
 
 _LOOKS: Final = (12, 18, 24)
 _ROUNDS: Final = 4
-"""A cell with an undecided rate is continued until it has so many times the studies that were asked for."""
+"""A cell with an undecided rate is continued up to this multiple of the requested number of studies."""
 
 _Key: TypeAlias = tuple[str, int]
 """The name of a cell and its number of participants."""
 
 _Count: TypeAlias = Callable[[int, int, int], tuple[Rate, ...]]
-"""Returns the rates of a batch: seed, number of the batch, studies in it."""
+"""Return the rates of a batch from the seed, the number of the batch and the number of its studies."""
 
 
 def cells(sizes: Sequence[int] = _SIZES) -> tuple[Cell, ...]:
     """Return every kind of study with every generator and size, and null studies with planned looks."""
-    every = [Cell(generator, extent, n) for generator in GENERATORS for extent in EXTENTS for n in sizes]
-    looked = [Cell("ordinal probit", "empty", _LOOKS[-1], _LOOKS, spending) for spending in get_args(Spending)]
-    return (*every, *looked)
+    all_cells = [Cell(generator, extent, n) for generator in GENERATORS for extent in EXTENTS for n in sizes]
+    planned_looks = [Cell("ordinal probit", "empty", _LOOKS[-1], _LOOKS, spending) for spending in get_args(Spending)]
+    return (*all_cells, *planned_looks)
 
 
 def measure_report_rates(
@@ -589,13 +594,13 @@ def measure_report_rates(
     """
     counts = _cell_counts(simulation, sizes)
     done, total = 0, dict[tuple[str, int, str], Rate]()
-    for finished in range(_ROUNDS):
-        waiting = [
-            executor.submit(count, seed, batch, many)
-            for batch, many in _batches(studies, finished)
+    for round_number in range(_ROUNDS):
+        futures = [
+            executor.submit(count, seed, batch, size)
+            for batch, size in _batches(studies, round_number)
             for count in counts.values()
         ]
-        for future in waiting:
+        for future in futures:
             rates = future.result()
             done += rates[0].studies
             for rate in rates:
@@ -606,22 +611,22 @@ def measure_report_rates(
         counts = {key: counts[key] for key in dict.fromkeys((rate.cell, rate.participants) for rate in undecided)}
         if not counts:
             return
-        if finished + 1 < _ROUNDS:
+        if round_number + 1 < _ROUNDS:
             for rate in undecided:
                 progress(f"continued: {rate}")
 
 
 def _cell_counts(simulation: Plan, sizes: Sequence[int]) -> Mapping[_Key, _Count]:
     """Return the function that counts the rates of each cell."""
-    every = cells(sizes)
-    kinds = {(cell.generator, cell.extent): cell for cell in every}
+    all_cells = cells(sizes)
+    kinds = {(cell.generator, cell.extent): cell for cell in all_cells}
     truths = {kind: true_effects(simulation, cell) for kind, cell in kinds.items()}
     return {
         **{
             (cell.name, cell.participants): partial(
                 count_studies, simulation, cell, truths[cell.generator, cell.extent]
             )
-            for cell in every
+            for cell in all_cells
         },
         **{case: partial(count_single, case) for case in _single_tests()},
     }

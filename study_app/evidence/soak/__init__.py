@@ -1,4 +1,4 @@
-"""The servo for hours or days with every kind of fault: drift, leaks and failures."""
+"""Soak tests: the servo runs for hours or days with all kinds of faults, to find drift, leaks and failures."""
 
 from study_app.evidence.soak.soak import soak_servo
 

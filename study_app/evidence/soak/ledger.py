@@ -1,7 +1,7 @@
-"""How far the servo's wakes are from their definition (`evidence.reference_model`), followed from scene to scene.
+"""The deviation of the servo's wakes from their definition (`evidence.reference_model`), from scene to scene.
 
-The servo keeps sums and takes from them what falls off. Here the whole list is summed again at intervals, from the
-samples in telemetry alone.
+The servo updates running sums. This module sums the whole list of elements at intervals, from the samples in telemetry
+alone.
 """
 
 import math
@@ -17,7 +17,7 @@ from study_app.haptics.model.force_rules import CURRENT
 from study_app.haptics.model.layout import records
 from study_app.haptics.model.scene import Everywhere, Liquid, Scene
 
-_REFUSALS_IN_A_ROW: Final = 5
+_MAX_REFUSALS: Final = 5
 _SHORTEST_NS: Final = 200_000
 _LONGEST_NS: Final = 20_000_000
 
@@ -72,18 +72,18 @@ class _Ledger:
         |wake - definition| at the last accepted sample, in units of Σ|e|/S; infinite if that is not finite, None
             if there is nothing to compare
         """
-        records_here = self._ledger[0], self._wake[0], self._elements
+        state = self._ledger[0], self._wake[0], self._elements
         rejected = samples.limited_by("glitch")
         accepted = np.flatnonzero((samples.fresh != 0) & ~rejected)
         if accepted.size == 0:
-            record_samples(*records_here, samples, rejected, 0, len(samples))
+            record_samples(*state, samples, rejected, 0, len(samples))
             return None
         last = int(accepted[-1])
-        record_samples(*records_here, samples, rejected, 0, last)
+        record_samples(*state, samples, rejected, 0, last)
         defined, size_mps = np.zeros(3), 0.0
-        if self._ledger[0].tracking and not _begins_anew(self._ledger[0], samples[last]):
+        if self._ledger[0].tracking and not _is_reset_in_gap(self._ledger[0], samples[last]):
             size_mps = sum_elements(self._wake[0], self._elements, defined)
-        record_samples(*records_here, samples, rejected, last, len(samples))
+        record_samples(*state, samples, rejected, last, len(samples))
         error_mps = float(np.linalg.norm(samples.wake_mps[last] - defined))
         if size_mps == 0.0:
             return None if error_mps == 0.0 else math.inf
@@ -96,26 +96,26 @@ class _Ledger:
 
 
 @kernel
-def _begins_anew(ledger: Any, sample: Any) -> bool:
-    """Return whether the body was reset in a gap: it has moved, and yet its velocity is exactly 0."""
+def _is_reset_in_gap(ledger: Any, sample: Any) -> bool:
+    """Return whether the body was reset in a gap: its position has changed, but its velocity is exactly 0."""
     moved = distance(sample.position_m, ledger.accepted_m) > 0.0
     return bool(sample.time_ns - ledger.accepted_ns > ledger.gap_ns and moved and norm(sample.velocity_mps) == 0.0)
 
 
 @kernel
 def record_samples(ledger: Any, wake: Any, elements: Any, samples: Any, rejected: Any, first: int, end: int) -> None:
-    """Record samples ``first`` to ``end`` in the list according to the definition, but ``rejected`` (n,) ones."""
+    """Record samples ``first`` to ``end`` in the list according to the definition, without ``rejected`` (n,) ones."""
     for i in range(first, end):
         sample = samples[i]
         if sample.fresh == 0:
             continue
         if rejected[i]:
             ledger.rejected += 1
-            if ledger.rejected == _REFUSALS_IN_A_ROW:
+            if ledger.rejected == _MAX_REFUSALS:
                 ledger.tracking = 0
             continue
         interval_ns = ledger.period_ns
-        if ledger.tracking != 0 and not _begins_anew(ledger, sample):
+        if ledger.tracking != 0 and not _is_reset_in_gap(ledger, sample):
             interval_ns = min(max(sample.time_ns - ledger.accepted_ns, _SHORTEST_NS), _LONGEST_NS)
         else:
             ledger.tracking = 1
@@ -131,7 +131,7 @@ def record_samples(ledger: Any, wake: Any, elements: Any, samples: Any, rejected
         store_element(wake, elements, ledger.h_mps, ledger.position_m, interval_ns)
 
 
-def prepare(samples: Any) -> None:
+def compile_recording(samples: Any) -> None:
     """Compile the recording functions for ``samples``, or load them from the cache."""
     wake, elements = new_wake_list(Wake(length=1, scaling=1), 1000.0)
     sum_elements(wake[0], elements, np.zeros(3))
@@ -159,13 +159,10 @@ class Drift:
             self._scenes[serial] = scene
 
     def record(self, samples: Any) -> None:
-        """Follow the next ``samples`` (`Samples`).
-
-        A scene with missing samples is not followed further.
-        """
-        for part in np.split(samples, np.flatnonzero(np.diff(samples.scene)) + 1):
-            if len(part) > 0:
-                self._record_part(part)
+        """Record the next ``samples`` (`Samples`); a scene with missing samples is not compared further."""
+        for scene_samples in np.split(samples, np.flatnonzero(np.diff(samples.scene)) + 1):
+            if len(scene_samples) > 0:
+                self._record_part(scene_samples)
 
     def _record_part(self, samples: Any) -> None:
         serial = int(samples.scene[0])

@@ -1,4 +1,4 @@
-"""What a soak found: its numbers as text and as a table for machines, and what of it is wrong."""
+"""The result of a soak test: its numbers as text and as a machine-readable table, and the problems found."""
 
 import json
 from collections.abc import Iterator
@@ -11,12 +11,12 @@ from study_app.evidence.soak.sample_audit import TOLERANCE_N
 from study_app.evidence.table import Evidence
 from study_app.haptics.model.layout import LIMITER_NAMES
 
-_MOST_DRIFT: Final = 1e-9  # greatest wake error, in units of Σ|e|/S
-_MOST_GROWTH_BYTES: Final = 5 * 2**20
-_MOST_RESIDUE_N: Final = 1e-12
+_MAX_DRIFT: Final = 1e-9  # greatest wake error, in units of Σ|e|/S
+_MAX_GROWTH_BYTES: Final = 5 * 2**20
+_MAX_RESIDUE_N: Final = 1e-12
 PERCEPTIBLE_N: Final = 0.05
 
-_SEEN: Final = {
+_REPORTED_AS: Final = {
     NON_FINITE: "not_finite",
     GLITCH: "displaced",
     SILENCE: "silent",
@@ -86,8 +86,8 @@ class SoakResult:
         """The injected faults of each kind."""
         rows = []
         for kind, name in enumerate(KINDS):
-            shown = kind != JUMP or self.virtual  # a tick may take long for other reasons too
-            seen = int(self.counts[_SEEN[kind]]) if shown else None
+            is_counted = kind != JUMP or self.virtual  # a tick may take long for other reasons too
+            seen = int(self.counts[_REPORTED_AS[kind]]) if is_counted else None
             times, readings = int(self.device.episodes[kind]), int(self.device.injected[kind])
             rows.append(InjectedFault(name, times=times, readings=readings, seen=seen))
         return tuple(rows)
@@ -95,17 +95,17 @@ class SoakResult:
     @property
     def findings(self) -> tuple[str, ...]:
         """One sentence per problem; empty if there is none."""
-        checks = (*self._limits(), *self._sums())
+        checks = (*self._limit_checks(), *self._count_checks())
         return tuple(sentence for sentence, wrong in checks if wrong)
 
-    def _limits(self) -> Iterator[tuple[str, bool]]:
+    def _limit_checks(self) -> Iterator[tuple[str, bool]]:
         """Yield the limits of samples, written forces and drift, and whether each is violated."""
         counts, device = self.counts, self.device
         first = f", first at tick {counts.first_tick}"
         yield f"{counts.excess} forces above the limit of {counts.limit_n:g} N{first}", counts.excess > 0
         yield f"{counts.no_number} non-finite forces{first}", counts.no_number > 0
-        spoilt = int(counts.limiters[LIMITER_NAMES.index("non_finite")])
-        yield f"{spoilt} non-finite liquid forces", spoilt > 0
+        non_finite = int(counts.limiters[LIMITER_NAMES.index("non_finite")])
+        yield f"{non_finite} non-finite liquid forces", non_finite > 0
         yield f"{device.not_finite} non-finite forces were written", device.not_finite > 0
         yield f"a force of {device.most_n:.3g} N was written", device.most_n > counts.limit_n + TOLERANCE_N
         yield (
@@ -117,19 +117,19 @@ class SoakResult:
         yield f"the clock deviates from the ticks by up to {counts.drift_ns} ns{first}", counts.drift_ns > 0
         yield f"the last force written is {device.last_n.tolist()} N, not zero", bool(device.last_n.any())
         drift, rests = self.drift.worst, self.rests  # values that must not accumulate; NaN counts as too large
-        yield f"the wake deviates from its definition by {drift:.2g} of Σ|e|/S", not drift <= _MOST_DRIFT
+        yield f"the wake deviates from its definition by {drift:.2g} of Σ|e|/S", not drift <= _MAX_DRIFT
         yield f"a wake of {rests.wake_mps:.2g} m/s remains after a rest", rests.wake_mps != 0.0
-        yield f"a force of {rests.force_n:.2g} N remains after a rest", not rests.force_n <= _MOST_RESIDUE_N
-        yield f"memory grew by {_mib(self.growth_bytes):.1f} MiB", self.growth_bytes > _MOST_GROWTH_BYTES
+        yield f"a force of {rests.force_n:.2g} N remains after a rest", not rests.force_n <= _MAX_RESIDUE_N
+        yield f"memory grew by {_mib(self.growth_bytes):.1f} MiB", self.growth_bytes > _MAX_GROWTH_BYTES
 
-    def _sums(self) -> Iterator[tuple[str, bool]]:
+    def _count_checks(self) -> Iterator[tuple[str, bool]]:
         """Yield consistency checks between two independent counts; some require that no sample is missing."""
         counts = self.counts
-        lost = counts.samples + self.dropped != self.ticks or counts.missing > self.dropped
-        yield f"{self.ticks} ticks do not equal {counts.samples} samples plus {self.dropped} dropped", lost
+        is_inconsistent = counts.samples + self.dropped != self.ticks or counts.missing > self.dropped
+        yield f"{self.ticks} ticks do not equal {counts.samples} samples plus {self.dropped} dropped", is_inconsistent
         if self.dropped == 0:
-            wrong = counts.overruns != self.overruns
-            yield f"{self.overruns} overruns, but the ticks imply {counts.overruns}", wrong
+            differs = counts.overruns != self.overruns
+            yield f"{self.overruns} overruns, but the ticks imply {counts.overruns}", differs
             for name, _, readings, seen in self.faults:
                 yield f"{readings} readings of {name}, but {seen} in telemetry", seen not in {None, readings}
 
@@ -142,13 +142,13 @@ class SoakResult:
 
     def text(self) -> str:
         clock = "virtual" if self.virtual else "real"
-        pace = self.ticks / self.rate_hz / self.took_s if self.took_s > 0.0 else 0.0
-        fast = f", {pace:.0f} times as fast as real time" if self.virtual else ""
+        speed = self.ticks / self.rate_hz / self.took_s if self.took_s > 0.0 else 0.0
+        speed_text = f", {speed:.0f} times as fast as real time" if self.virtual else ""
         return "\n".join(
             (
                 f"soak test of {self.hours:g} h in {clock} time at {self.rate_hz:g} Hz, seed {self.seed}",
                 f"liquids: {', '.join(self.scenes)}",
-                f"{self.ticks:,} of {self.planned:,} ticks in {self.took_s:.1f} s{fast}",
+                f"{self.ticks:,} of {self.planned:,} ticks in {self.took_s:.1f} s{speed_text}",
                 *self._drift_text(),
                 *self._force_text(),
                 *self._counter_text(),

@@ -1,8 +1,9 @@
-"""Every sample of a servo looked at once: what was promised of it, and what was counted on the way.
+"""Audit of every sample of a servo: violations of its guarantees, and counts of events.
 
-Promised: no force beyond the limit or not finite; none while it is stopped; between two forces sent at most
-the slew limit, unless a force stop, a fault or the passivity controller let go at once; no reading that is not finite;
-a deadline every period, but for those passed over; every tick in telemetry, or counted as dropped.
+The guarantees are: every force is finite and within the limit, and zero while the force is stopped; successive forces
+differ by at most the slew limit, unless a force stop, a fault or the passivity controller releases the force at once;
+no reading that is not finite is accepted; every period has a deadline, except skipped ones; every tick is in telemetry
+or counted as dropped.
 """
 
 from typing import Any, Final
@@ -78,29 +79,29 @@ class Audit:
         counts.samples += len(samples)
         counts.missing += missing.sum()
         counts.limiters += [np.count_nonzero(samples.limited_by(name)) for name in LIMITER_NAMES]
-        broken = (
+        violating = (
             self._check_readings(samples) | self._check_forces(samples, follows) | self._check_times(samples, follows)
         )
-        if counts.first_tick < 0 and broken.any():
-            counts.first_tick = samples.tick[np.argmax(broken)]
+        if counts.first_tick < 0 and violating.any():
+            counts.first_tick = samples.tick[np.argmax(violating)]
         self._was_ok, self._next_tick = bool(samples.is_ok[-1]), int(samples.tick[-1]) + 1
 
     def _check_readings(self, samples: Any) -> Any:
         """Count readings; return the samples (n,) with an invalid position that was accepted."""
-        new, lost, rejected = samples.fresh != 0, samples.is_lost, samples.limited_by("glitch")
-        is_place = np.isfinite(samples.position_m).all(axis=1)
+        is_fresh, is_lost, rejected = samples.fresh != 0, samples.is_lost, samples.limited_by("glitch")
+        is_position = np.isfinite(samples.position_m).all(axis=1)
         farthest_m = np.abs(samples.position_m).max(axis=1)
-        accepted = new & ~is_place & ~rejected
+        accepted = is_fresh & ~is_position & ~rejected
         for name, happened in (
             ("stale", samples.is_stale),
-            ("lost", ~new & lost),
-            ("silent", ~new & ~lost),
-            ("lost_at_write", new & lost),
-            ("refused", new & rejected),
-            ("not_finite", new & ~is_place),
+            ("lost", ~is_fresh & is_lost),
+            ("silent", ~is_fresh & ~is_lost),
+            ("lost_at_write", is_fresh & is_lost),
+            ("refused", is_fresh & rejected),
+            ("not_finite", is_fresh & ~is_position),
             ("accepted", accepted),
-            ("displaced", new & is_place & (farthest_m > self._displaced_m)),
-            ("buttons", new & samples.has_stop_button),
+            ("displaced", is_fresh & is_position & (farthest_m > self._displaced_m)),
+            ("buttons", is_fresh & samples.has_stop_button),
         ):
             self.counts[name] += np.count_nonzero(happened)
         return accepted
@@ -113,20 +114,20 @@ class Audit:
         is_force, stopped_limit_n = np.isfinite(size_n), samples.stopped_limit_n
         compared = follows & is_force
         released = compared & (np.isfinite(stopped_limit_n) | ~samples.is_ok)
-        repaying = compared & ~released & samples.limited_by("energy")
-        promised = compared & ~released & ~repaying
+        repaying_debt = compared & ~released & samples.limited_by("energy")
+        limited = compared & ~released & ~repaying_debt
         for name, values_n, measured in (
             ("most_n", size_n, is_force),
             ("release_step_n", change_n, released),
-            ("energy_step_n", change_n, repaying),
-            ("steepest_n", change_n, promised),
+            ("energy_step_n", change_n, repaying_debt),
+            ("steepest_n", change_n, limited),
         ):
             counts[name] = np.fmax.reduce(values_n[measured], initial=counts[name])
         violations = {
             "no_number": ~is_force,
             "excess": is_force & (size_n > counts.limit_n + TOLERANCE_N),
             "unstopped": is_force & (size_n > stopped_limit_n),
-            "steps": promised & (change_n > counts.slew_n + TOLERANCE_N),
+            "steps": limited & (change_n > counts.slew_n + TOLERANCE_N),
         }
         for name, violated in violations.items():
             counts[name] += np.count_nonzero(violated)
@@ -150,5 +151,5 @@ class Audit:
 
 
 def _previous_values(last: Any, values: Any) -> Any:
-    """Return ``last`` and all ``values`` (n, …) but the last one: of each sample, the value of the one before."""
+    """Return for each of the ``values`` (n, …) the value before it; ``last`` precedes the first one."""
     return np.concatenate([[last], values[:-1]])

@@ -1,12 +1,12 @@
-"""The servo as it is, for hours or days, while hand and hardware do all they can to it.
+"""Soak test: run the real servo for hours or days with demanding motions and injected hardware faults.
 
-Each round has three parts. *Rough*: every fault there is, liquids changed every few seconds, the force stopped and let
-on again, the device lost and found. *Steady*: one liquid, and only such faults as its wake must live through, so that
-its sums run on and on. *Rest*: the hand keeps still for longer than the wake is long. A round lasts an hour, or a
-quarter of a shorter soak, but five seconds at least.
+Each round has three parts. *Rough*: all kinds of faults; the liquid changes every few seconds, the force is stopped and
+restored, and the device is lost and reconnected. *Steady*: one liquid and only faults that its wake must survive, so
+that its sums run for a long time. *Rest*: the hand keeps still for longer than the wake lasts. A round takes an hour,
+or a quarter of a shorter soak test, but at least five seconds.
 
-Every sample is looked at (``sample_audit``), the wake is compared with its definition (``ledger``), memory is read at
-every tenth. On a virtual clock the same loop ticks as fast as it computes.
+Every sample is checked (``sample_audit``), the wake is compared with its definition (``ledger``), and memory is read at
+every tenth of the test. On a virtual clock the same loop runs as fast as it computes.
 """
 
 import math
@@ -51,35 +51,35 @@ class _RandomHand(ScriptedDevice):
         super().__init__(random, force_limit_n=force_limit_n)
         self._draw = random.random
 
-    def go_on(self) -> float:
-        """Begin another motion; return how long to continue it [s]."""
-        self._shake(TREMOR_M)
+    def start_motion(self) -> float:
+        """Start a random motion and return its duration [s]."""
+        self._set_tremor(TREMOR_M)
         kind = self._draw()
         if kind < 0.3:
             return self._reach()
         if kind < 0.4:
             self.rest()
             return 0.1 + self._draw()
-        return self._circle() if kind < 0.7 else self._tick_sharply()
+        return self._circle() if kind < 0.7 else self._zigzag()
 
     def keep_still(self) -> None:
         """Stay at rest without tremor, so that the encoder counts are constant."""
-        self._shake(0.0)
+        self._set_tremor(0.0)
         self.rest()
 
-    def _shake(self, amplitude_m: float) -> None:
+    def _set_tremor(self, amplitude_m: float) -> None:
         self.state.hand.tremor_m = amplitude_m
 
     def _reach(self) -> float:
         duration_s = 0.12 + 1.5 * self._draw() ** 2
-        x_m, y_m, z_m = self._place_m()
+        x_m, y_m, z_m = self._random_place_m()
         self.reach_to(x_m, y_m, z_m, duration_s)
         return duration_s + 0.3 * self._draw()
 
-    def _speed_mps(self) -> float:
+    def _random_speed_mps(self) -> float:
         return float(_SLOWEST_MPS * (_FASTEST_MPS / _SLOWEST_MPS) ** self._draw())
 
-    def _place_m(self) -> Vector:
+    def _random_place_m(self) -> Vector:
         x_m, y_m, z_m = (_REACH_M * (2 * self._draw() - 1) for _ in range(3))
         return x_m, y_m, z_m
 
@@ -88,32 +88,30 @@ class _RandomHand(ScriptedDevice):
         radius_m = _REACH_M * (0.1 + 0.9 * self._draw())
         duration_s = 1.0 + 5.0 * self._draw()
         t_s = np.arange(round(duration_s / _ROW_S) + 1) * _ROW_S
-        angle = t_s * self._speed_mps() / radius_m + 2 * math.pi * self._draw()
+        angle = t_s * self._random_speed_mps() / radius_m + 2 * math.pi * self._draw()
         y_m = 0.3 * radius_m * np.sin(0.37 * angle)
         self.follow(t_s, np.column_stack([radius_m * np.cos(angle), y_m, radius_m * np.sin(angle)]))
         return duration_s
 
-    def _tick_sharply(self) -> float:
+    def _zigzag(self) -> float:
         """Move along straight lines to random positions without slowing down at the corners."""
         legs = 4 + int(8 * self._draw())
-        places_m = np.array([self._place_m() for _ in range(legs)])
+        places_m = np.array([self._random_place_m() for _ in range(legs)])
         lengths_m = np.linalg.norm(np.diff(places_m, axis=0), axis=1)
-        t_s = np.concatenate([[0.0], np.cumsum(np.maximum(lengths_m / self._speed_mps(), _ROW_S))])
+        t_s = np.concatenate([[0.0], np.cumsum(np.maximum(lengths_m / self._random_speed_mps(), _ROW_S))])
         self.follow(t_s, places_m)
         return float(min(t_s[-1], 8.0))
 
 
-_MOST_HOURS: Final = 10_000.0
-_FEWEST_TICKS: Final = 1_000
-_LONGEST_ROUND_S: Final = 3600.0
-_SHORTEST_ROUND_S: Final = 5.0
-_ROUGH: Final = 0.35  # share of a round
+_MAX_HOURS: Final = 10_000.0
+_MIN_TICKS: Final = 1_000
+_MAX_ROUND_S: Final = 3600.0
+_MIN_ROUND_S: Final = 5.0
+_ROUGH_SHARE: Final = 0.35  # share of a round
 _SETTLING_S: Final = 2.0  # time for a hand at rest, and its velocity estimate, to settle
-_LONGEST_REST: Final = 0.4  # greatest share of a round for a rest; longer rests are omitted
-_MOST_TICKS: Final = (
-    1000  # ticks between two checks, fewer than a wake's elements, so that an error is seen before it is evicted
-)
-_WAITING_S: Final = 0.25  # the same on a clock that runs by itself
+_MAX_REST_SHARE: Final = 0.4  # greatest share of a round for a rest; longer rests are omitted
+_CHECK_TICKS: Final = 1000  # at most between two checks; a wake has more elements, so that no error is evicted unseen
+_POLL_S: Final = 0.25  # longest time between two checks on a real clock [s]
 PATIENCE_S: Final = 10.0  # while the servo runs no tick
 
 # kind: share of all faults, fewest and most readings
@@ -133,7 +131,7 @@ _STEADY_GAP: Final = (50, 4000)
 Part: TypeAlias = Literal["rough", "steady", "rest"]
 
 
-class _Stretch(NamedTuple):
+class _RoundPart(NamedTuple):
     """A part of a round; ``end`` is the tick before which it ends."""
 
     part: Part
@@ -164,9 +162,9 @@ class Soak:
         self._lasting = [name for name in self._names if wake_of(self._scenes[name])] or self._names
         self._rate_hz = next(iter(self._scenes.values())).rate_hz
         self.hours, self.virtual, self.seed = hours, virtual, seed
-        fewest = _FEWEST_TICKS / self._rate_hz / 3600
-        if not fewest <= hours <= _MOST_HOURS:
-            raise StudyError(f"a soak test lasts {fewest:.2g} to {_MOST_HOURS:g} hours, not {hours:g}")
+        fewest = _MIN_TICKS / self._rate_hz / 3600
+        if not fewest <= hours <= _MAX_HOURS:
+            raise StudyError(f"a soak test lasts {fewest:.2g} to {_MAX_HOURS:g} hours, not {hours:g}")
         self.ticks = round(hours * 3600 * self._rate_hz)
         self._draw = Random(seed).random  # noqa: S311 - simulated faults, not secrets
         clock = VirtualClock() if virtual else SystemClock()
@@ -183,7 +181,7 @@ class Soak:
         self._due, self._rests = _Due(), Rests()
         self._recoveries, self._loads, self._stops = 0, 0, 0
         self._presented = self._names[0]
-        self.stretch: _Stretch | None = None
+        self.stretch: _RoundPart | None = None
         self._still_from = 0
         self._memory: list[int] = []
         self._began_s = self._ticked_s = 0.0
@@ -193,10 +191,10 @@ class Soak:
         return int(self.servo.telemetry.written[0])
 
     def __enter__(self) -> Self:
-        ledger.prepare(self.reader.read())
+        ledger.compile_recording(self.reader.read())
         self.servo.prepare()
         for _ in range(2):
-            self.servo.telemetry.ring.copy()  # the most memory that a check needs, which does not count as growth
+            self.servo.telemetry.ring.copy()  # allocate the memory of a check now, so that it does not count as growth
         self._began_s = time.perf_counter()
         self._ticked_s = time.perf_counter()
         if not self.virtual:
@@ -211,24 +209,28 @@ class Soak:
     def step(self, ending: threading.Event | None = None) -> None:
         """Carry out the due actions, let some ticks pass, and check them; setting ``ending`` ends the wait early."""
         tick = self.done
-        stretch = self._stretch_at(tick)
+        stretch = self._part_at(tick)
         if self.stretch is None or (stretch.part, stretch.round) != (self.stretch.part, self.stretch.round):
-            self._leave()
+            self._leave_part()
             self.stretch = stretch
-            self._enter(stretch, tick)
-        self._act(stretch, tick)
-        due = [at for at in (self._due.motion, self._due.scene, self._due.stop, self._due.fade) if at > tick]
-        ticks = min(_MOST_TICKS, self.ticks - tick, stretch.end - tick, *(at - tick for at in due))
+            self._enter_part(stretch, tick)
+        self._run_due_actions(stretch, tick)
+        due = [
+            due_tick
+            for due_tick in (self._due.motion, self._due.scene, self._due.stop, self._due.fade)
+            if due_tick > tick
+        ]
+        ticks = min(_CHECK_TICKS, self.ticks - tick, stretch.end - tick, *(due_tick - tick for due_tick in due))
         if self.virtual:
             self.servo.advance(ticks)
         else:
-            (ending or threading.Event()).wait(min(ticks / self._rate_hz, _WAITING_S))
-        self._look()
+            (ending or threading.Event()).wait(min(ticks / self._rate_hz, _POLL_S))
+        self._check_samples()
         if self.servo.fault is not None:
             self._recover()
-        self._watch(tick)
+        self._check_progress(tick)
 
-    def _watch(self, before: int) -> None:
+    def _check_progress(self, before: int) -> None:
         """Raise ``ServoFault`` if the ticks have stopped without a fault, to avoid waiting forever."""
         now_s = time.perf_counter()
         if self.done > before:
@@ -240,9 +242,9 @@ class Soak:
         """Stop the servo, check the remaining samples, and return the result so far."""
         took_s = time.perf_counter() - self._began_s
         if self.done >= self.ticks:
-            self._leave()
+            self._leave_part()
         self.servo.stop()
-        self._look()
+        self._check_samples()
         counts, device = self.audit.counts, self.device.state
         return SoakResult(
             hours=self.hours,
@@ -265,22 +267,22 @@ class Soak:
             stops=self._stops,
         )
 
-    def _stretch_at(self, tick: int) -> _Stretch:
-        length = round(self._rate_hz * min(max(900 * self.hours, _SHORTEST_ROUND_S), _LONGEST_ROUND_S))
+    def _part_at(self, tick: int) -> _RoundPart:
+        length = round(self._rate_hz * min(max(900 * self.hours, _MIN_ROUND_S), _MAX_ROUND_S))
         number = tick // length
         rest = round(_SETTLING_S * self._rate_hz) + self._longest_wake
-        if rest > _LONGEST_REST * length:
+        if rest > _MAX_REST_SHARE * length:
             rest = 0
         first = number * length
         ends: tuple[tuple[Part, int], ...] = (
-            ("rough", first + round(_ROUGH * length)),
+            ("rough", first + round(_ROUGH_SHARE * length)),
             ("steady", first + length - rest),
             ("rest", first + length),
         )
         part, end = next((part, end) for part, end in ends if tick < end)
-        return _Stretch(part, number, end)
+        return _RoundPart(part, number, end)
 
-    def _enter(self, stretch: _Stretch, tick: int) -> None:
+    def _enter_part(self, stretch: _RoundPart, tick: int) -> None:
         self._due = _Due(motion=tick)
         if stretch.part == "rest":
             self._still_from = tick
@@ -295,14 +297,14 @@ class Soak:
         else:
             self.device.allow(_ROUGH_FAULTS, _ROUGH_GAP)
             self._due.scene = tick
-            self._due.stop = self._later(tick, 1.0, 10.0)
+            self._due.stop = self._random_later_tick(tick, 1.0, 10.0)
 
-    def _leave(self) -> None:
+    def _leave_part(self) -> None:
         sample = self.servo.telemetry.latest()
         if self._is_left_alone and sample is not None:
             self._rests.count += 1
-            self._rests.wake_mps = max(self._rests.wake_mps, _size(sample.wake_mps))
-            self._rests.force_n = max(self._rests.force_n, _size(sample.force_n))
+            self._rests.wake_mps = max(self._rests.wake_mps, _vector_length(sample.wake_mps))
+            self._rests.force_n = max(self._rests.force_n, _vector_length(sample.force_n))
 
     @property
     def _is_left_alone(self) -> bool:
@@ -310,25 +312,25 @@ class Soak:
         effects = {effect for liquid in self._scenes[self._presented].liquids for effect in liquid.effects}
         return self.stretch is not None and self.stretch.part == "rest" and not effects - {"drag", "wake"}
 
-    def _act(self, stretch: _Stretch, tick: int) -> None:
+    def _run_due_actions(self, stretch: _RoundPart, tick: int) -> None:
         """Carry out the due actions: change the motion or the liquid, stop the force, or release it again."""
         due = self._due
         if 0 <= due.motion <= tick:
-            due.motion = tick + max(1, round(self.hand.go_on() * self._rate_hz))
+            due.motion = tick + max(1, round(self.hand.start_motion() * self._rate_hz))
         if 0 <= due.scene <= tick:
             self._load(self._names[int(self._draw() * len(self._names))])
-            due.scene = self._later(tick, 0.2, 10.0)
+            due.scene = self._random_later_tick(tick, 0.2, 10.0)
         if 0 <= due.stop <= tick:
             self.servo.stop_force()
             self._stops += 1
-            due.stop = self._later(tick, 2.0, 20.0)
+            due.stop = self._random_later_tick(tick, 2.0, 20.0)
         if 0 <= due.fade <= tick:
             self.servo.fade_in()
             due.fade = -1
         elif due.fade < 0 and not self.servo.force_is_on and stretch.part != "rest":
-            due.fade = self._later(tick, 0.05, 1.0)
+            due.fade = self._random_later_tick(tick, 0.05, 1.0)
 
-    def _later(self, tick: int, least_s: float, most_s: float) -> int:
+    def _random_later_tick(self, tick: int, least_s: float, most_s: float) -> int:
         return tick + max(1, round((least_s + (most_s - least_s) * self._draw()) * self._rate_hz))
 
     def _load(self, name: str) -> None:
@@ -341,13 +343,13 @@ class Soak:
     def _recover(self) -> None:
         """Restart a servo that has stopped itself, as a host does once the cable is reconnected."""
         self.servo.stop()
-        self._look()
+        self._check_samples()
         self._recoveries += 1
         if not self.virtual:
             self.servo.start()
         self._load(self._presented)
 
-    def _look(self) -> None:
+    def _check_samples(self) -> None:
         """Check all new samples and, at every tenth of the test, the memory."""
         samples = self.reader.read()
         self.audit.check(samples)
@@ -359,7 +361,7 @@ class Soak:
             self._memory.append(psutil.Process().memory_info().rss)
 
 
-def _size(vector: Floats) -> float:
+def _vector_length(vector: Floats) -> float:
     """Return the length of a vector (3,); infinite if it is not finite."""
     return float(np.nan_to_num(np.linalg.norm(vector), nan=np.inf))
 

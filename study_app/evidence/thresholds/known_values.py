@@ -1,10 +1,10 @@
-"""Whether known thresholds and exponents are recovered: by methods and analysis alone, and by the whole program.
+"""Tests whether known thresholds and exponents are recovered, by methods and analysis alone and by the whole program.
 
-In many studies of observers who differ what is presented is what was requested, so that errors are those of methods
-and estimates. Rehearsed participants pass through servo, store, unblinding and analysis.
+In many simulated studies with differing observers the presented levels equal the requested ones, so that errors are
+those of methods and estimates. The data of rehearsed participants pass through servo, store, unblinding and analysis.
 
-In magnitude estimation an observer's estimate is exp(n y + 0.25 N), where y is the logarithm of what reaches the hand:
-mean force over RMS speed. The exponent over the varied number is n times the slope of y over its logarithm at the
+In magnitude estimation an observer's estimate is exp(n y + 0.25 N), where y is the logarithm of the resistance at the
+hand: mean force over RMS speed. The exponent over the varied number is n times the slope of y over its logarithm at the
 task's pace, from which n follows.
 """
 
@@ -59,32 +59,32 @@ _SHIPPED: Final[dict[str, Observer]] = {
     "delayjnd": OBSERVER,
     "forcedelay": Observer(delay_jnd_s=0.015),
 }
-"""The shipped studies with thresholds. Known are a Weber fraction of 0.24 at 75 % correct, which is 0.19 at 71 %
-(Jones, Hunter & Lafontaine 1997), 45 ms (Vogels 2004), 25 ms at every standard (below 33 ms: Ellis et al. 1999),
-and 15 ms of a force (Rank et al. 2010)."""
+"""The shipped studies with thresholds, and their observers. The known values are a Weber fraction of 0.24 at 75 %
+correct, or 0.19 at 71 % (Jones, Hunter & Lafontaine 1997), 45 ms (Vogels 2004), 25 ms at every standard (below 33 ms:
+Ellis et al. 1999), and 15 ms for a force (Rank et al. 2010)."""
 NAMES: Final = (*_SHIPPED, "thickness")
 """The shipped studies that are validated."""
 EXPONENT: Final = 0.44
-"""Of perceived thickness over viscosity (Stevens & Guirao 1964)."""
+"""Exponent of perceived thickness over viscosity (Stevens & Guirao 1964)."""
 _POINTS: Final = 64
 _BETWEEN_SESSIONS: Final = 10**SESSION_SD
-"""Factor between a person's thresholds of several sessions, as measured."""
+"""Factor by which a person's thresholds typically vary between sessions."""
 
 PEOPLE: Final = 20
-"""Of a study: so many, and ±`_NEAR`, are planned in the shipped studies (``analysis.participants``, ``precision``)."""
+"""Participants of a simulated study; like `_NEAR`, planned in the shipped studies (``participants``, ``precision``)."""
 _REHEARSED: Final = 2
-_ERROR_MOST: Final = 0.05
+_MAX_ERROR: Final = 0.05
 _NEAR: Final = 0.15
-_NEAR_SHARE: Final = 0.95
-COVERAGE_LEAST: Final = 0.93
-_OWN_COVERAGE_MOST: Final = 0.98
-_SLOPE_ERROR_MOST: Final = 0.15
-_EXPONENT_ERROR_MOST: Final = 0.03
-_DELIVERED_LEAST: Final = 0.99
+_MIN_NEAR_SHARE: Final = 0.95
+MIN_COVERAGE: Final = 0.93
+_MAX_OWN_COVERAGE: Final = 0.98
+_MAX_SLOPE_ERROR: Final = 0.15
+_MAX_EXPONENT_ERROR: Final = 0.03
+_MIN_DELIVERED: Final = 0.99
 _FAMILY_ERROR: Final = 0.05
 """Probability that chance alone takes any value beyond its limit, shared equally among all (Bonferroni)."""
-_KIND_SHARE: Final = 20
-"""For each kind of people there is one study to so many others."""
+_STUDIES_PER_KIND_STUDY: Final = 20
+"""Ratio of all simulated studies to those for each kind of people."""
 
 
 class Verdict(NamedTuple):
@@ -124,50 +124,50 @@ class Measure:
     least: float = -math.inf
     most: float = math.inf
     limit: str
-    written: Callable[[float], str]
+    format_value: Callable[[float], str]
 
-    def judged(self, confidence: float) -> Verdict:
+    def verdict(self, confidence: float) -> Verdict:
         """Return the verdict: the limit is exceeded if the whole interval lies beyond it."""
         low, high = self.interval(confidence)
-        value = self.written(self.value)
+        value = self.format_value(self.value)
         if low < high:
-            value += f" [{self.written(low)}, {self.written(high)}]"
+            value += f" [{self.format_value(low)}, {self.format_value(high)}]"
         holds = low <= self.most and high >= self.least
         return Verdict(study=self.study, what=self.what, value=value, limit=self.limit, holds=holds)
 
 
 def verdicts_on(measures: Sequence[Measure]) -> list[Verdict]:
     """Return the verdicts; the probability that any limit is exceeded by chance is at most `_FAMILY_ERROR`."""
-    return [measure.judged(1.0 - _FAMILY_ERROR / len(measures)) for measure in measures]
+    return [measure.verdict(1.0 - _FAMILY_ERROR / len(measures)) for measure in measures]
 
 
 def mean_interval(values: ArrayLike) -> Callable[[float], tuple[float, float]]:
     """Return Student's t interval for the mean over independent studies, as a function of the confidence."""
-    of_studies = np.asarray(values, float)
-    mean, error = float(of_studies.mean()), float(of_studies.std(ddof=1)) / math.sqrt(len(of_studies))
+    study_values = np.asarray(values, float)
+    mean, error = float(study_values.mean()), float(study_values.std(ddof=1)) / math.sqrt(len(study_values))
 
     def ends(confidence: float) -> tuple[float, float]:
-        half = float(student.ppf((1 + confidence) / 2, len(of_studies) - 1)) * error
+        half = float(student.ppf((1 + confidence) / 2, len(study_values) - 1)) * error
         return mean - half, mean + half
 
     return ends
 
 
-def share_interval(shares: ArrayLike, each: int) -> Callable[[float], tuple[float, float]]:
-    """Return the interval of the mean share of studies (n,) with ``each`` cases, which may be correlated.
+def share_interval(shares: ArrayLike, cases_per_study: int) -> Callable[[float], tuple[float, float]]:
+    """Return the interval of the mean share of studies (n,) with ``cases_per_study`` cases, which may be correlated.
 
     It is the Clopper–Pearson interval for the effective number of independent cases (Korn & Graubard 1998, Survey
     Methodology 24, 193–201).
     """
-    of_studies = np.asarray(shares, float)
-    share, studies = float(of_studies.mean()), len(of_studies)
-    variance = float(of_studies.var(ddof=1)) / studies
-    cases = min(share * (1 - share) / variance, studies * each) if variance else studies
+    study_shares = np.asarray(shares, float)
+    share, studies = float(study_shares.mean()), len(study_shares)
+    variance = float(study_shares.var(ddof=1)) / studies
+    cases = min(share * (1 - share) / variance, studies * cases_per_study) if variance else studies
 
     def ends(confidence: float) -> tuple[float, float]:
-        tail, held = (1 - confidence) / 2, share * cases
-        low = float(beta.ppf(tail, held, cases - held + 1)) if held else 0.0
-        return low, float(beta.ppf(1 - tail, held + 1, cases - held)) if held < cases else 1.0
+        tail, successes = (1 - confidence) / 2, share * cases
+        low = float(beta.ppf(tail, successes, cases - successes + 1)) if successes else 0.0
+        return low, float(beta.ppf(1 - tail, successes + 1, cases - successes)) if successes < cases else 1.0
 
     return ends
 
@@ -195,7 +195,7 @@ class StudyFound:
 
 @dataclass(frozen=True, slots=True)
 class Rehearsed:
-    """Share of intervals delivered as requested, findings of verify, reproduce and replay, and estimated values."""
+    """The share of intervals delivered as requested, the number of findings of all checks, and the estimated values."""
 
     delivered: float
     findings: int
@@ -223,7 +223,7 @@ class _KnownValue(ABC):
         ]
         return float(np.std(errors, ddof=1))
 
-    def _apart(self, people: int, seed: int, number: int) -> tuple[list[float], Draw]:
+    def _draw_deviations(self, people: int, seed: int, number: int) -> tuple[list[float], Draw]:
         """Return the participants' deviations from the mean, in ln of `BETWEEN_PEOPLE`, and the random generator."""
         draw = stream(seed, f"validate/{self.name}/{number}/people").random
         return [math.log(BETWEEN_PEOPLE) * normal(draw) for _ in range(people)], draw
@@ -232,8 +232,10 @@ class _KnownValue(ABC):
         self, observers: Sequence[Observer], seed: int, number: int, sense: Callable[[Any], float] = as_requested
     ) -> pd.DataFrame:
         """Return the answers in the block; ``sense`` returns the quantity that observers perceive in an interval."""
-        who = {f"P{at:03d}": observer for at, observer in enumerate(observers, start=1)}
-        rows = pd.DataFrame(simulate_study(self.protocol, who, seed, f"validate/{self.name}/{number}", sense))
+        observers_by_id = {f"P{index:03d}": observer for index, observer in enumerate(observers, start=1)}
+        rows = pd.DataFrame(
+            simulate_study(self.protocol, observers_by_id, seed, f"validate/{self.name}/{number}", sense)
+        )
         return rows[rows["block"] == self.block.id]
 
 
@@ -265,13 +267,15 @@ class KnownThreshold(_KnownValue):
         Thresholds also vary between sessions. ``kind`` is one of `KINDS` or `MIXED`; by default participants differ in
         lapse rates up to `LAPSES_MOST`.
         """
-        apart, draw = self._apart(PEOPLE, seed, number)
+        deviations, draw = self._draw_deviations(PEOPLE, seed, number)
         name = "delay_jnd_s" if self._of_delay else "weber_fraction"
-        for one in apart:
-            own = replace(self.observer, person=of_kind(kind, draw) if kind else Person(lapse=LAPSES_MOST * draw()))
-            own = replace(own, **{name: getattr(own, name) * math.exp(one)})
-            today = getattr(own, name) * _BETWEEN_SESSIONS ** normal(draw)
-            yield replace(own, **{name: today}), self._threshold(own)
+        for deviation in deviations:
+            participant = replace(
+                self.observer, person=of_kind(kind, draw) if kind else Person(lapse=LAPSES_MOST * draw())
+            )
+            participant = replace(participant, **{name: getattr(participant, name) * math.exp(deviation)})
+            session_threshold = getattr(participant, name) * _BETWEEN_SESSIONS ** normal(draw)
+            yield replace(participant, **{name: session_threshold}), self._threshold(participant)
 
     def simulate(self, number: int, seed: int, kind: str = "", observers: Sequence[Observer] = ()) -> StudyFound:
         """Return the estimates of one study of ``observers``, by default from `people`."""
@@ -289,38 +293,38 @@ class KnownThreshold(_KnownValue):
             settings=(),
             method=protocol.method_of(block),
         )
-        truths = {f"P{at:03d}": threshold for at, (_, threshold) in enumerate(people, start=1)}
-        found: dict[str | None, list[Estimated]] = {}
+        truths = {f"P{index:03d}": threshold for index, (_, threshold) in enumerate(people, start=1)}
+        estimates: dict[str | None, list[Estimated]] = {}
         for row in thresholds(levels, frame):
             truth = self.threshold if row.participant is None else truths[row.participant]
             assert row.low is not None and row.high is not None  # noqa: S101, PT018 - ten participants have an interval
-            found.setdefault(row.participant, []).append(
+            estimates.setdefault(row.participant, []).append(
                 Estimated(value=row.threshold, low=row.low, high=row.high, truth=truth)
             )
-        group = tuple(found.pop(None))
-        return StudyFound(group, tuple(map(tuple, found.values())))
+        group = tuple(estimates.pop(None))
+        return StudyFound(group, tuple(map(tuple, estimates.values())))
 
     def errors(self, studies: Sequence[StudyFound]) -> Array:
         """Return the error of the group's ln threshold in each study, relative to its own participants."""
         truths = [[estimate.truth for person in study.own for estimate in person] for study in studies]
-        of_groups = [self.error([estimate.value for estimate in study.group]) for study in studies]
-        return np.array(of_groups) - [self.error(of_people) for of_people in truths]
+        group_errors = [self.error([estimate.value for estimate in study.group]) for study in studies]
+        return np.array(group_errors) - [self.error(people_truths) for people_truths in truths]
 
     def measures(self, studies: Sequence[StudyFound]) -> Iterator[Measure]:
         """Yield the error and, with several standards, the slope of ln JND against ln standard."""
         errors = self.errors(studies)
         yield _error_measure(self.name, errors)
-        near = np.abs(np.expm1(errors)) <= _NEAR
+        is_near = np.abs(np.expm1(errors)) <= _NEAR
         yield Measure(
             study=self.name,
             what=f"studies with {PEOPLE} participants within ±15 %",
-            value=float(near.mean()),
-            interval=share_interval(near, 1),
-            least=_NEAR_SHARE,
+            value=float(is_near.mean()),
+            interval=share_interval(is_near, 1),
+            least=_MIN_NEAR_SHARE,
             limit="at least 95 %",
-            written=percent,
+            format_value=percent,
         )
-        standards = np.array([one for one in self.protocol.standards_of(self.block) if one is not None])
+        standards = np.array([standard for standard in self.protocol.standards_of(self.block) if standard is not None])
         if len(standards) < 2:
             return
         unit = standards if self.protocol.stimulus_of(self.block).level_kind == "weber" else 1.0
@@ -328,22 +332,25 @@ class KnownThreshold(_KnownValue):
             [jnd_slope(standards, np.array([estimate.value for estimate in person]) * unit) for person in study.own]
             for study in studies
         ]
-        of_studies, true = np.mean(slopes, axis=1), 0.0 if self._of_delay else 1.0  # a constant JND, or Weber's law
+        mean_slopes, expected = (
+            np.mean(slopes, axis=1),
+            0.0 if self._of_delay else 1.0,
+        )  # a constant JND, or Weber's law
         yield Measure(
             study=self.name,
             what="exponent of the JND against the standard",
-            value=float(of_studies.mean()),
-            interval=mean_interval(of_studies),
-            least=true - _SLOPE_ERROR_MOST,
-            most=true + _SLOPE_ERROR_MOST,
-            limit=f"{true:g} ± {_SLOPE_ERROR_MOST:g}",
-            written="{:.3f}".format,
+            value=float(mean_slopes.mean()),
+            interval=mean_interval(mean_slopes),
+            least=expected - _MAX_SLOPE_ERROR,
+            most=expected + _MAX_SLOPE_ERROR,
+            limit=f"{expected:g} ± {_MAX_SLOPE_ERROR:g}",
+            format_value="{:.3f}".format,
         )
 
-    def values_of(self, block: LevelBlock, rows: pd.DataFrame) -> Iterator[float]:
+    def estimates_of(self, block: LevelBlock, rows: pd.DataFrame) -> Iterator[float]:
         return (row.threshold for row in thresholds(block, rows) if row.participant is not None)
 
-    def recovered(self, values: Sequence[float], spread: float) -> Measure:
+    def recovery_measure(self, values: Sequence[float], spread: float) -> Measure:
         """Return the threshold of rehearsed participants; ``spread`` is the standard error (ln) of such a study."""
         error = self.error(values)
 
@@ -359,7 +366,7 @@ class KnownThreshold(_KnownValue):
             least=self.threshold,
             most=self.threshold,
             limit=f"{self.threshold:g}",
-            written="{:.3g}".format,
+            format_value="{:.3g}".format,
         )
 
 
@@ -388,51 +395,56 @@ class KnownExponent(_KnownValue):
 
     def simulate(self, number: int, seed: int, people: int = PEOPLE) -> StudyFound:
         """Return the estimates of one study; observers perceive the force that reaches the hand at the pace."""
-        reached = dict(zip(_levels(self.protocol, self.block), self.resistances, strict=True))
-        truths = [EXPONENT * (1 + one) for one in self._apart(people, seed, number)[0]]
+        resistance_by_level = dict(zip(_levels(self.protocol, self.block), self.resistances, strict=True))
+        truths = [EXPONENT * (1 + one) for one in self._draw_deviations(people, seed, number)[0]]
         observers = [self._observer(truth) for truth in truths]
         frame = self._simulate_answers(
-            observers, seed, number, lambda presented: reached.get(presented.value, math.nan)
+            observers, seed, number, lambda presented: resistance_by_level.get(presented.value, math.nan)
         )
-        own = np.array([estimate_slope(rows["level"], rows["answer"]) for _, rows in frame.groupby("participant")])
-        low, high = student_interval(own)
+        slopes = np.array([estimate_slope(rows["level"], rows["answer"]) for _, rows in frame.groupby("participant")])
+        low, high = student_interval(slopes)
         assert low is not None and high is not None  # noqa: S101, PT018 - several participants have an interval
-        each = tuple((Estimated(one, truth=truth),) for one, truth in zip(own.tolist(), truths, strict=True))
-        return StudyFound((Estimated(value=float(own.mean()), low=low, high=high, truth=EXPONENT),), each)
+        by_participant = tuple(
+            (Estimated(one, truth=truth),) for one, truth in zip(slopes.tolist(), truths, strict=True)
+        )
+        return StudyFound((Estimated(value=float(slopes.mean()), low=low, high=high, truth=EXPONENT),), by_participant)
 
     def measures(self, studies: Sequence[StudyFound]) -> Iterator[Measure]:
         """Yield the mean exponent."""
-        of_studies = [study.group[0].value for study in studies]
+        exponents = [study.group[0].value for study in studies]
         yield Measure(
             study=self.name,
             what=f"exponent against {self.protocol.stimulus_of(self.block).vary}",
-            value=float(np.mean(of_studies)),
-            interval=mean_interval(of_studies),
-            least=EXPONENT - _EXPONENT_ERROR_MOST,
-            most=EXPONENT + _EXPONENT_ERROR_MOST,
-            limit=f"{EXPONENT:g} ± {_EXPONENT_ERROR_MOST:g}",
-            written="{:.3f}".format,
+            value=float(np.mean(exponents)),
+            interval=mean_interval(exponents),
+            least=EXPONENT - _MAX_EXPONENT_ERROR,
+            most=EXPONENT + _MAX_EXPONENT_ERROR,
+            limit=f"{EXPONENT:g} ± {_MAX_EXPONENT_ERROR:g}",
+            format_value="{:.3f}".format,
         )
 
-    def values_of(self, block: LevelBlock, rows: pd.DataFrame) -> Iterator[float]:
+    def estimates_of(self, block: LevelBlock, rows: pd.DataFrame) -> Iterator[float]:
         return (
             estimated_exponent.exponent
             for estimated_exponent in estimated_exponents(block, rows)
             if estimated_exponent.participant is not None
         )
 
-    def recovered(self, values: Sequence[float], spread: float) -> Measure:
+    def recovery_measure(self, values: Sequence[float], spread: float) -> Measure:
         """Return the mean exponent of rehearsed participants; ``spread`` is the standard error of such a study."""
         mean = float(np.mean(values))
         return Measure(
             study=self.name,
             what=f"exponent of {len(values)} participants",
             value=mean,
-            interval=lambda sure: (mean - _normal_half(sure) * spread, mean + _normal_half(sure) * spread),
+            interval=lambda confidence: (
+                mean - _normal_half(confidence) * spread,
+                mean + _normal_half(confidence) * spread,
+            ),
             least=EXPONENT,
             most=EXPONENT,
             limit=f"{EXPONENT:g}",
-            written="{:.3f}".format,
+            format_value="{:.3f}".format,
         )
 
 
@@ -457,8 +469,10 @@ def known_value(name: str, protocol: Protocol) -> Known:
         if protocol.design_of(block).reply == "number" and stimulus.vary not in DELAYS and isinstance(task, Follow):
             scene = protocol.scene_for(protocol.condition_of(stimulus))
             fastest_mps = task.fastest_stroke(protocol.device.workspace_m).speed_mps
-            of_levels = [override_all(scene, {stimulus.vary: level}) for level in _levels(protocol, block)]
-            return KnownExponent(name, protocol, block, tuple(_resistance(it, fastest_mps) for it in of_levels))
+            level_scenes = [override_all(scene, {stimulus.vary: level}) for level in _levels(protocol, block)]
+            return KnownExponent(
+                name, protocol, block, tuple(_resistance(level_scene, fastest_mps) for level_scene in level_scenes)
+            )
     for block in blocks:
         standards = protocol.standards_of(block)
         if protocol.stimulus_of(block).level_kind != "value" and not all(standard is None for standard in standards):
@@ -481,22 +495,22 @@ def _resistance(scene: Any, fastest_mps: float) -> float:
     return mean_n / (fastest_mps / math.sqrt(2))
 
 
-def rehearsed(known: Known, source: bytes, seed: int) -> Rehearsed:
+def rehearse_known(known: Known, source: bytes, seed: int) -> Rehearsed:
     """Rehearse `_REHEARSED` participants of a protocol in a temporary folder; return the results."""
-    with tempfile.TemporaryDirectory() as place:
-        file, folder = Path(place) / f"{known.name}.toml", Path(place) / "study"
+    with tempfile.TemporaryDirectory() as temporary:
+        file, folder = Path(temporary) / f"{known.name}.toml", Path(temporary) / "study"
         file.write_bytes(source)
         rehearse(str(file), participants=_REHEARSED, seed=seed, results=folder, observer=known.observer)
         sessions = StudyFolder(folder).sessions()
-        findings = len(verify_study(folder, None).errors)
-        findings += sum(len(reproduce_session(session.path).differences) for session in sessions)
-        findings += sum(not replay(session.path).proved for session in sessions)
+        finding_count = len(verify_study(folder, None).errors)
+        finding_count += sum(len(reproduce_session(session.path).differences) for session in sessions)
+        finding_count += sum(not replay(session.path).proved for session in sessions)
         unblind(folder, "validate", "to compare the results with the known values")
         study = load_study(folder)
         intervals = study.intervals[study.intervals["block"] == known.block.id]
         block = next(block for block in study.levels if block.id == known.block.id)
-        values = tuple(known.values_of(block, tracks(study)))
-        return Rehearsed(float(intervals["invalid_reasons"].isna().mean()), findings, values)
+        values = tuple(known.estimates_of(block, tracks(study)))
+        return Rehearsed(float(intervals["invalid_reasons"].isna().mean()), finding_count, values)
 
 
 def percent(share: float) -> str:
@@ -516,34 +530,37 @@ def _error_measure(study: str, errors: Array) -> Measure:
         study=study,
         what="mean error of the threshold",
         value=math.expm1(float(errors.mean())),
-        interval=lambda sure: (math.expm1(ends(sure)[0]), math.expm1(ends(sure)[1])),
-        least=-_ERROR_MOST,
-        most=_ERROR_MOST,
+        interval=lambda confidence: (math.expm1(ends(confidence)[0]), math.expm1(ends(confidence)[1])),
+        least=-_MAX_ERROR,
+        most=_MAX_ERROR,
         limit="within ±5 %",
-        written=lambda share: f"{100 * share:+.1f} %",
+        format_value=lambda share: f"{100 * share:+.1f} %",
     )
 
 
 def coverage(name: str, studies: Sequence[StudyFound]) -> Iterator[Measure]:
     """Yield how often the 95 % intervals of groups and of participants contain the true value."""
-    of_groups = [[estimate.covered for estimate in study.group] for study in studies]
-    of_people = [
+    group_coverage = [[estimate.covered for estimate in study.group] for study in studies]
+    people_coverage = [
         [estimate.covered for person in study.own for estimate in person if not math.isnan(estimate.low)]
         for study in studies
     ]
-    for whose, covered, most in (("the group's", of_groups, 1.0), ("participants'", of_people, _OWN_COVERAGE_MOST)):
-        shares = [float(np.mean(of_study)) for of_study in covered if of_study]
+    for owner, covered, most in (
+        ("the group's", group_coverage, 1.0),
+        ("participants'", people_coverage, _MAX_OWN_COVERAGE),
+    ):
+        shares = [float(np.mean(study_coverage)) for study_coverage in covered if study_coverage]
         if not shares:
             continue
         yield Measure(
             study=name,
-            what=f"coverage of {whose} 95 % intervals",
+            what=f"coverage of {owner} 95 % intervals",
             value=float(np.mean(shares)),
             interval=share_interval(shares, max(map(len, covered))),
-            least=COVERAGE_LEAST,
+            least=MIN_COVERAGE,
             most=most,
             limit="at least 93 %" if most == 1.0 else f"93 to {100 * most:.0f} %",
-            written=percent,
+            format_value=percent,
         )
 
 
@@ -554,9 +571,9 @@ def rehearsed_measures(known: Known, found: Rehearsed, spread: float) -> Iterato
         what="intervals delivered as requested",
         value=found.delivered,
         interval=lambda _confidence: (found.delivered, found.delivered),
-        least=_DELIVERED_LEAST,
+        least=_MIN_DELIVERED,
         limit="at least 99 %",
-        written=percent,
+        format_value=percent,
     )
     yield Measure(
         study=known.name,
@@ -565,9 +582,9 @@ def rehearsed_measures(known: Known, found: Rehearsed, spread: float) -> Iterato
         interval=lambda _confidence: (found.findings, found.findings),
         most=0,
         limit="0",
-        written=str,
+        format_value=str,
     )
-    yield known.recovered(found.values, spread)
+    yield known.recovery_measure(found.values, spread)
 
 
 def validate_known_values(
@@ -584,47 +601,55 @@ def validate_known_values(
     ``say`` with a line when each rehearsal, study and kind of participants is finished.
     """
     measures: list[Measure] = []
-    every: list[StudyFound] = []
-    rehearsals = [executor.submit(rehearsed, one, source, seeds[0]) for source, one in known]
-    for (_, one), rehearsal in zip(known, rehearsals, strict=True):
+    all_studies: list[StudyFound] = []
+    rehearsals = [executor.submit(rehearse_known, value, source, seeds[0]) for source, value in known]
+    for (_, value), rehearsal in zip(known, rehearsals, strict=True):
 
-        def finished(_rehearsal: object, name: str = one.name) -> None:
+        def finished(_rehearsal: object, name: str = value.name) -> None:
             say(f"{name}: {_REHEARSED} simulated participants rehearsed")
 
         rehearsal.add_done_callback(finished)
     cases = [(number, seed) for seed in dict.fromkeys(seeds) for number in range(studies)]
-    for (_, one), rehearsal in zip(known, rehearsals, strict=True):
+    for (_, value), rehearsal in zip(known, rehearsals, strict=True):
 
-        def counted(done: int, name: str = one.name) -> None:
+        def counted(done: int, name: str = value.name) -> None:
             progress(f"{name}: {done} of {len(cases)} studies", done / len(cases))
 
-        progress(f"{one.name}: studies and rehearsals", 0.0)
-        found = run(one.simulate, cases, executor, counted)
-        every += found
-        measures += [*one.measures(found), *coverage(one.name, found)]
-        progress(f"{one.name}: rehearsing {_REHEARSED} participants", None)
-        measures += rehearsed_measures(one, rehearsal.result(), one.spread(found, _REHEARSED))
-        say(f"{one.name}: {len(cases)} studies")
-    measures += coverage("all studies", every)
-    of_thresholds = [one for _, one in known if isinstance(one, KnownThreshold)]
-    cases = cases[:: max(1, min(_KIND_SHARE, len(cases) // 2))]
-    for kind in (*KINDS, MIXED) if of_thresholds else ():
+        progress(f"{value.name}: studies and rehearsals", 0.0)
+        studies_found = run(value.simulate, cases, executor, counted)
+        all_studies += studies_found
+        measures += [*value.measures(studies_found), *coverage(value.name, studies_found)]
+        progress(f"{value.name}: rehearsing {_REHEARSED} participants", None)
+        measures += rehearsed_measures(value, rehearsal.result(), value.spread(studies_found, _REHEARSED))
+        say(f"{value.name}: {len(cases)} studies")
+    measures += coverage("all studies", all_studies)
+    known_thresholds = [value for _, value in known if isinstance(value, KnownThreshold)]
+    cases = cases[:: max(1, min(_STUDIES_PER_KIND_STUDY, len(cases) // 2))]
+    for kind in (*KINDS, MIXED) if known_thresholds else ():
         progress(f"people: {kind}", None)
-        found_of = [run(threshold.simulate, [(*it, kind) for it in cases], executor) for threshold in of_thresholds]
+        found_by_threshold = [
+            run(threshold.simulate, [(*case, kind) for case in cases], executor) for threshold in known_thresholds
+        ]
         errors = np.concatenate(
-            [threshold.errors(found) for threshold, found in zip(of_thresholds, found_of, strict=True)]
+            [
+                threshold.errors(studies_found)
+                for threshold, studies_found in zip(known_thresholds, found_by_threshold, strict=True)
+            ]
         )
-        measures += [_error_measure(kind, errors), *coverage(kind, [study for found in found_of for study in found])]
+        measures += [
+            _error_measure(kind, errors),
+            *coverage(kind, [study for studies_found in found_by_threshold for study in studies_found]),
+        ]
         say(f"people, {kind}: {len(errors)} studies")
     return verdicts_on(measures)
 
 
 def known_values_evidence(verdicts: Sequence[Verdict], heading: str) -> Evidence:
     """Return one row per value with its limit, as Markdown below a heading and as CSV."""
-    table = Table(Verdict._fields, [(*it[:-1], "yes" if it.holds else "no") for it in verdicts], left=5)
-    csv = Table(Verdict._fields, [(*it[:-1], str(it.holds).lower()) for it in verdicts]).csv()
+    table = Table(Verdict._fields, [(*verdict[:-1], "yes" if verdict.holds else "no") for verdict in verdicts], left=5)
+    csv = Table(Verdict._fields, [(*verdict[:-1], str(verdict.holds).lower()) for verdict in verdicts]).csv()
     text = f"{heading}\n\n{table.markdown()}\n"
-    beyond = sum(not it.holds for it in verdicts)
+    beyond = sum(not verdict.holds for verdict in verdicts)
     closing = f"{beyond} of {len(verdicts)} values exceed their limits" if beyond else "every value is within its limit"
     files = {"thresholds.md": text, "thresholds.csv": csv}
     return Evidence(text, files, missed=beyond > 0, closing=closing)

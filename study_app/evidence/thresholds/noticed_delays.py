@@ -1,9 +1,9 @@
-"""The delay that people rate as noticed, and the one that they detect: the same simulated people in both procedures.
+"""Comparison of the delay that people rate as noticed with the one that they detect, for the same simulated people.
 
-A delay reaches a person with Gaussian noise, whose spread follows from the person's just-noticeable difference. In
+A person perceives a delay with Gaussian noise, whose spread follows from the person's just-noticeable difference. In
 ``delaydetect`` the person chooses the interval that seems more delayed. In ``rek2024`` the person rates the statement
-``different`` after each delay: the noisy delay is compared with a criterion of the person's own, as in the answer model
-of rehearsals. Both sets of answers are analysed as in the report. The figure has the shares over the delay, and both
+``different`` after each delay by comparing the noisy delay with a personal criterion, as in the answer model of
+rehearsals. Both sets of answers are analysed as in the report. The figure shows the shares over the delay, and both
 thresholds over the criterion.
 """
 
@@ -27,13 +27,13 @@ from study_app.psychophysics.families import success
 from study_app.psychophysics.people import normal
 
 JND_S: Final = 0.045
-"""Of a delay, at 75 % correct in two intervals (Vogels 2004)."""
+"""Just-noticeable difference of a delay at 75 % correct in two intervals [s] (Vogels 2004)."""
 _BETWEEN_PEOPLE: Final = 1.2
 MEAN_CRITERION_S: Final = 0.13
-"""Of the answer model, which was chosen to agree with the thesis."""
+"""Mean criterion of the answer model [s], chosen to agree with the thesis."""
 CRITERIA_S: Final = (0.06, 0.095, MEAN_CRITERION_S, 0.165)
 _ADAPTED_S: Final = 0.03
-"""How far earlier delays have moved the delay that seems to be none."""
+"""Adaptation: the shift, by earlier delays, of the delay that is perceived as none [s]."""
 _STATEMENT: Final = "different"
 LIKERT, FORCED_CHOICE = "rek2024", "delaydetect"
 
@@ -74,34 +74,39 @@ class Detected(NamedTuple):
 class Compared:
     """The results of both procedures for the same participants.
 
-    ``detected_ms`` is the group's threshold in the forced choice [ms]; ``rated`` are the ratings by criterion, the last
-    one after adaptation.
+    ``detected_ms`` is the group's threshold in the forced choice [ms]; ``ratings`` are the ratings by criterion,
+    the last one after adaptation.
     """
 
     people: int
     seed: int
     detected_ms: Detected
-    rated: tuple[Rated, ...]
+    ratings: tuple[Rated, ...]
 
 
-def people_of(count: int, seed: int) -> tuple[Person, ...]:
+def draw_people(count: int, seed: int) -> tuple[Person, ...]:
     """Return participants whose just-noticeable differences differ by a factor of 1.2."""
-    found = []
+    people = []
     for number in range(1, count + 1):
         draw = stream(seed, f"noticed/person/{number}").random
         jnd_s = JND_S * _BETWEEN_PEOPLE ** normal(draw)
-        found.append(Person(Observer(delay_jnd_s=jnd_s), rater(draw)))
-    return tuple(found)
+        people.append(Person(Observer(delay_jnd_s=jnd_s), rater(draw)))
+    return tuple(people)
 
 
 def compare_delays(count: int, seed: int) -> Compared:
     """Return the delays that ``count`` participants (at least three) detect, and those that they rate as noticed."""
-    people = people_of(count, seed)
-    both = [(criterion_s, 0.0) for criterion_s in CRITERIA_S] + [(MEAN_CRITERION_S, _ADAPTED_S)]
-    return Compared(count, seed, detected(people, seed), tuple(rated(people, *one, seed) for one in both))
+    people = draw_people(count, seed)
+    conditions = [(criterion_s, 0.0) for criterion_s in CRITERIA_S] + [(MEAN_CRITERION_S, _ADAPTED_S)]
+    return Compared(
+        count,
+        seed,
+        detect_threshold(people, seed),
+        tuple(rate_delays(people, *condition, seed) for condition in conditions),
+    )
 
 
-def detected(people: Sequence[Person], seed: int) -> Detected:
+def detect_threshold(people: Sequence[Person], seed: int) -> Detected:
     """Return the group's threshold in `FORCED_CHOICE` with its 95 % interval [ms]."""
     known = known_value(FORCED_CHOICE, load(FORCED_CHOICE))
     assert isinstance(known, KnownThreshold)  # noqa: S101 - it has only forced choices
@@ -109,7 +114,7 @@ def detected(people: Sequence[Person], seed: int) -> Detected:
     return Detected(value=group.value, low=group.low, high=group.high)
 
 
-def rated(people: Sequence[Person], criterion_s: float, adapted_s: float, seed: int) -> Rated:
+def rate_delays(people: Sequence[Person], criterion_s: float, adapted_s: float, seed: int) -> Rated:
     """Return the delay above which participants agree with "different" in `LIKERT`.
 
     The participants' deviations from the mean criterion [s] and the noise are the same for every criterion.
@@ -120,8 +125,8 @@ def rated(people: Sequence[Person], criterion_s: float, adapted_s: float, seed: 
     answers = []
     for number, person in enumerate(people, start=1):
         draw = stream(seed, f"noticed/ratings/{number}").random
-        own = replace(person.rater, threshold_s=person.rater.threshold_s - MEAN_CRITERION_S + criterion_s)
-        answers.append([_rating(replace(person, rater=own), ms / 1000 - adapted_s, draw) for ms in delays_ms])
+        person_rater = replace(person.rater, threshold_s=person.rater.threshold_s - MEAN_CRITERION_S + criterion_s)
+        answers.append([_rating(replace(person, rater=person_rater), ms / 1000 - adapted_s, draw) for ms in delays_ms])
     return Rated(criterion_s, adapted_s, noticed(np.array(answers, float), delays_ms))
 
 
@@ -144,7 +149,7 @@ def draw(comparison: Compared) -> Figure:
     shares.set(title="Answers at each delay", xlabel="Delay, ms", xticks=[0, 50, 75, 100, 125, 150, 200])
     shares.set(ylim=(-0.03, 1.03), yticks=[0.0, 0.5, 0.75, 1.0])
     shares.yaxis.set_major_formatter(PercentFormatter(1.0))
-    criteria = [1000 * rating.criterion_s for rating in comparison.rated if not rating.adapted_s]
+    criteria = [1000 * rating.criterion_s for rating in comparison.ratings if not rating.adapted_s]
     thresholds.set(title="Threshold, ms", xlabel="Mean criterion of the ratings, ms", xlim=(50, 175), xticks=criteria)
     thresholds.set(ylim=(0, 205), yticks=[0, 50, 100, 150, 200])
     delays, (middle, low, high) = np.linspace(1.0, 200.0, 200), comparison.detected_ms
@@ -154,19 +159,28 @@ def draw(comparison: Compared) -> Figure:
     thresholds.axhspan(low, high, color=style.BAND, linewidth=0)
     thresholds.axhline(middle, color=style.TEXT, dashes=(4, 2), label=FORCED_CHOICE)
     thresholds.axhline(_THESIS_MS, color=style.TEXT_SOFT, linewidth=0.8, dashes=(1, 1.5), label="thesis, 125 ms")
-    for rating, colour in zip(comparison.rated, (*style.STEPS[1 : 1 + len(criteria)], style.WARN), strict=True):
-        test, at = rating.found, 1000 * rating.criterion_s + (5 if rating.adapted_s else 0)
-        if test.effect is None or test.width is None or test.guess is None or test.lapse is None:
+    for rating, colour in zip(comparison.ratings, (*style.STEPS[1 : 1 + len(criteria)], style.WARN), strict=True):
+        threshold, criterion_ms = rating.found, 1000 * rating.criterion_s + (5 if rating.adapted_s else 0)
+        if threshold.effect is None or threshold.width is None or threshold.guess is None or threshold.lapse is None:
             continue
-        if test.lower is not None and test.upper is not None:
-            thresholds.plot([at, at], [test.lower, test.upper], color=colour, linewidth=1.0)
+        if threshold.lower is not None and threshold.upper is not None:
+            thresholds.plot(
+                [criterion_ms, criterion_ms], [threshold.lower, threshold.upper], color=colour, linewidth=1.0
+            )
         name = f"adapted to {1000 * rating.adapted_s:.0f} ms" if rating.adapted_s else LIKERT
-        label = name if rating.adapted_s or at == criteria[0] else None
-        thresholds.plot([at], [test.effect], "D" if rating.adapted_s else "o", markersize=4, color=colour, label=label)
+        label = name if rating.adapted_s or criterion_ms == criteria[0] else None
+        thresholds.plot(
+            [criterion_ms],
+            [threshold.effect],
+            "D" if rating.adapted_s else "o",
+            markersize=4,
+            color=colour,
+            label=label,
+        )
         if not rating.adapted_s:
-            shares.plot(test.levels, np.array(test.yes) / test.asked, "o", markersize=3, color=colour)
-            agree = success("logistic", delays, test.effect, test.width, test.guess, test.lapse)
-            shares.plot(delays, agree, color=colour, label=f"{LIKERT}, {at:.0f} ms")
+            shares.plot(threshold.levels, np.array(threshold.yes) / threshold.asked, "o", markersize=3, color=colour)
+            agree = success("logistic", delays, threshold.effect, threshold.width, threshold.guess, threshold.lapse)
+            shares.plot(delays, agree, color=colour, label=f"{LIKERT}, {criterion_ms:.0f} ms")
     for axes in (shares, thresholds):
         axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.18), ncols=2, frameon=False, fontsize=7.2)
     return figure
@@ -186,7 +200,7 @@ def noticed_delays_evidence(comparison: Compared) -> Evidence:
     """Return both thresholds as a table, and the figure (PNG, SVG, PDF) with its caption."""
     middle, low, high = comparison.detected_ms
     rows = [(f"{FORCED_CHOICE}: forced choice, 75 % correct", "–", f"{middle:.0f} ms", f"{low:.0f} to {high:.0f} ms")]
-    for rating in comparison.rated:
+    for rating in comparison.ratings:
         adapted = f", adapted to {1000 * rating.adapted_s:.0f} ms" if rating.adapted_s else ""
         name = f"{LIKERT}: rating of “{_STATEMENT}”, half agree{adapted}"
         effect, threshold = rating.found.effect, rating.found

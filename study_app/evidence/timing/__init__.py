@@ -1,4 +1,4 @@
-"""How late the servo's ticks begin, compared with a bare loop on the same clock, a Python thread and a Qt timer."""
+"""Lateness of the servo's ticks, compared with a bare loop on the same clock, a Python thread and a Qt timer."""
 
 from study_app.evidence.timing.delays import BESIDE, DELAYS_S, VIRTUAL_HZ, Delayed, Shown, delays_evidence
 from study_app.evidence.timing.device_lateness import emulated_devices, lateness_evidence, time_devices

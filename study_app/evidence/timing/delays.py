@@ -1,8 +1,8 @@
-"""How much later than requested a participant's picture was shown, delay by delay: text, Markdown, CSV and a figure.
+"""The error of the visual delay for each requested delay, as text, Markdown, CSV and a figure.
 
-The error of a frame is all that lies between the requested moment and what is seen: from the sample that is drawn to
-the end of its painting, or to the surface's swap, less the delay. It holds ``session.runner.SETTLED_S``, which is the
-same at every delay. The figure has one panel per screen, loads abreast; ½ frame and 1 frame are marked.
+The error of a frame is the time from the drawn sample to the end of its painting, or to the surface's swap, minus the
+requested delay. It includes ``session.trial.SETTLED_S``, which is the same at every delay. The figure has one panel per
+screen, with the loads side by side; ½ frame and 1 frame are marked.
 """
 
 import itertools
@@ -119,8 +119,8 @@ class Delayed:
 
     def on(self, screen: str, load: LoadName) -> tuple[Shown, ...]:
         """Return the trials on a screen under a load, from the shortest delay to the longest."""
-        here = (column for column in self.shown if (column.screen, column.load) == (screen, load))
-        return tuple(sorted(here, key=lambda one: one.delay_s))
+        trials = (column for column in self.shown if (column.screen, column.load) == (screen, load))
+        return tuple(sorted(trials, key=lambda trial: trial.delay_s))
 
     def limits(self) -> tuple[str, ...]:
         """Return the limits for each screen and load, and whether they are met."""
@@ -140,8 +140,8 @@ class Delayed:
 
 
 _LAYOUT: Final = Layout(height_pt=212, top_pt=46, left_pt=34, gap_pt=46, right_pt=44)
-_MOST_FRAMES: Final = 1.5  # limit of the axis; values beyond it are written at its top
-_APART: Final = 0.34
+_MAX_FRAMES: Final = 1.5  # limit of the axis; values beyond it are written at its top
+_LOAD_SPACING: Final = 0.34
 
 _LOOKS: Final[dict[LoadName, dict[str, Any]]] = {
     "none": {"color": "#0b65a3", "marker": "o", "markerfacecolor": "#0b65a3"},
@@ -165,22 +165,22 @@ def draw(delays: Delayed) -> Figure:
     ]
     figure, panels = panels_abreast(_LAYOUT, len(delays.screens), handles, 2.6, caption)
     for axes, screen in zip(panels, delays.screens, strict=True):
-        _panel(axes, delays, screen, first=axes is panels[0])
+        _draw_panel(axes, delays, screen, first=axes is panels[0])
     return figure
 
 
-def _panel(axes: Axes, delays: Delayed, screen: str, *, first: bool) -> None:
+def _draw_panel(axes: Axes, delays: Delayed, screen: str, *, first: bool) -> None:
     """Draw every trial on a screen: a marker at the mean, and a line from it to the 99th percentile."""
     frame_ms = delays.on(screen, delays.loads[0])[0].frame_ms
-    top_ms = _MOST_FRAMES * frame_ms
+    top_ms = _MAX_FRAMES * frame_ms
     for number, load in enumerate(delays.loads):
-        aside = _APART * (number - (len(delays.loads) - 1) / 2)
-        for place, trial in enumerate(delays.on(screen, load)):
-            _trial(axes, trial, place + aside, top_ms)
-    for share, words in ((0.5, "½ frame"), (1.0, "1 frame")):
+        offset = _LOAD_SPACING * (number - (len(delays.loads) - 1) / 2)
+        for index, trial in enumerate(delays.on(screen, load)):
+            _draw_trial(axes, trial, index + offset, top_ms)
+    for share, text in ((0.5, "½ frame"), (1.0, "1 frame")):
         axes.axhline(share * frame_ms, color=style.ZERO, linewidth=0.8, linestyle=(0, (1, 1.5)), zorder=1)
         axes.annotate(
-            words,
+            text,
             (1.0, share * frame_ms),
             (3, 0),
             xycoords=("axes fraction", "data"),
@@ -200,16 +200,16 @@ def _panel(axes: Axes, delays: Delayed, screen: str, *, first: bool) -> None:
     axes.set_title(f"{screen[0].upper()}{screen[1:]}, {paced}", pad=13, color=style.TEXT)
 
 
-def _trial(axes: Axes, trial: Shown, at: float, top_ms: float) -> None:
+def _draw_trial(axes: Axes, trial: Shown, x: float, top_ms: float) -> None:
     look = _LOOKS[trial.load]
     tail_ms = trial.percentile_ms(_TAIL_PERCENT)
-    axes.plot([at, at], [trial.mean_ms, min(tail_ms, top_ms)], color=look["color"], linewidth=1.3, zorder=4)
+    axes.plot([x, x], [trial.mean_ms, min(tail_ms, top_ms)], color=look["color"], linewidth=1.3, zorder=4)
     if tail_ms < top_ms:
-        axes.plot([at - 0.09, at + 0.09], [tail_ms, tail_ms], color=look["color"], linewidth=1.3, zorder=4)
+        axes.plot([x - 0.09, x + 0.09], [tail_ms, tail_ms], color=look["color"], linewidth=1.3, zorder=4)
     else:
         axes.annotate(
             f"{tail_ms:.0f}",
-            (at, top_ms),
+            (x, top_ms),
             (0, 1),
             textcoords="offset points",
             ha="center",
@@ -218,7 +218,7 @@ def _trial(axes: Axes, trial: Shown, at: float, top_ms: float) -> None:
             color=look["color"],
             annotation_clip=False,
         )
-    axes.plot([at], [np.clip(trial.mean_ms, 0, top_ms)], markersize=4.5, zorder=5, clip_on=False, **look)
+    axes.plot([x], [np.clip(trial.mean_ms, 0, top_ms)], markersize=4.5, zorder=5, clip_on=False, **look)
 
 
 COLUMNS: Final = (
@@ -244,14 +244,14 @@ def delays_evidence(delays: Delayed) -> Evidence:
     for screen, load in itertools.product(delays.screens, delays.loads):
         trials = delays.on(screen, load)
         lines += ["", f"{screen} ({trials[0].paced}), {BESIDE[load]}: errors in ms, then in frames", ""]
-        lines.append(Table(_HEADINGS, [_row(trial) for trial in trials]).text())
+        lines.append(Table(_HEADINGS, [_table_row(trial) for trial in trials]).text())
     text = "\n".join((*lines, "", *delays.limits())) + "\n"
     abreast = [
         trials
         for screen in delays.screens
         for trials in zip(*(delays.on(screen, load) for load in delays.loads), strict=True)
     ]
-    heads = [
+    column_heads = [
         f"{BESIDE[load]}: mean" if name == "mean" else name
         for load in delays.loads
         for name in ("mean", "p95", "p99", "worst", "late")
@@ -260,11 +260,11 @@ def delays_evidence(delays: Delayed) -> Evidence:
         (
             trials[0].screen,
             f"{1e3 * trials[0].delay_s:g}",
-            *(cell for it in trials for cell in (*_errors(it), _late(it))),
+            *(cell for trial in trials for cell in (*_error_texts(trial), _late_text(trial))),
         )
         for trials in abreast
     ]
-    table = Table(("screen", "requested", *heads), rows, left=1).markdown()
+    table = Table(("screen", "requested", *column_heads), rows, left=1).markdown()
     limits = "\n".join(f"- {limit}" for limit in delays.limits())
     files = {
         "delays.txt": text,
@@ -285,25 +285,25 @@ def _csv_row(trial: Shown) -> tuple[object, ...]:
     )
 
 
-def _row(trial: Shown) -> tuple[str, ...]:
+def _table_row(trial: Shown) -> tuple[str, ...]:
     return (
         f"{1e3 * trial.delay_s:g}",
         f"{trial.achieved_ms:.1f}",
-        *_errors(trial),
-        *(f"{error_ms / trial.frame_ms:.2f}" for error_ms in _measures_ms(trial)),
-        _late(trial),
+        *_error_texts(trial),
+        *(f"{error_ms / trial.frame_ms:.2f}" for error_ms in _error_measures_ms(trial)),
+        _late_text(trial),
         f"{trial.missed}",
     )
 
 
-def _late(trial: Shown) -> str:
+def _late_text(trial: Shown) -> str:
     return f"{trial.late} of {trial.frames}"
 
 
-def _errors(trial: Shown) -> tuple[str, ...]:
-    return tuple(f"{error_ms:.1f}" for error_ms in _measures_ms(trial))
+def _error_texts(trial: Shown) -> tuple[str, ...]:
+    return tuple(f"{error_ms:.1f}" for error_ms in _error_measures_ms(trial))
 
 
-def _measures_ms(trial: Shown) -> tuple[float, ...]:
+def _error_measures_ms(trial: Shown) -> tuple[float, ...]:
     """Return mean, 95th and 99th percentile, and maximum [ms]."""
     return trial.mean_ms, trial.percentile_ms(95), trial.percentile_ms(99), trial.worst_ms

@@ -1,6 +1,6 @@
 """How late the servo's ticks begin with each emulated device, compared with the scripted hand in the same run.
 
-All take quarter seconds in turn, as the loops of `measurement` do, so that the machine's load strikes all alike.
+All devices run alternately for quarter seconds, like the loops of `measurement`, so that other load affects all alike.
 """
 
 import threading
@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from study_app.devices.hand import hand_of
 from study_app.devices.registry import all_devices, open_device
 from study_app.evidence.table import TURN_S, Evidence, check_seconds, take_turns
-from study_app.evidence.timing.measurement import PERIOD_NS, ServoLoop, granted
+from study_app.evidence.timing.measurement import PERIOD_NS, ServoLoop, granted_classes
 
 _REFERENCE: Final = "scripted"
-_MOST_RATIO: Final = 1.5
+_MAX_RATIO: Final = 1.5
 _DRAWS: Final = 1000
 _REACH_M: Final = 0.02
 
@@ -43,13 +43,13 @@ class DeviceLateness:
     @property
     def missed(self) -> bool:
         """Whether the ratio is significantly above the limit."""
-        return self.low > _MOST_RATIO
+        return self.low > _MAX_RATIO
 
     @property
     def verdict(self) -> str:
         if self.missed:
             return "missed"
-        return "met" if self.ratio <= _MOST_RATIO else "undecided: measure for longer"
+        return "met" if self.ratio <= _MAX_RATIO else "undecided: measure for longer"
 
 
 def emulated_devices() -> tuple[str, ...]:
@@ -76,7 +76,7 @@ def time_devices(
     """
     check_seconds(seconds, "each device is timed")
     ticks = round(TURN_S * 1e9) // PERIOD_NS
-    grant = granted().best or granted().normal
+    grant = granted_classes().best or granted_classes().normal
 
     with ExitStack() as stack:
         devices = {name: stack.enter_context(open_device(name)) for name in names}
@@ -111,8 +111,10 @@ def _compare_lateness(name: str, late_ns: dict[str, list[NDArray[np.int64]]]) ->
 
 def _ratio(own: list[NDArray[np.int64]], reference: list[NDArray[np.int64]], rounds: Any) -> float:
     """Return the ratio of the 99th percentiles of both devices over the same ``rounds``."""
-    late, early = (float(np.percentile(np.concatenate([one[k] for k in rounds]), 99)) for one in (own, reference))
-    return late / early
+    own_p99, reference_p99 = (
+        float(np.percentile(np.concatenate([segments[k] for k in rounds]), 99)) for segments in (own, reference)
+    )
+    return own_p99 / reference_p99
 
 
 def lateness_evidence(found: Sequence[DeviceLateness]) -> Evidence:
@@ -125,5 +127,5 @@ def lateness_evidence(found: Sequence[DeviceLateness]) -> Evidence:
             else ""
         )
         lines.append(f"{lateness.name:<28}{lateness.ticks:>8}{lateness.p50_us:>9.0f}{lateness.p99_us:>9.0f}{ratio}")
-    text = "\n".join((*lines, f"limit: {_MOST_RATIO:g}; exceeded if the whole interval lies above it")) + "\n"
+    text = "\n".join((*lines, f"limit: {_MAX_RATIO:g}; exceeded if the whole interval lies above it")) + "\n"
     return Evidence(text, {"devices.txt": text}, missed=any(lateness.missed for lateness in found))

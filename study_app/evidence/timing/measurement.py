@@ -1,7 +1,7 @@
 """Lateness of ticks: loops that run a tick every millisecond, one loop after another, and their results.
 
-All loops count alike: a deadline every millisecond; one that a tick ran past is passed over and counted, never made up
-for. What a tick has to do is a scene with every effect, on a hand that costs nothing itself.
+All loops count in the same way: there is a deadline every millisecond, and one that a tick overran is skipped and
+counted, never made up for. A tick computes a scene with every effect, for a hand that takes no time itself.
 """
 
 import threading
@@ -40,10 +40,10 @@ FULL: Final = Scene(
         ),
     )
 )
-"""Every effect that can act at once, on a hand that comes out of the liquid's surface and goes back."""
+"""A scene with all effects that can act at once, in which the hand leaves and re-enters the liquid."""
 
 Kind: TypeAlias = Literal["servo", "bare", "thread", "qt"]
-_Whole: TypeAlias = NDArray[np.int64]
+_Nanoseconds: TypeAlias = NDArray[np.int64]
 
 PERIOD_NS: Final = 1_000_000
 LEAD_IN: Final = 50  # ticks at the start of each turn that are not counted, while threads start and scenes are loaded
@@ -58,13 +58,13 @@ NAMES: Final[dict[Kind, str]] = {
 class Ticks(NamedTuple):
     """The timing of a loop: the lateness and duration of each tick [ns] (n,), and the number of skipped deadlines."""
 
-    lateness_ns: _Whole
-    busy_ns: _Whole
+    lateness_ns: _Nanoseconds
+    busy_ns: _Nanoseconds
     overruns: int
 
 
 _Timer: TypeAlias = Callable[[int, int, Callable[[], object]], int]
-"""Calls a function every so many milliseconds and so many times, and returns its start by ``time.perf_counter_ns``."""
+"""Call a function with a period [ms] for a number of times; return the start by ``time.perf_counter_ns``."""
 
 
 class Loop(Protocol):
@@ -77,7 +77,7 @@ class Loop(Protocol):
 
 
 class ServoLoop:
-    """The product's servo with a full scene in its own thread, on ``device`` or (None) one without any cost."""
+    """The program's servo with a full scene in its own thread, on ``device``, by default one that takes no time."""
 
     kind: Kind = "servo"
 
@@ -89,7 +89,7 @@ class ServoLoop:
         self.servo.prepare()
 
     def run(self, ticks: int) -> Ticks:
-        """Run at least so many ticks."""
+        """Run the servo for at least ``ticks`` ticks and return their timing."""
         servo = self.servo
         reader = servo.telemetry.reader()
         began = int(servo.telemetry.written[0])
@@ -109,7 +109,7 @@ class ServoLoop:
 
 
 class _BareLoop:
-    """The limit of this machine: a compiled loop that only sleeps, by the servo's C function and clock."""
+    """The limit of this machine: a compiled loop that only sleeps, with the servo's C function and clock."""
 
     kind: Kind = "bare"
 
@@ -132,8 +132,8 @@ class _BareLoop:
         return Ticks(lateness_ns, np.zeros(0, np.int64), int(skipped.sum()))
 
 
-def _same_tick() -> Callable[[], object]:
-    """Return the servo's tick to be called from Python: the same compiled loop, one tick at a time."""
+def _new_servo_tick() -> Callable[[], object]:
+    """Return a function that runs one tick of a new servo, with the same compiled loop."""
     servo = Servo(PlayedHand(hand_motion()), clock=VirtualClock(), elements=elements_needed(FULL))
     servo.load(FULL)
     servo.advance(1)
@@ -148,7 +148,7 @@ class _ThreadLoop:
     def __init__(self, grant: Grant, *, real_time: bool) -> None:
         self.grant = grant
         self._real_time = real_time
-        self.tick = _same_tick()
+        self.tick = _new_servo_tick()
 
     def run(self, ticks: int) -> Ticks:
         times: list[tuple[int, int]] = []
@@ -181,7 +181,7 @@ class _QtLoop:
     def __init__(self, grant: Grant, timer: _Timer) -> None:
         self.grant = grant
         self._timer = timer
-        self.tick = _same_tick()
+        self.tick = _new_servo_tick()
 
     def run(self, ticks: int) -> Ticks:
         times: list[tuple[int, int]] = []
@@ -204,9 +204,9 @@ def ticks_at(start_ns: int, times: Sequence[tuple[int, int]]) -> Ticks:
     overruns, due_ns = 0, start_ns + PERIOD_NS
     for i in range(len(began)):
         lateness_ns[i] = max(0, int(began[i]) - due_ns)
-        passed = max(1, (int(ended[i]) - due_ns) // PERIOD_NS)
-        overruns += passed - 1 if i >= LEAD_IN else 0
-        due_ns += passed * PERIOD_NS
+        period_count = max(1, (int(ended[i]) - due_ns) // PERIOD_NS)
+        overruns += period_count - 1 if i >= LEAD_IN else 0
+        due_ns += period_count * PERIOD_NS
     return Ticks(lateness_ns[LEAD_IN:], (ended - began)[LEAD_IN:], overruns)
 
 
@@ -224,15 +224,15 @@ class Classes:
     best: Grant | None
 
 
-def granted() -> Classes:
+def granted_classes() -> Classes:
     """Return the priority classes to be timed; the best is None if it is the ordinary one."""
     grants: list[Grant] = []
 
-    def ask() -> None:
+    def raise_priorities() -> None:
         grants.append(raise_priority(real_time=False))
         grants.append(raise_priority())
 
-    _run_in_thread(ask)
+    _run_in_thread(raise_priorities)
     normal, best = grants
     return Classes(normal, None if best.level == "normal" else best)
 
@@ -252,8 +252,8 @@ class LoopTiming:
 
     kind: Kind
     grant: Grant
-    lateness_ns: _Whole
-    busy_ns: _Whole
+    lateness_ns: _Nanoseconds
+    busy_ns: _Nanoseconds
     overruns: int
 
     @property
@@ -328,21 +328,21 @@ class Timed:
             return ()
         above_us = servo.late_us(50) - bare.late_us(50)
         ratio = self.ratio(servo, 99)
-        took_us = servo.busy_us(99)
+        busy_us = servo.busy_us(99)
         late = (
             f"{servo.late:,} {'tick' if servo.late == 1 else 'ticks'} more than 1 ms late, {_fewer(thread, servo)} "
             f"than with a Python thread (at least {_FEWER_LATE:g} times fewer; the bare loop: {_fewer(thread, bare)})"
         )
         return tuple(
-            Limit(level, said, held)
-            for said, held in (
+            Limit(level, text, held)
+            for text, held in (
                 (
                     f"median {above_us:+.1f} µs relative to the bare loop (at most +{_MEDIAN_US:g} µs)",
                     above_us <= _MEDIAN_US,
                 ),
                 (f"p99 {ratio:.2f} times the bare loop's (at most {_TAIL_RATIO:g})", ratio <= _TAIL_RATIO),
                 (late, thread.late_share >= _FEWER_LATE * servo.late_share),
-                (f"a tick took {took_us:.1f} µs at p99 (at most {_BUSY_US:g} µs)", took_us <= _BUSY_US),
+                (f"a tick took {busy_us:.1f} µs at p99 (at most {_BUSY_US:g} µs)", busy_us <= _BUSY_US),
             )
         )
 
@@ -391,7 +391,7 @@ def measure_timing(
         The servo stopped itself.
     """
     check_seconds(seconds, "each loop is timed")
-    classes = granted()
+    classes = granted_classes()
     servos: list[ServoLoop] = []
     loops: list[Loop] = []
     for grant in (classes.normal, *([classes.best] if classes.best else [])):
@@ -407,21 +407,21 @@ def measure_timing(
     rounds = max(1, round(seconds / TURN_S))
     ticks = round(seconds / rounds * 1e9) // PERIOD_NS
 
-    def measured() -> Timed:
+    def measure_loops() -> Timed:
         frames, began_s = windows.frames if windows else 0, time.perf_counter()
         arms = {loop: partial(_run_loop, loop, ticks) for loop in loops}
-        rounds_of = take_turns(arms, rounds, ending=ending or threading.Event(), progress=progress)
+        ticks_by_loop = take_turns(arms, rounds, ending=ending or threading.Event(), progress=progress)
         frames_hz = ((windows.frames if windows else 0) - frames) / (time.perf_counter() - began_s)
-        each_ns = rounds * ticks * PERIOD_NS
+        loop_ns = rounds * ticks * PERIOD_NS
         return Timed(
             machine=machine(),
             load=load,
-            seconds=each_ns * 1e-9,
+            seconds=loop_ns * 1e-9,
             spin_us=servos[0].clock.spin_us,
-            spun_share=sum(servo.clock.spun_ns for servo in servos) / (len(servos) * each_ns),
+            spun_share=sum(servo.clock.spun_ns for servo in servos) / (len(servos) * loop_ns),
             frames_hz=frames_hz if load != "none" else None,
-            loops=tuple(_loop_timing(loop.kind, loop.grant, parts) for loop, parts in rounds_of.items()),
+            loops=tuple(_loop_timing(loop.kind, loop.grant, parts) for loop, parts in ticks_by_loop.items()),
             notes=tuple(notes),
         )
 
-    return under_load(load, windows, measured)
+    return under_load(load, windows, measure_loops)

@@ -20,7 +20,7 @@ from study_app.evidence.timing.measurement import LATE_NS, NAMES, PERCENTILES, K
 from study_app.haptics.runtime.grants import Level
 
 _FOOT_PT: Final = 62.0
-_LETTERS: Final = 132
+_CAPTION_LETTERS: Final = 132
 
 
 class Layout(NamedTuple):
@@ -40,9 +40,9 @@ def panels_abreast(
     width_pt, height_pt = style.PAGE_WIDTH_PT, layout.height_pt
     figure = Figure(figsize=(width_pt / 72, height_pt / 72), facecolor="white")
     panel_pt = (width_pt - layout.left_pt - layout.right_pt - layout.gap_pt * (count - 1)) / count
-    tall = (height_pt - layout.top_pt - _FOOT_PT) / height_pt
+    panel_height = (height_pt - layout.top_pt - _FOOT_PT) / height_pt
     lefts = [(layout.left_pt + k * (panel_pt + layout.gap_pt)) / width_pt for k in range(count)]
-    panels = [figure.add_axes((left, _FOOT_PT / height_pt, panel_pt / width_pt, tall)) for left in lefts]
+    panels = [figure.add_axes((left, _FOOT_PT / height_pt, panel_pt / width_pt, panel_height)) for left in lefts]
     figure.legend(
         handles=handles,
         loc="upper left",
@@ -53,7 +53,7 @@ def panels_abreast(
         handlelength=handlelength,
         columnspacing=2.2,
     )
-    text = "\n".join(textwrap.wrap(caption, _LETTERS))
+    text = "\n".join(textwrap.wrap(caption, _CAPTION_LETTERS))
     figure.text(4 / width_pt, 29 / height_pt, text, va="top", fontsize=6.6, color=style.TEXT_SOFT)
     return figure, panels
 
@@ -95,11 +95,11 @@ def draw(timing: Timed) -> Figure:
     figure, panels = panels_abreast(_LAYOUT, len(timing.levels), handles, 3.4, caption)
     highest_us = float(10 ** np.ceil(np.log10(max(2e3, *(loop.late_us(100) for loop in timing.loops)))))
     for axes, level in zip(panels, timing.levels, strict=True):
-        _panel(axes, timing, level, highest_us, first=axes is panels[0])
+        _draw_panel(axes, timing, level, highest_us, first=axes is panels[0])
     return figure
 
 
-def _panel(axes: Axes, timing: Timed, level: Level, highest_us: float, *, first: bool) -> None:
+def _draw_panel(axes: Axes, timing: Timed, level: Level, highest_us: float, *, first: bool) -> None:
     """Draw the loops of a class as steps, each with a mark at its 99th percentile."""
     decades = np.log10(highest_us / _LOWEST_US)
     edges = np.logspace(np.log10(_LOWEST_US), np.log10(highest_us), round(_BINS_A_DECADE * decades) + 1)
@@ -112,7 +112,7 @@ def _panel(axes: Axes, timing: Timed, level: Level, highest_us: float, *, first:
     for loop in loops:
         shares = np.histogram(np.clip(loop.lateness_ns * 1e-3, _LOWEST_US, None), edges)[0] / loop.ticks
         axes.stairs(np.where(shares > 0, shares, 0.1 * least), edges, baseline=None, **_LOOKS[loop.kind])
-    _tails(axes, loops, least)
+    _mark_tails(axes, loops, least)
     axes.axvline(LATE_NS * 1e-3, color=style.ZERO, linewidth=0.8, linestyle=(0, (1, 1.5)), zorder=1)
     axes.annotate("1 ms", (LATE_NS * 1e-3, 1.3), (2, -1), textcoords="offset points", va="top", fontsize=6.6)
     axes.xaxis.set_major_locator(FixedLocator([10.0**power for power in range(0, 8)]))
@@ -122,11 +122,11 @@ def _panel(axes: Axes, timing: Timed, level: Level, highest_us: float, *, first:
     axes.minorticks_off()
     axes.tick_params(labelsize=6.6, labelleft=first)
     axes.set_xlabel("lateness of a tick", fontsize=7, labelpad=2)
-    how = loops[0].grant.how if level != "normal" else ""
-    axes.set_title(f"{level.capitalize()} priority{f' ({how})' if how else ''}", pad=5, color=style.TEXT)
+    grant_text = loops[0].grant.how if level != "normal" else ""
+    axes.set_title(f"{level.capitalize()} priority{f' ({grant_text})' if grant_text else ''}", pad=5, color=style.TEXT)
 
 
-def _tails(axes: Axes, loops: list[LoopTiming], least: float) -> None:
+def _mark_tails(axes: Axes, loops: list[LoopTiming], least: float) -> None:
     """Mark the 99th percentiles along the bottom of a panel."""
     for loop in loops:
         look = _LOOKS[loop.kind]
@@ -163,12 +163,12 @@ def timing_evidence(timing: Timed) -> Evidence:
     notes = timing.notes
     if timing.spin_us > 0:
         notes += (f"spinning for {timing.spin_us:g} µs before each deadline used {timing.spun_share:.1%} of one core",)
-    table = Table(_HEADINGS, [_row(timing, loop) for loop in timing.loops], left=2)
-    what = "lateness in µs; skipped: deadlines that passed during a longer tick"
-    text = "\n".join((head, what, "", table.text(), "", *map(str, timing.limits()), "", *notes)) + "\n"
+    table = Table(_HEADINGS, [_table_row(timing, loop) for loop in timing.loops], left=2)
+    explanation = "lateness in µs; skipped: deadlines that passed during a longer tick"
+    text = "\n".join((head, explanation, "", table.text(), "", *map(str, timing.limits()), "", *notes)) + "\n"
     limits = "\n".join(f"- {limit}" for limit in timing.limits())
-    said = " ".join(f"{note[0].upper()}{note[1:]}." for note in notes)
-    markdown = f"{head} Lateness in µs.\n\n{table.markdown()}\n\n{limits}\n\n{said}\n"
+    notes_text = " ".join(f"{note[0].upper()}{note[1:]}." for note in notes)
+    markdown = f"{head} Lateness in µs.\n\n{table.markdown()}\n\n{limits}\n\n{notes_text}\n"
     csv = Table(COLUMNS, [_csv_row(timing, loop) for loop in timing.loops]).csv()
     files = {"timing.txt": text, "timing.md": markdown, "timing.csv": csv}
     return Evidence(text, files, plot_files("timing", "Lateness of ticks", draw, timing))
@@ -183,14 +183,16 @@ def _csv_row(timing: Timed, loop: LoopTiming) -> tuple[object, ...]:
     )
 
 
-def _row(timing: Timed, loop: LoopTiming) -> tuple[str, ...]:
+def _table_row(timing: Timed, loop: LoopTiming) -> tuple[str, ...]:
     ratios = (
-        ("1", "1") if loop.kind == "bare" else tuple(_ratio(timing.ratio(loop, percent)) for percent in (50.0, 99.0))
+        ("1", "1")
+        if loop.kind == "bare"
+        else tuple(_format_ratio(timing.ratio(loop, percent)) for percent in (50.0, 99.0))
     )
     return (
         loop.grant.level,
         loop.name,
-        *(_number(loop.late_us(percent)) for percent in (*PERCENTILES, 100.0)),
+        *(_format_us(loop.late_us(percent)) for percent in (*PERCENTILES, 100.0)),
         f"{loop.late:,}",
         f"{loop.overruns:,}",
         *ratios,
@@ -198,11 +200,11 @@ def _row(timing: Timed, loop: LoopTiming) -> tuple[str, ...]:
     )
 
 
-def _number(us: float) -> str:
+def _format_us(us: float) -> str:
     return f"{us:,.0f}" if us >= 100 else f"{us:.1f}"
 
 
-def _ratio(ratio: float) -> str:
+def _format_ratio(ratio: float) -> str:
     if ratio >= 1000:
         return "> 1,000"
     return f"{ratio:.2f}" if ratio < 10 else f"{ratio:.0f}"

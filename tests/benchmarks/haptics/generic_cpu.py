@@ -33,7 +33,7 @@ for name in json.loads(sys.argv[1]):
         benches[key] = TickTimer(scene)
 print(json.dumps(forces), flush=True)
 for line in sys.stdin:
-    benches[line.strip()].batch()
+    benches[line.strip()].run_batch()
     print(benches[line.strip()].costs_ns[-1], flush=True)
 """
 

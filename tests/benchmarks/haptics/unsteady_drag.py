@@ -19,7 +19,7 @@ def costs_ns(batches: int) -> tuple[float, float]:
     benches = {name: TickTimer(Scene(scale=3, liquids=(liquid,))) for name, liquid in liquids.items()}
     for _ in range(batches):
         for bench in benches.values():
-            bench.batch()
+            bench.run_batch()
     rest_ns, apart_ns, law_ns = (statistics.median(bench.costs_ns) for bench in benches.values())
     return apart_ns - rest_ns, law_ns - rest_ns
 

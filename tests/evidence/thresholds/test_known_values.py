@@ -23,7 +23,7 @@ from study_app.evidence.thresholds.known_values import (
     coverage,
     known_value,
     mean_interval,
-    rehearsed,
+    rehearse_known,
     rehearsed_measures,
     share_interval,
     validate_known_values,
@@ -214,7 +214,7 @@ def test_limits_allow_for_the_number_of_values() -> None:
     def one_run() -> bool:
         measures = []
         for number in range(60):
-            held = draw.random(100) < known_values.COVERAGE_LEAST
+            held = draw.random(100) < known_values.MIN_COVERAGE
             found = [
                 StudyFound((Estimated(value=1.0, low=0.5, high=2.0 if one else 0.9, truth=1.0),), ()) for one in held
             ]
@@ -236,7 +236,7 @@ def test_a_coverage_that_is_too_low_is_found(share: float, holds: bool) -> None:
 def test_studies_of_all_seeds_count_together_and_each_seed_once(
     threshold: KnownThreshold, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(known_values, "rehearsed", lambda *_: Rehearsed(1.0, 0, (0.24,) * 3))
+    monkeypatch.setattr(known_values, "rehearse_known", lambda *_: Rehearsed(1.0, 0, (0.24,) * 3))
     told = []
     with ThreadPoolExecutor(1) as executor:
         said: list[str] = []
@@ -248,18 +248,18 @@ def test_studies_of_all_seeds_count_together_and_each_seed_once(
     assert said[-1].startswith("people, a mix of these: ")
     found = [threshold.simulate(number, seed) for seed in (1, 2) for number in range(2)]
     own = [*threshold.measures(found), *coverage("small", found)]
-    assert rows[: len(own)] == [one.judged(1 - 0.05 / len(rows)) for one in own]
+    assert rows[: len(own)] == [one.verdict(1 - 0.05 / len(rows)) for one in own]
 
 
 @pytest.mark.nightly
 @pytest.mark.slow
 @needs_servo
 def test_the_whole_program_recovers_it_and_another_observer_is_found(threshold: KnownThreshold) -> None:
-    rows = verdicts_on([*rehearsed_measures(threshold, rehearsed(threshold, SMALL.encode(), seed=1), 0.25)])
+    rows = verdicts_on([*rehearsed_measures(threshold, rehearse_known(threshold, SMALL.encode(), seed=1), 0.25)])
     assert [row.holds for row in rows] == [True, True, True], rows
     assert rows[0].what == "intervals delivered as requested"
     dull = replace(threshold, observer=Observer(weber_fraction=2.0))
-    other = verdicts_on([*rehearsed_measures(dull, rehearsed(dull, SMALL.encode(), seed=1), 0.05)])
+    other = verdicts_on([*rehearsed_measures(dull, rehearse_known(dull, SMALL.encode(), seed=1), 0.05)])
     assert other[2].limit == "2"
     assert not other[2].holds, "the levels end at 0.6"
 
@@ -301,6 +301,6 @@ def test_the_whole_program_recovers_the_exponent() -> None:
     short = known_value("short", parse(text.encode(), "short.toml"))
     assert isinstance(short, KnownExponent)
     spread = short.spread([short.simulate(number, seed=1) for number in range(10)], 3)
-    rows = verdicts_on([*rehearsed_measures(short, rehearsed(short, text.encode(), seed=1), spread)])
+    rows = verdicts_on([*rehearsed_measures(short, rehearse_known(short, text.encode(), seed=1), spread)])
     assert [row.holds for row in rows] == [True, True, True], rows
     assert rows[2].what == "exponent of 3 people"

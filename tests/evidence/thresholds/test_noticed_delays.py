@@ -8,8 +8,8 @@ from study_app.evidence.thresholds.noticed_delays import (
     MEAN_CRITERION_S,
     Compared,
     compare_delays,
-    people_of,
-    rated,
+    draw_people,
+    rate_delays,
 )
 from study_app.protocol.randomization.streams import stream
 from study_app.protocol.simulated import OBSERVER, Comparison
@@ -27,7 +27,7 @@ def test_the_forced_choice_finds_the_known_delay_and_the_rating_the_criterion(fo
     middle, low, high = found.detected_ms
     assert low < 1000 * JND_S < high
     assert middle == pytest.approx(1000 * JND_S, rel=0.1)
-    plain = [one for one in found.rated if not one.adapted_s]
+    plain = [one for one in found.ratings if not one.adapted_s]
     thresholds = [float(one.found.effect or 0.0) for one in plain]
     assert thresholds == sorted(thresholds)
     for one, threshold in zip(plain, thresholds, strict=True):
@@ -38,8 +38,8 @@ def test_the_forced_choice_finds_the_known_delay_and_the_rating_the_criterion(fo
 
 
 def test_adaptation_moves_the_rating_and_no_forced_choice(found: Compared) -> None:
-    people = people_of(400, 2)
-    before, after = (rated(people, MEAN_CRITERION_S, adapted, 2).found.effect for adapted in (0.0, 0.03))
+    people = draw_people(400, 2)
+    before, after = (rate_delays(people, MEAN_CRITERION_S, adapted, 2).found.effect for adapted in (0.0, 0.03))
     assert before is not None
     assert after is not None
     assert before == pytest.approx(1000 * MEAN_CRITERION_S, abs=8)

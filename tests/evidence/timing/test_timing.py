@@ -15,7 +15,7 @@ from study_app.cli import main
 from study_app.devices.simulated import PlayedHand
 from study_app.evidence.computer import busy_cores
 from study_app.evidence.cost import hand_motion
-from study_app.evidence.timing.measurement import FULL, LEAD_IN, PERIOD_NS, granted, measure_timing, ticks_at
+from study_app.evidence.timing.measurement import FULL, LEAD_IN, PERIOD_NS, granted_classes, measure_timing, ticks_at
 from study_app.haptics.runtime.clocks import VirtualClock
 from study_app.haptics.runtime.pack import elements_needed
 from study_app.haptics.runtime.servo import Servo
@@ -72,7 +72,7 @@ class FakeWindows:
 def test_a_race_times_every_loop_in_every_class_it_is_granted():
     lines = []
     raced = measure_timing(0.5, "none", FakeWindows(), progress=lines.append)
-    levels = ["normal"] if granted().best is None else ["normal", granted().best.level]
+    levels = ["normal"] if granted_classes().best is None else ["normal", granted_classes().best.level]
     assert list(raced.levels) == levels
     assert [one.kind for one in raced.loops][:4] == ["servo", "bare", "thread", "qt"]
     assert {one.ticks for one in raced.loops} == {500}
