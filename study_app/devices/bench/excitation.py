@@ -1,10 +1,10 @@
-"""The forces of a bench protocol, computed between servo and device in the servo's own loop.
+"""The forces of a bench test, computed between servo and device in the servo's own loop.
 
-The servo presents no liquid; `BenchDriver` lies between it and the device, and adds an excitation force: a spring to a
-place, a constant push, a chirp, a damper. A write without a reading before it is zero, and so is the last write of a
-servo. The force ends at once if the handle oscillates or moves too far, if its stop button is pressed, or if device or
-host do not respond; then it stays zero until the next excitation.
-`Stand` is the servo around the device: it applies excitations for a time, and returns the samples of that time.
+The servo presents no liquid. `BenchDriver` sits between it and the device and replaces its force by an excitation: a
+spring to a position, a constant force, a chirp, a damper. A write that does not follow a reading is zero, and so is the
+last write of a servo. The force ends at once if the handle oscillates or moves too far, if its stop button is pressed,
+or if the device or the host stops responding; it then stays zero until the next excitation. `Stand` runs the servo on
+the device: it applies excitations for a given time and returns the samples of that time.
 """
 
 import math
@@ -50,13 +50,13 @@ ENDED: Final = {
     STOP_BUTTON: "the stop button was pressed",
 }
 
-_EWMA: Final = 0.1
-"""Weight of the velocity of spring and damper for differences over 1 ms: that of the servo's `ewma`."""
+_EWMA_WEIGHT: Final = 0.1
+"""Weight of the newest difference over 1 ms in the velocity of spring and damper: that of the servo's `ewma`."""
 _PACE_MPS: Final = 0.03
 _PUSH_NPS: Final = 2.0
 SILENT_TICKS: Final = 20
-_SLOW_S: Final = 8e-3  # a first-order filter of 20 Hz: faster motion counts as oscillation
-_SHAKE_S: Final = 0.1
+_SHAKE_FILTER_S: Final = 8e-3  # time constant of a 20 Hz low-pass; what it removes counts as oscillation
+_SHAKE_AVERAGE_S: Final = 0.1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -68,9 +68,9 @@ class Excitation:
     stiffness_npm, damping_nspm, integral_per_s, centre_m : the spring to a position
     push_n : the constant force, reached at 2 N/s
     axis, wave_n, from_hz, hz_per_s : the chirp; -1: none
-    rise_nspm_per_s, most_nspm : the damper
-    shake_limit_n : the greatest effective force of the damper above 20 Hz; 0: any
-    reach_m : greatest distance of the handle from its initial place; 0: unlimited
+    rise_nspm_per_s, most_nspm : how fast the damper grows, and its greatest value
+    shake_limit_n : the greatest RMS force of the damper above 20 Hz; 0: unlimited
+    reach_m : greatest distance of the handle from its initial position; 0: unlimited
     """
 
     stiffness_npm: float = 0.0
@@ -88,11 +88,11 @@ class Excitation:
     reach_m: float = 0.0
 
 
-_AT_REST = asdict(Excitation())
+_DEFAULTS = asdict(Excitation())
 
 _EXCITATION = np.dtype(
     [
-        # the device behind
+        # the measured device
         ("context", np.intp),
         ("read", np.intp),
         ("write", np.intp),
@@ -100,16 +100,16 @@ _EXCITATION = np.dtype(
         ("armed", np.int64),  # 1: forces are sent
         ("alive_ns", np.int64),  # the host's latest report, on the servo's clock
         ("limit_n", np.float64),
-        *((name, np.int64 if name == "axis" else np.float64, np.shape(rest)) for name, rest in _AT_REST.items()),
-        # of the loop
-        ("ended", np.int64),  # RUNNING, or the reason of the end
+        *((name, np.int64 if name == "axis" else np.float64, np.shape(default)) for name, default in _DEFAULTS.items()),
+        # state of the loop
+        ("ended", np.int64),  # RUNNING, or the reason why the excitation ended
         ("started", np.int64),
         ("pending", np.int64),  # 1 between a reading and its write
         ("silent", np.int64),  # readings without a usable new position in a row
         ("now_ns", np.int64),
         ("new_ns", np.int64),  # when the last new position was read
         ("position_m", np.float64, (3,)),
-        ("from_m", np.float64, (3,)),  # its place when this excitation began
+        ("from_m", np.float64, (3,)),  # position at the start of this excitation
         ("velocity_mps", np.float64, (3,)),
         ("aim_m", np.float64, (3,)),  # target of the spring, moving to the centre
         ("bias_n", np.float64, (3,)),
@@ -117,7 +117,7 @@ _EXCITATION = np.dtype(
         ("wave_s", np.float64),
         ("damper_nspm", np.float64),
         ("slow_n", np.float64, (3,)),  # the damper's force below 20 Hz
-        ("shake_n2", np.float64),  # mean square of the rest
+        ("shake_n2", np.float64),  # mean square of the damper's remaining force
         ("force_n", np.float64, (3,)),
     ],
     align=True,
@@ -128,7 +128,7 @@ _inner_read, _inner_write = call_at(READ), call_at(WRITE)
 
 
 class BenchDriver:
-    """A device between the servo and ``inner``; both must live as long as the servo ticks.
+    """A driver between the servo and ``inner``; both must exist as long as the servo runs.
 
     Parameters
     ----------
@@ -153,17 +153,20 @@ class BenchDriver:
         """The reason why the inner device failed, if it reports one."""
         return self._inner.failure
 
-    def excite(self, what: Excitation) -> None:
-        """Apply this excitation from the next reading onwards; a spring begins at the handle and keeps its integral."""
+    def excite(self, excitation: Excitation) -> None:
+        """Apply this excitation from the next reading on.
+
+        A new spring starts at the handle's position; a spring that follows another one keeps its target and integral.
+        """
         state = self.state
         state.armed = 0
-        held = state.stiffness_npm > 0.0 and what.stiffness_npm > 0.0 and state.ended == RUNNING
+        keeps_spring = state.stiffness_npm > 0.0 and excitation.stiffness_npm > 0.0 and state.ended == RUNNING
         for name in Excitation.__slots__:
-            state[name] = getattr(what, name)
+            state[name] = getattr(excitation, name)
         state.wave_s = state.damper_nspm = state.shake_n2 = 0.0
         state.slow_n, state.from_m = 0.0, state.position_m
         state.ended = RUNNING
-        if not held:
+        if not keeps_spring:
             state.aim_m, state.bias_n, state.pushed_n = state.position_m, 0.0, 0.0
         state.armed = 1
 
@@ -186,22 +189,22 @@ def _read(context: int, now_ns: int, reading: int) -> int:
         _track_position(bench, out.position_m, now_ns)
     else:
         bench.silent += 1
-    _judge_end(bench, out.buttons)
-    _excite(bench, elapsed_s)
+    _check_end(bench, out.buttons)
+    _update_force(bench, elapsed_s)
     bench.pending = 1
     return answer
 
 
 def _write(context: int, command: int) -> int:
-    bench, asked = _excitation_at(context), command_at(command)
+    bench, record = _excitation_at(context), command_at(command)
     if bench.pending != 0 and bench.armed != 0 and bench.ended == RUNNING:
-        copy(bench.force_n, asked.force_n)
+        copy(bench.force_n, record.force_n)
     else:
-        clear(asked.force_n)
+        clear(record.force_n)
     bench.pending = 0
-    copy(asked.force_n, asked.sent_n)
+    copy(record.force_n, record.sent_n)
     answer: int = _inner_write(bench.write, bench.context, command)
-    clear(asked.force_n)  # the servo's command: it then records the force sent instead
+    clear(record.force_n)  # the servo then records the force that was sent instead of its own
     return answer
 
 
@@ -215,7 +218,7 @@ def _is_usable(bench: Any, position_m: Any, now_ns: int) -> bool:
 @kernel
 def _track_position(bench: Any, position_m: Any, now_ns: int) -> None:
     interval_s = (now_ns - bench.new_ns) * 1e-9
-    weight = 1.0 - (1.0 - _EWMA) ** (interval_s * 1e3)
+    weight = 1.0 - (1.0 - _EWMA_WEIGHT) ** (interval_s * 1e3)
     for axis in range(3):
         if bench.started == 0 or interval_s <= 0.0:
             bench.velocity_mps[axis] = 0.0
@@ -229,7 +232,7 @@ def _track_position(bench: Any, position_m: Any, now_ns: int) -> None:
 
 
 @kernel
-def _judge_end(bench: Any, buttons: int) -> None:
+def _check_end(bench: Any, buttons: int) -> None:
     if bench.ended != RUNNING or bench.armed == 0:
         return
     if buttons & BUTTON_STOP:
@@ -245,24 +248,24 @@ def _judge_end(bench: Any, buttons: int) -> None:
 
 
 @kernel
-def _excite(bench: Any, elapsed_s: float) -> None:
+def _update_force(bench: Any, elapsed_s: float) -> None:
     wave_n = 0.0
     if bench.wave_n > 0.0:
         bench.wave_s += elapsed_s
         turns = (bench.from_hz + 0.5 * bench.hz_per_s * bench.wave_s) * bench.wave_s
         wave_n = bench.wave_n * math.sin(2.0 * math.pi * turns)
     bench.damper_nspm = min(bench.damper_nspm + bench.rise_nspm_per_s * elapsed_s, bench.most_nspm)
-    shaken_n2 = 0.0
+    fast_n2 = 0.0
     for axis in range(3):
         bench.aim_m[axis] += _clamp(bench.centre_m[axis] - bench.aim_m[axis], _PACE_MPS * elapsed_s)
-        off_m = bench.aim_m[axis] - bench.position_m[axis]
-        spring_n = bench.stiffness_npm * off_m
+        error_m = bench.aim_m[axis] - bench.position_m[axis]
+        spring_n = bench.stiffness_npm * error_m
         bench.bias_n[axis] += bench.integral_per_s * elapsed_s * spring_n
         bench.bias_n[axis] = _clamp(bench.bias_n[axis], 0.5 * bench.limit_n)
         bench.pushed_n[axis] += _clamp(bench.push_n[axis] - bench.pushed_n[axis], _PUSH_NPS * elapsed_s)
         damper_n = -bench.damper_nspm * bench.velocity_mps[axis]
-        bench.slow_n[axis] += elapsed_s / (elapsed_s + _SLOW_S) * (damper_n - bench.slow_n[axis])
-        shaken_n2 += (damper_n - bench.slow_n[axis]) ** 2
+        bench.slow_n[axis] += elapsed_s / (elapsed_s + _SHAKE_FILTER_S) * (damper_n - bench.slow_n[axis])
+        fast_n2 += (damper_n - bench.slow_n[axis]) ** 2
         bench.force_n[axis] = (
             spring_n
             - bench.damping_nspm * bench.velocity_mps[axis]
@@ -271,7 +274,7 @@ def _excite(bench: Any, elapsed_s: float) -> None:
             + damper_n
             + (wave_n if axis == bench.axis else 0.0)
         )
-    bench.shake_n2 += elapsed_s / (elapsed_s + _SHAKE_S) * (shaken_n2 - bench.shake_n2)
+    bench.shake_n2 += elapsed_s / (elapsed_s + _SHAKE_AVERAGE_S) * (fast_n2 - bench.shake_n2)
     size_n = norm(bench.force_n)
     if not math.isfinite(size_n):
         clear(bench.force_n)
@@ -281,15 +284,15 @@ def _excite(bench: Any, elapsed_s: float) -> None:
 
 
 @kernel
-def _clamp(value: float, most: float) -> float:
-    return min(max(value, -most), most)
+def _clamp(value: float, limit: float) -> float:
+    return min(max(value, -limit), limit)
 
 
 RATE_HZ: Final = 1000.0
-_GREATEST_N: Final = 4.0
+_MAX_FORCE_N: Final = 4.0
 """Greatest force of an excitation, even if the device permits more."""
-_LOOK_S: Final = 0.02
-_ALIVE_NS: Final = 500_000_000
+_CHECK_INTERVAL_S: Final = 0.02
+_HOST_TIMEOUT_NS: Final = 500_000_000
 
 
 class Stand:
@@ -304,7 +307,7 @@ class Stand:
     def __init__(self, device: Device, clock: Clock | None = None) -> None:
         self.device = device
         self.clock = clock or SystemClock()
-        self.limit_n = min(device.force_limit_n, _GREATEST_N)
+        self.limit_n = min(device.force_limit_n, _MAX_FORCE_N)
         self._driver = BenchDriver(device, self.limit_n)
         self._servo = Servo(self._driver, clock=self.clock, rate_hz=RATE_HZ, elements=0)
         self._reader = self._servo.telemetry.reader()
@@ -320,7 +323,7 @@ class Stand:
 
     @property
     def ended(self) -> str | None:
-        """The reason why the excitation ended by itself; None while it acts."""
+        """The reason why the excitation ended by itself; None while it continues."""
         return ENDED.get(int(self._driver.state.ended))
 
     @property
@@ -328,38 +331,38 @@ class Stand:
         """The number of deadlines that the servo skipped."""
         return self._servo.overruns
 
-    def excite(self, what: Excitation) -> None:
-        """Apply this excitation from the next tick onwards."""
-        self._live()
-        self._driver.excite(what)
+    def excite(self, excitation: Excitation) -> None:
+        """Apply this excitation from the next tick on."""
+        self._report_alive()
+        self._driver.excite(excitation)
 
     def run(
         self, seconds: float, *, answered: Callable[[], str | None] | None = None, may_end: bool = False
     ) -> tuple[Any, str | None]:
-        """Wait for a duration; return its samples and the operator's answer during it, if any.
+        """Let the servo run for a duration; return the samples and the operator's answer, if any.
 
         Parameters
         ----------
         answered : returns the operator's input, None without one
-        may_end : whether an excitation may end by itself; then this returns at once
+        may_end : whether the excitation may end by itself, in which case this returns at once
 
         Raises
         ------
         DeviceError
-            The excitation ended by itself and may not; or the device was lost.
+            The excitation ended by itself although it may not, or the device was lost.
         """
         self._reader.read()
-        taken, left = [], round(seconds * RATE_HZ)
+        chunks, ticks_left = [], round(seconds * RATE_HZ)
         answer: str | None = None
-        while left > 0 and answer is None:
-            ticks = min(left, round(_LOOK_S * RATE_HZ))
-            self._live()
+        while ticks_left > 0 and answer is None:
+            ticks = min(ticks_left, round(_CHECK_INTERVAL_S * RATE_HZ))
+            self._report_alive()
             if self.clock.runs:
                 time.sleep(ticks / RATE_HZ)
             else:
                 self._servo.advance(ticks)
-            left -= ticks
-            taken.append(self._reader.read())
+            ticks_left -= ticks
+            chunks.append(self._reader.read())
             self._servo.check()
             answer = None if answered is None else answered()
             if self._driver.state.ended != RUNNING:
@@ -369,13 +372,13 @@ class Stand:
                     f"the bench test stopped because {self.ended}; the force is zero: check the device, then start "
                     "again"
                 )
-        return np.concatenate(taken).view(np.recarray) if taken else self._reader.read(), answer
+        return np.concatenate(chunks).view(np.recarray) if chunks else self._reader.read(), answer
 
     def rest(self) -> None:
         self._driver.end()
 
-    def _live(self) -> None:
-        self._driver.state.alive_ns = self._servo.now_ns() + _ALIVE_NS
+    def _report_alive(self) -> None:
+        self._driver.state.alive_ns = self._servo.now_ns() + _HOST_TIMEOUT_NS
 
     def __enter__(self) -> Self:
         if self.clock.runs:
