@@ -1,9 +1,10 @@
 """Emulated Falcons as a backend of pyusb, with its ``find``, ``write``, ``read`` and ``ctrl_transfer``.
 
-The descriptors are those of an FT232R with the Falcon's ids: one configuration, one interface of the vendor's class,
-two bulk endpoints. Refusals raise what pyusb's own backend of libusb would raise.
-The driver in front of it is the real one, including pyusb and the C function; the emulator replaces the USB bus. Once
-it is open, the emulator's time is that of the servo's ticks, so that it runs as fast as a rehearsal.
+The USB descriptors are those of an FT232R with the Falcon's ids: one configuration, one interface of the vendor's
+class, two bulk endpoints. Rejected calls raise what pyusb's libusb backend would raise.
+
+The driver that uses this backend is the real one, including pyusb and the C function; only the USB bus is replaced.
+Once the device is open, the emulator's time is that of the servo's ticks, so that it runs as fast as a rehearsal.
 """
 
 import errno
@@ -92,14 +93,14 @@ class _Handle:
     open: bool = True
 
 
-def _check(code: int) -> None:
+def _raise_for_code(code: int) -> None:
     if code >= 0:
         return
     if code == constants.ERROR_NOT_SUPPORTED:
         raise NotImplementedError("Operation not supported or unimplemented on this platform")
     number, message = _ERRORS[code]
-    kind = usb.core.USBTimeoutError if code == constants.ERROR_TIMEOUT else usb.core.USBError
-    raise kind(message, code, number)
+    error_class = usb.core.USBTimeoutError if code == constants.ERROR_TIMEOUT else usb.core.USBError
+    raise error_class(message, code, number)
 
 
 class EmulatedBackend(usb.backend.IBackend):  # type: ignore[misc]
@@ -109,7 +110,7 @@ class EmulatedBackend(usb.backend.IBackend):  # type: ignore[misc]
         self.emulators = emulators
         self._claims: dict[int, _Handle] = {}
 
-    # The part of the interface that this program's transport needs besides pyusb.
+    # What this program's transport needs besides the interface of pyusb.
 
     def c_calls(self, handle: _Handle) -> BulkCalls:
         return handle.emulator.calls()
@@ -162,11 +163,11 @@ class EmulatedBackend(usb.backend.IBackend):  # type: ignore[misc]
 
     def open_device(self, dev: Emulator) -> _Handle:
         if dev.faults.is_on("unplugged"):
-            _check(constants.ERROR_NO_DEVICE)
+            _raise_for_code(constants.ERROR_NO_DEVICE)
         if dev.faults.is_on("access_denied"):
-            _check(constants.ERROR_ACCESS)
+            _raise_for_code(constants.ERROR_ACCESS)
         if dev.faults.is_on("not_supported"):
-            _check(constants.ERROR_NOT_SUPPORTED)
+            _raise_for_code(constants.ERROR_NOT_SUPPORTED)
         return _Handle(dev)
 
     def close_device(self, dev_handle: _Handle) -> None:
@@ -176,48 +177,48 @@ class EmulatedBackend(usb.backend.IBackend):  # type: ignore[misc]
             del self._claims[id(dev_handle.emulator)]
 
     def set_configuration(self, dev_handle: _Handle, config_value: int) -> None:
-        self._reach(dev_handle)
+        self._connected_emulator(dev_handle)
 
     def get_configuration(self, dev_handle: _Handle) -> int:
-        self._reach(dev_handle)
+        self._connected_emulator(dev_handle)
         return _CONFIGURATION_VALUE
 
     def claim_interface(self, dev_handle: _Handle, intf: int) -> None:
-        emulator = self._reach(dev_handle)
+        emulator = self._connected_emulator(dev_handle)
         if intf != 0:
-            _check(constants.ERROR_NOT_FOUND)
+            _raise_for_code(constants.ERROR_NOT_FOUND)
         owner = self._claims.get(id(emulator))
         if emulator.faults.is_on("busy") or emulator.faults.is_on("kernel_driver") or owner not in {None, dev_handle}:
-            _check(constants.ERROR_BUSY)
+            _raise_for_code(constants.ERROR_BUSY)
         self._claims[id(emulator)] = dev_handle
         emulator.note_claim()
 
     def release_interface(self, dev_handle: _Handle, intf: int) -> None:
-        emulator = self._reach(dev_handle)
+        emulator = self._connected_emulator(dev_handle)
         if self._claims.pop(id(emulator), None) is None:
-            _check(constants.ERROR_NOT_FOUND)
+            _raise_for_code(constants.ERROR_NOT_FOUND)
 
     def is_kernel_driver_active(self, dev_handle: _Handle, intf: int) -> bool:
-        return self._reach(dev_handle).faults.is_on("kernel_driver")
+        return self._connected_emulator(dev_handle).faults.is_on("kernel_driver")
 
     def detach_kernel_driver(self, dev_handle: _Handle, intf: int) -> None:
-        faults = self._reach(dev_handle).faults
+        faults = self._connected_emulator(dev_handle).faults
         if faults.is_on("kernel_driver_stays"):
-            _check(constants.ERROR_ACCESS)
+            _raise_for_code(constants.ERROR_ACCESS)
         faults.off("kernel_driver")
 
     def bulk_write(self, dev_handle: _Handle, ep: int, intf: int, data: Any, timeout: int) -> int:
-        code, moved = self._claimed(dev_handle).write(bytes(data), timeout)
+        code, moved = self._claimed_emulator(dev_handle).write(bytes(data), timeout)
         if (
             moved == 0 or code != constants.ERROR_TIMEOUT
         ):  # the bytes transferred before the time-out are reported, as by libusb
-            _check(code)
+            _raise_for_code(code)
         return moved
 
     def bulk_read(self, dev_handle: _Handle, ep: int, intf: int, buff: Any, timeout: int) -> int:
-        code, data = self._claimed(dev_handle).read(len(buff) * buff.itemsize, timeout)
+        code, data = self._claimed_emulator(dev_handle).read(len(buff) * buff.itemsize, timeout)
         if not data or code != constants.ERROR_TIMEOUT:
-            _check(code)
+            _raise_for_code(code)
         buff[: len(data)] = type(buff)("B", data)
         return len(data)
 
@@ -231,34 +232,34 @@ class EmulatedBackend(usb.backend.IBackend):  # type: ignore[misc]
         data: Any,
         timeout: int,
     ) -> int:
-        emulator = self._reach(dev_handle)
+        emulator = self._connected_emulator(dev_handle)
         if bmRequestType == constants.REQUEST_TYPE:
-            _check(emulator.control(bRequest, wValue))
+            _raise_for_code(emulator.control(bRequest, wValue))
             return len(data)
         if (bmRequestType, bRequest, wValue >> 8) != (_DEVICE_TO_HOST, _GET_DESCRIPTOR, _STRING_DESCRIPTOR):
-            _check(constants.ERROR_PIPE)
+            _raise_for_code(constants.ERROR_PIPE)
         descriptor = _string_descriptor(wValue & 0xFF, emulator.serial)[: len(data)]
         data[: len(descriptor)] = type(data)("B", descriptor)
         return len(descriptor)
 
     def reset_device(self, dev_handle: _Handle) -> None:
         """Reset the bridge's port; the device behind it continues."""
-        _check(self._reach(dev_handle).control(constants.REQUEST_RESET, constants.RESET_ALL))
+        _raise_for_code(self._connected_emulator(dev_handle).control(constants.REQUEST_RESET, constants.RESET_ALL))
 
     def clear_halt(self, dev_handle: _Handle, ep: int) -> None:
         """Continue after a stall of an endpoint, which never happens."""
-        self._reach(dev_handle)
+        self._connected_emulator(dev_handle)
 
-    def _reach(self, handle: _Handle) -> Emulator:
+    def _connected_emulator(self, handle: _Handle) -> Emulator:
         """Return the Falcon of an open handle; raise an error if its cable is unplugged."""
         if not handle.open or handle.emulator.faults.is_on("unplugged"):
-            _check(constants.ERROR_NO_DEVICE)
+            _raise_for_code(constants.ERROR_NO_DEVICE)
         return handle.emulator
 
-    def _claimed(self, handle: _Handle) -> Emulator:
-        emulator = self._reach(handle)
+    def _claimed_emulator(self, handle: _Handle) -> Emulator:
+        emulator = self._connected_emulator(handle)
         if self._claims.get(id(emulator)) is not handle:
-            _check(constants.ERROR_IO)
+            _raise_for_code(constants.ERROR_IO)
         return emulator
 
 
@@ -279,9 +280,9 @@ class EmulatedFalcon(FalconDevice):
     Parameters
     ----------
     random : random numbers for the hand's tremor and the emulator's faults; None: fixed ones
-    firmware : file to load into it; without one its program runs already
+    firmware : file to load; None: its firmware already runs
     emulator : an existing one to use
-    given : arguments of a `FalconDevice`
+    given : further arguments of `FalconDevice`
     """
 
     name = "falcon-emulated"
@@ -310,12 +311,12 @@ class EmulatedFalcon(FalconDevice):
     def open(self) -> None:
         """Open the device and wait until the hand has moved the grip to the middle after homing."""
         super().open()
-        still = 0
-        while still < _STILL_TICKS:
+        still_ticks = 0
+        while still_ticks < _STILL_TICKS:
             self._tick()
-            still = 0 if self.hand.moving else still + 1
+            still_ticks = 0 if self.hand.moving else still_ticks + 1
         self._begin_anew()
-        self._backend.follow_clock(self.context)  # FALCON begins with the time of the tick
+        self._backend.follow_clock(self.context)  # the record there begins with the time of the tick
 
     def close(self) -> None:
         self._backend.follow_clock(0)

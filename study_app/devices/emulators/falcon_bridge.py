@@ -1,12 +1,12 @@
 """The emulated USB bridge: an FT232R between the host's transfers and the bytes on the Falcon's line.
 
 Two rings store bytes with their arrival times: ``out`` toward the device, ``back`` from it. A transfer is a small
-simulation in emulated time: it runs to its end and never waits. The chip returns its bytes (two status bytes first)
-when it has 62 bytes, after the event character (not as the first byte), or when the latency timer expires, then even
-without bytes (FTDI AN232B-04).
+simulation in emulated time: it runs to its end and never waits. The chip returns a packet, which begins with two status
+bytes, when it has 62 bytes, when the event character has arrived (except as the first byte), or when the latency timer
+expires, in that case even without bytes (FTDI AN232B-04).
 
-Time is read at the address ``clock``, and exceeds it by at most a transfer's time-out; without a clock it is the
-emulator's own, which every transfer advances.
+The time is read at the address ``clock``; the emulated time exceeds it by at most the time-out of a transfer. Without a
+clock, the emulator has its own time, which every transfer advances.
 """
 
 from typing import Any, Final
@@ -18,8 +18,8 @@ from study_app.haptics.kernels import kernel, record_at
 
 OUT_RING: Final = 4096
 BACK_RING: Final = 4096
-_OUT_BUFFER: Final = 128  # the chip's own, to the device
-_BACK_BUFFER: Final = 256  # and from it
+_OUT_BUFFER: Final = 128  # size of the chip's buffer toward the device
+_BACK_BUFFER: Final = 256  # and of that from the device
 
 BRIDGE = np.dtype(
     [
@@ -31,13 +31,13 @@ BRIDGE = np.dtype(
         ("event", np.int64),  # event character; -1: off
         ("dtr", np.int64),
         ("sent_ns", np.int64),  # time of the last packet to the host, which restarted the latency timer
-        ("lost", np.int64),  # bytes that found a buffer full
+        ("lost", np.int64),  # bytes dropped because a buffer was full
         ("out", np.uint8, (OUT_RING,)),
         ("out_ns", np.int64, (OUT_RING,)),  # arrival at the device
-        ("out_divisor", np.int64, (OUT_RING,)),  # duration of each on the line
+        ("out_divisor", np.int64, (OUT_RING,)),  # baud-rate divisor of each
         ("out_first", np.int64),  # bytes out_first ... out_last - 1 of all are still on their way
         ("out_last", np.int64),
-        ("out_free_ns", np.int64),  # the line is busy until
+        ("out_free_ns", np.int64),  # time until which the line is busy
         ("back", np.uint8, (BACK_RING,)),
         ("back_ns", np.int64, (BACK_RING,)),  # arrival in the chip
         ("back_first", np.int64),
@@ -56,7 +56,7 @@ _USB_NS: Final = 30_000  # least duration of a transfer, in the emulator's own t
 _ENDLESS_NS: Final = 3_600_000_000_000
 _BACK_NS: Final = 1_000_000_000  # a clock this far behind was replaced or reset
 _STATUS = (0x01, 0x60)  # modem status, line status: ready and empty
-_EIGHTHS = (0, 4, 2, 1)  # of a divisor, by its two highest bits
+_EIGHTHS = (0, 4, 2, 1)  # the fraction of a divisor, by its two highest bits
 
 
 @kernel
@@ -69,7 +69,7 @@ def power_up(bridge: Any) -> None:
 
 
 @kernel
-def begin(bridge: Any) -> int:
+def begin_transfer(bridge: Any) -> int:
     """Begin a transfer; return the clock jump since the last one, by which all other times must be shifted [ns]."""
     if bridge.clock == 0:
         bridge.now_ns += _USB_NS
@@ -83,12 +83,12 @@ def begin(bridge: Any) -> int:
 
 
 @kernel
-def end_of(bridge: Any, timeout_ns: int) -> int:
-    """Return the time-out of a transfer that begins now [ns]."""
-    lasting = timeout_ns if timeout_ns > 0 else _ENDLESS_NS
+def transfer_end_ns(bridge: Any, timeout_ns: int) -> int:
+    """Return the time at which a transfer that begins now reaches its time-out [ns]; 0 means no time-out."""
+    duration_ns = timeout_ns if timeout_ns > 0 else _ENDLESS_NS
     if bridge.clock == 0:
-        return int(bridge.now_ns + lasting)
-    return int(max(bridge.now_ns, _word_at(bridge.clock).value + lasting))
+        return int(bridge.now_ns + duration_ns)
+    return int(max(bridge.now_ns, _word_at(bridge.clock).value + duration_ns))
 
 
 @kernel
@@ -117,44 +117,44 @@ def byte_ns(divisor: int) -> int:
 
 @kernel
 def send(bridge: Any, value: int, end_ns: int) -> bool:
-    """Queue a byte for the device when there is room; return False if there is none until ``end_ns``."""
-    lasting = byte_ns(bridge.divisor)
-    arrival = max(bridge.out_free_ns, bridge.now_ns) + lasting
-    room_ns = arrival - _OUT_BUFFER * lasting
+    """Queue a byte for the device once there is room; return False if there is none until ``end_ns``."""
+    duration_ns = byte_ns(bridge.divisor)
+    arrival = max(bridge.out_free_ns, bridge.now_ns) + duration_ns
+    room_ns = arrival - _OUT_BUFFER * duration_ns
     if room_ns > end_ns or bridge.out_last - bridge.out_first >= OUT_RING:
         return False
     bridge.now_ns = max(bridge.now_ns, room_ns)
-    place = bridge.out_last % OUT_RING
-    bridge.out[place] = value
-    bridge.out_ns[place] = arrival
-    bridge.out_divisor[place] = bridge.divisor
+    index = bridge.out_last % OUT_RING
+    bridge.out[index] = value
+    bridge.out_ns[index] = arrival
+    bridge.out_divisor[index] = bridge.divisor
     bridge.out_free_ns = arrival
     bridge.out_last += 1
     return True
 
 
 @kernel
-def answer(bridge: Any, value: int, since_ns: int, divisor: int) -> None:
+def queue_reply(bridge: Any, value: int, since_ns: int, divisor: int) -> None:
     """Send a byte from the device over the line, not before ``since_ns``."""
     if bridge.back_last - bridge.back_first >= BACK_RING:
         bridge.lost += 1
         return
     bridge.back_free_ns = max(bridge.back_free_ns, since_ns) + byte_ns(divisor)
-    place = bridge.back_last % BACK_RING
-    bridge.back[place] = value
-    bridge.back_ns[place] = bridge.back_free_ns
+    index = bridge.back_last % BACK_RING
+    bridge.back[index] = value
+    bridge.back_ns[index] = bridge.back_free_ns
     bridge.back_last += 1
 
 
 @kernel
-def hand_over_ns(bridge: Any) -> int:
+def next_packet_ns(bridge: Any) -> int:
     """Return when the chip sends its next packet to a host that requests it from now on [ns]."""
     due = bridge.sent_ns + bridge.latency_ns
-    first, held = bridge.back_first, bridge.back_last - bridge.back_first
-    if held >= constants.CHUNK:
+    first, waiting = bridge.back_first, bridge.back_last - bridge.back_first
+    if waiting >= constants.CHUNK:
         due = min(due, bridge.back_ns[(first + constants.CHUNK - 1) % BACK_RING])
     if bridge.event >= 0:
-        for k in range(1, min(held, constants.CHUNK)):
+        for k in range(1, min(waiting, constants.CHUNK)):
             if bridge.back[(first + k) % BACK_RING] == bridge.event:
                 due = min(due, bridge.back_ns[(first + k) % BACK_RING])
                 break
@@ -162,12 +162,12 @@ def hand_over_ns(bridge: Any) -> int:
 
 
 @kernel
-def hand_over(bridge: Any, data: int, noise: int) -> int:
+def deliver_packet(bridge: Any, data: int, noise: int) -> int:
     """Write the current packet to the address ``data``; return its length, including status bytes."""
     byte_at(data).value = _STATUS[0] ^ (noise & 0xF0)
     byte_at(data + 1).value = _STATUS[1] ^ ((noise >> 8) & 0xFF)
     length = constants.STATUS_BYTES
-    while length < constants.USB_PACKET and arrived(bridge) > 0:
+    while length < constants.USB_PACKET and has_arrived(bridge) > 0:
         byte_at(data + length).value = bridge.back[bridge.back_first % BACK_RING]
         bridge.back_first += 1
         length += 1
@@ -176,28 +176,28 @@ def hand_over(bridge: Any, data: int, noise: int) -> int:
 
 
 @kernel
-def arrived(bridge: Any) -> int:
-    """Return the number of bytes that the chip has for the host."""
+def has_arrived(bridge: Any) -> int:
+    """Return 1 if the chip has a byte for the host, else 0."""
     if bridge.back_first == bridge.back_last:
         return 0
     return 1 if bridge.back_ns[bridge.back_first % BACK_RING] <= bridge.now_ns else 0
 
 
 @kernel
-def overflow(bridge: Any) -> None:
-    """Drop bytes that arrived while the chip's buffer was full: all except the oldest."""
-    held = 0
+def drop_overflow(bridge: Any) -> None:
+    """Drop the bytes that arrived while the chip's buffer was full; it keeps the oldest."""
+    waiting = 0
     for k in range(bridge.back_first, bridge.back_last):
         if bridge.back_ns[k % BACK_RING] <= bridge.now_ns:
-            held += 1
-    beyond = held - _BACK_BUFFER
-    if beyond <= 0:
+            waiting += 1
+    excess = waiting - _BACK_BUFFER
+    if excess <= 0:
         return
-    bridge.lost += beyond
-    for k in range(bridge.back_first + _BACK_BUFFER, bridge.back_last - beyond):
-        bridge.back[k % BACK_RING] = bridge.back[(k + beyond) % BACK_RING]
-        bridge.back_ns[k % BACK_RING] = bridge.back_ns[(k + beyond) % BACK_RING]
-    bridge.back_last -= beyond
+    bridge.lost += excess
+    for k in range(bridge.back_first + _BACK_BUFFER, bridge.back_last - excess):
+        bridge.back[k % BACK_RING] = bridge.back[(k + excess) % BACK_RING]
+        bridge.back_ns[k % BACK_RING] = bridge.back_ns[(k + excess) % BACK_RING]
+    bridge.back_last -= excess
 
 
 @kernel
@@ -221,7 +221,7 @@ def control(bridge: Any, request: int, value: int) -> None:
 
 @kernel
 def _purge_back(bridge: Any) -> None:
-    while arrived(bridge) > 0:
+    while has_arrived(bridge) > 0:
         bridge.back_first += 1
 
 

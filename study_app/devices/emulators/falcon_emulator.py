@@ -1,6 +1,6 @@
 """An emulated Falcon: the USB bridge, the boot loader, the program it runs, its arms, and the hand that holds the grip.
 
-A transfer advances emulated time from byte to byte at the device, until it is complete or its time is out. Its
+A transfer advances emulated time from byte to byte at the device, until it is complete or reaches its time-out. The
 interface is one C function with the signature of ``libusb_bulk_transfer`` (``bulk``), whose handle is the address of
 the emulator's memory, and the bridge's control requests. Everything happens in emulated time (``falcon_bridge``) and
 depends only on its commands and on ``random``.
@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from study_app.devices.emulators import falcon_bridge, falcon_processor
-from study_app.devices.emulators.falcon_arm import ARMS, count, find_angles, find_force, saturate, set_arms
+from study_app.devices.emulators.falcon_arm import ARMS, encoder_count, find_angles, find_force, saturate, set_arms
 from study_app.devices.emulators.falcon_bridge import BRIDGE, OUT_RING, byte_at, power_up
 from study_app.devices.falcon import constants
 from study_app.devices.falcon.bulk import BULK, BulkCalls
@@ -59,8 +59,8 @@ def _bulk(handle: int, endpoint: int, data: int, length: int, transferred: int, 
     moved.value = 0
     if e.faults.unplugged:
         return constants.ERROR_NO_DEVICE
-    _begin(e)
-    end_ns = falcon_bridge.end_of(e.bridge, timeout_ms * 1_000_000)
+    _begin_transfer(e)
+    end_ns = falcon_bridge.transfer_end_ns(e.bridge, timeout_ms * 1_000_000)
     if endpoint == constants.ENDPOINT_OUT:
         return _bulk_out(e, data, length, moved, end_ns)
     if endpoint == constants.ENDPOINT_IN:
@@ -69,9 +69,9 @@ def _bulk(handle: int, endpoint: int, data: int, length: int, transferred: int, 
 
 
 @kernel
-def _begin(e: Any) -> None:
+def _begin_transfer(e: Any) -> None:
     """Begin a transfer now; if the clock was changed, shift all times to it."""
-    jump_ns = falcon_bridge.begin(e.bridge)
+    jump_ns = falcon_bridge.begin_transfer(e.bridge)
     if jump_ns != 0:
         falcon_bridge.shift_bridge(e.bridge, jump_ns)
         e.moved_ns += jump_ns
@@ -98,8 +98,8 @@ def _bulk_out(e: Any, data: int, length: int, moved: Any, end_ns: int) -> int:
 def _bulk_in(e: Any, data: int, length: int, moved: Any, end_ns: int) -> int:
     bridge = e.bridge
     while moved.value < length:
-        falcon_bridge.overflow(bridge)
-        due_ns = falcon_bridge.hand_over_ns(bridge)
+        falcon_bridge.drop_overflow(bridge)
+        due_ns = falcon_bridge.next_packet_ns(bridge)
         if bridge.out_first < bridge.out_last:
             heard_ns = bridge.out_ns[bridge.out_first % OUT_RING]
             if heard_ns <= min(due_ns, end_ns):  # the device's answer to it may be due sooner
@@ -109,14 +109,14 @@ def _bulk_in(e: Any, data: int, length: int, moved: Any, end_ns: int) -> int:
             _advance(e, end_ns)
             return constants.ERROR_TIMEOUT
         _advance(e, due_ns)
-        waiting = bridge.back_last - bridge.back_first
+        queued = bridge.back_last - bridge.back_first
         room = length - moved.value
-        if room < constants.USB_PACKET and _arrived_of(bridge, waiting) + constants.STATUS_BYTES > room:
+        if room < constants.USB_PACKET and _count_arrived(bridge, queued) + constants.STATUS_BYTES > room:
             return constants.ERROR_OVERFLOW
         noise = int(falcon_processor.draw(e.faults) * 0x10000) if e.faults.status_noise else 0
-        got = falcon_bridge.hand_over(bridge, data + moved.value, noise)
-        moved.value += got
-        if got < constants.USB_PACKET:
+        length_moved = falcon_bridge.deliver_packet(bridge, data + moved.value, noise)
+        moved.value += length_moved
+        if length_moved < constants.USB_PACKET:
             return constants.SUCCESS
     return constants.SUCCESS
 
@@ -130,7 +130,7 @@ def poll(e: Any, data: int, length: int, moved: Any) -> int:
     moved.value = 0
     if e.faults.unplugged:
         return constants.ERROR_NO_DEVICE
-    _begin(e)
+    _begin_transfer(e)
     return _bulk_in(e, data, length, moved, e.bridge.now_ns)
 
 
@@ -138,20 +138,20 @@ def poll(e: Any, data: int, length: int, moved: Any) -> int:
 def next_event_ns(e: Any) -> int:
     """Return the time of the next packet from the chip or byte to the device, when a poll may transfer more [ns]."""
     bridge = e.bridge
-    due_ns = falcon_bridge.hand_over_ns(bridge)
+    due_ns = falcon_bridge.next_packet_ns(bridge)
     if bridge.out_first < bridge.out_last:
         due_ns = min(due_ns, bridge.out_ns[bridge.out_first % OUT_RING])
     return int(due_ns)
 
 
 @kernel
-def _arrived_of(bridge: Any, waiting: int) -> int:
-    held = 0
-    while held < min(waiting, constants.CHUNK):
-        if bridge.back_ns[(bridge.back_first + held) % falcon_bridge.BACK_RING] > bridge.now_ns:
+def _count_arrived(bridge: Any, queued: int) -> int:
+    arrived = 0
+    while arrived < min(queued, constants.CHUNK):
+        if bridge.back_ns[(bridge.back_first + arrived) % falcon_bridge.BACK_RING] > bridge.now_ns:
             break
-        held += 1
-    return held
+        arrived += 1
+    return arrived
 
 
 @kernel
@@ -159,8 +159,8 @@ def _advance(e: Any, to_ns: int) -> None:
     """Let the device process the bytes that arrive up to ``to_ns``."""
     bridge = e.bridge
     while bridge.out_first < bridge.out_last:
-        place = bridge.out_first % OUT_RING
-        at_ns = bridge.out_ns[place]
+        index = bridge.out_first % OUT_RING
+        at_ns = bridge.out_ns[index]
         if at_ns > to_ns:
             break
         bridge.now_ns = max(bridge.now_ns, at_ns)
@@ -168,9 +168,11 @@ def _advance(e: Any, to_ns: int) -> None:
         if e.powered == 0:
             continue
         if e.loader.state == falcon_processor.RUNNING:
-            falcon_processor.receive_byte(e, bridge.out[place], bridge.out_divisor[place], at_ns)
+            falcon_processor.receive_byte(e, bridge.out[index], bridge.out_divisor[index], at_ns)
         else:
-            falcon_processor.load(e.loader, bridge, e.faults, bridge.out[place], bridge.out_divisor[place], at_ns)
+            falcon_processor.receive_boot_byte(
+                e.loader, bridge, e.faults, bridge.out[index], bridge.out_divisor[index], at_ns
+            )
             if e.loader.state == falcon_processor.RUNNING:
                 run_program(e)
     bridge.now_ns = max(bridge.now_ns, to_ns)
@@ -180,14 +182,14 @@ def _advance(e: Any, to_ns: int) -> None:
 def run_program(e: Any) -> None:
     """Start the program with encoders at 0, no torque and no arm homed."""
     e.loader.state = falcon_processor.RUNNING
-    _limp(e)
+    _clear_program(e)
     for arm in range(3):
-        e.run.origin[arm] = count(e.arms, arm)
+        e.run.origin[arm] = encoder_count(e.arms, arm)
         e.run.before_rad[arm] = e.arms.angle_rad[arm]
 
 
 @kernel
-def _limp(e: Any) -> None:
+def _clear_program(e: Any) -> None:
     run = e.run
     run.held = 0
     run.homed = 0
@@ -204,44 +206,44 @@ def control(e: Any, request: int, value: int) -> int:
     """Carry out a control request of the bridge; a rising DTR at 9600 baud resets the device."""
     if e.faults.unplugged:
         return constants.ERROR_NO_DEVICE
-    _begin(e)
+    _begin_transfer(e)
     dtr = e.bridge.dtr
     falcon_bridge.control(e.bridge, request, value)
     if e.bridge.dtr > dtr and e.bridge.divisor == constants.BAUD_9600 and e.powered != 0:
         falcon_processor.reset(e.loader)
-        _limp(e)
+        _clear_program(e)
     return constants.SUCCESS
 
 
 @kernel
-def supply(e: Any, on: int) -> None:
-    """Turn its mains power on or off; without power its program is lost."""
+def set_power(e: Any, on: int) -> None:
+    """Turn the mains power on or off; without power the program is lost."""
     if e.powered == on:
         return
     e.powered = on
     falcon_processor.reset(e.loader)
     e.loader.state = falcon_processor.WAITING
-    _limp(e)
+    _clear_program(e)
 
 
 @kernel
-def let_pass(e: Any, lasting_ns: int) -> None:
-    """Advance the time, including the motion of hand and handle."""
-    _begin(e)
-    end_ns = falcon_bridge.end_of(e.bridge, lasting_ns)
+def advance_time(e: Any, lasting_ns: int) -> None:
+    """Advance the time by a duration, including the motion of hand and handle."""
+    _begin_transfer(e)
+    end_ns = falcon_bridge.transfer_end_ns(e.bridge, lasting_ns)
     _advance(e, end_ns)
     falcon_processor.move_until(e, end_ns, max(lasting_ns, falcon_processor.LONGEST_NS))
 
 
 @kernel
-def look(e: Any) -> None:
+def catch_up(e: Any) -> None:
     """Advance to the current time of the clock."""
-    _begin(e)
+    _begin_transfer(e)
     falcon_processor.move_until(e, e.bridge.now_ns, falcon_processor.LONGEST_NS)
 
 
 @kernel
-def unload(e: Any) -> None:
+def reset_to_power_up(e: Any) -> None:
     """Reset to the state after connection: arms at the grip's position, no program."""
     find_angles(e.arms, e.handle.position_m)
     e.loader.state = falcon_processor.WAITING
@@ -249,12 +251,12 @@ def unload(e: Any) -> None:
 
 @kernel
 def update_force(e: Any) -> None:
-    """Set ``arms.force_n`` to the motors' present force."""
+    """Set ``arms.force_n`` to the current force of the motors."""
     find_force(e.arms, e.run.acting, e.handle.position_m)
     saturate(e.arms)
 
 
-_STOPS_M = (0.055, 0.055, 0.050)
+_HOUSING_M = (0.055, 0.055, 0.050)
 """Half extents of the housing about the hand's origin, larger than the hand's range of motion."""
 _UNITS_PER_NM = 6616.0
 """Motor units for an arm torque of 1 N m: Martin & Hillier 2009; others measured 10 000."""
@@ -306,27 +308,27 @@ class Emulator(HandOrders):
         power_up(self.state.bridge)
         set_arms(self.state.arms, self.geometry, units_per_nm, arm_offset_rad)
         self.state.handle = new_scripted_handle(quantum_m=0.0)
-        self.state.handle.stop_m = _STOPS_M
+        self.state.handle.stop_m = _HOUSING_M
         self.state.hand.place_m = self.state.hand.aim_m
         self.state.powered = 1
-        unload(self.state)
+        reset_to_power_up(self.state)
         if running:
             run_program(self.state)
 
     # The bridge's interface to a host.
 
     def control(self, request: int, value: int) -> int:
-        """Carry out a control request of the bridge; return 0 or a libusb error. ``recorded`` keeps them all."""
+        """Carry out a control request of the bridge and append it to ``recorded``; return 0 or a libusb error."""
         self.recorded.append((request, value))
         return int(control(self.state, request, value))
 
     def write(self, data: bytes, timeout_ms: int) -> tuple[int, int]:
-        """Transfer bytes out; return 0 or a libusb error, and how many it took."""
+        """Transfer bytes out; return 0 or a libusb error, and the number of bytes accepted."""
         memory = np.frombuffer(data or b"\0", np.uint8)
         return self.transfer(constants.ENDPOINT_OUT, memory, len(data), timeout_ms)
 
     def read(self, size: int, timeout_ms: int) -> tuple[int, bytes]:
-        """Transfer at most ``size`` bytes in, status bytes among them; return 0 or a libusb error, and the bytes."""
+        """Transfer at most ``size`` bytes in, including status bytes; return 0 or a libusb error, and the bytes."""
         memory = np.zeros(max(size, 1), np.uint8)
         code, moved = self.transfer(constants.ENDPOINT_IN, memory, size, timeout_ms)
         return code, memory[:moved].tobytes()
@@ -346,7 +348,7 @@ class Emulator(HandOrders):
         return int(next_event_ns(self.state))
 
     def transfer(self, endpoint: int, memory: Any, length: int, timeout_ms: int) -> tuple[int, int]:
-        """Transfer ``length`` bytes of ``memory`` at an endpoint; return 0 or a libusb error, and how many moved."""
+        """Transfer ``length`` bytes of ``memory`` at an endpoint; return 0 or a libusb error, and the number moved."""
         moved = np.zeros(1, np.int32)
         call = bulk().ctypes
         code = call(self._address, endpoint, memory.ctypes.data, length, moved.ctypes.data, timeout_ms)
@@ -382,21 +384,21 @@ class Emulator(HandOrders):
         return int(self._now_ns[0])
 
     def pause(self, seconds: float) -> None:
-        self._let_pass(self.state, round(seconds * 1e9))
+        self._advance_compiled(self.state, round(seconds * 1e9))
 
     @cached_property
-    def _let_pass(self) -> Callable[[Any, int], None]:
-        return entry_of(let_pass, self.state, 0)
+    def _advance_compiled(self) -> Callable[[Any, int], None]:
+        return entry_of(advance_time, self.state, 0)
 
     def look(self) -> None:
         """Advance to the current time of its clock: process received bytes, and move for a limited time."""
-        look(self.state)
+        catch_up(self.state)
 
     # State and faults.
 
     def power(self, on: bool) -> None:
-        """Connect or disconnect its mains adapter: without it, its program is lost and its motors are off."""
-        supply(self.state, 1 if on else 0)
+        """Connect or disconnect the mains adapter; without it the program is lost and the motors are off."""
+        set_power(self.state, 1 if on else 0)
 
     def set_fault(self, fault: str) -> None:
         """Set a fault in the notation of the command line: ``drop=0.01``, ``frozen`` or ``power-off``."""

@@ -1,13 +1,13 @@
 """The emulated Falcon's processor: its boot loader, its program, and faults of both.
 
-Without a program it is pinged at 9600 baud, timed by an 'A', and loaded byte by byte. It knows the boot stream of TI's
-loader (SPRUI33): little-endian words, the key 0x08AA, eight reserved words, the entry point, then blocks of (count,
-destination, words) until a count of 0, after which the program runs. After invalid data it does not answer until it is
-pinged again.
+Without a program it is pinged at 9600 baud, timed by an 'A', and loaded byte by byte. It understands the boot stream of
+TI's loader (SPRUI33): little-endian words, the key 0x08AA, eight reserved words, the entry point, then blocks of
+(count, destination, words) until a count of 0, after which the program runs. After invalid data it does not answer
+until it is pinged again.
 
 The program receives packets, sets torques, and moves a handle by motors and hand. Assumed, because not published: mass,
-friction and hand (those of the scripted device), the places of the arms' indices, the response time, that a torque
-persists until the next packet, and that one beyond the range is clipped.
+friction and hand (those of the scripted device), the positions of the arms' indices, the response time, that a torque
+persists until the next packet, and that a torque beyond the range is clipped.
 """
 
 import math
@@ -16,35 +16,35 @@ from typing import Any, Final
 
 import numpy as np
 
-from study_app.devices.emulators.falcon_arm import count, find_force, saturate, stop
-from study_app.devices.emulators.falcon_bridge import answer
+from study_app.devices.emulators.falcon_arm import encoder_count, find_force, saturate, stop
+from study_app.devices.emulators.falcon_bridge import queue_reply
 from study_app.devices.falcon import constants
 from study_app.devices.hand import REACH, move_hand
 from study_app.errors import DeviceError
 from study_app.haptics.kernels import kernel, move, push
 
 _CHANCES: Final = ("drop", "truncate", "corrupt", "duplicate", "delay", "stall", "echo", "glued", "echo_prefix")
-"""A reply lost, cut to 14 bytes, with a wrong byte, sent twice or late; a device that receives nothing for some time; a
-byte of firmware echoed wrongly; more bytes behind the answer to a ping, in the same USB packet; 13 41 as the echo of
-'A'."""
+"""Faults that occur at random: a reply is lost, cut to 14 bytes, has a wrong byte, is sent twice or late; the device
+receives nothing for some time; a byte of firmware is echoed wrongly; extra bytes follow the answer to a ping in the
+same USB packet; 'A' is echoed as 13 41."""
 DROP, TRUNCATE, CORRUPT, DUPLICATE, DELAY, STALL, ECHO, GLUED, ECHO_PREFIX = range(len(_CHANCES))
 
 _SWITCHES: Final = (
-    "unplugged",  # the bridge is gone
+    "unplugged",  # the bridge is disconnected
     "access_denied",  # cannot be opened: no permission
     "not_supported",  # cannot be opened: another driver has it
     "busy",  # cannot be claimed: another program has it
-    "kernel_driver",  # cannot be claimed until the kernel's driver is detached
-    "kernel_driver_stays",  # which it does not permit
-    "frozen",  # encoders stand still, homing too
+    "kernel_driver",  # cannot be claimed until the kernel's driver is detached,
+    "kernel_driver_stays",  # which is not permitted
+    "frozen",  # the encoder counts do not change, so homing fails
     "never_homes",  # no arm finds its index
     "forgets",  # the origin of the encoders is lost when the homing flag drops
     "leading_zero",  # a 00 before the answer to a ping
-    "status_noise",  # modem status bytes of all kinds
+    "status_noise",  # random modem status bytes
 )
 
 POWER_OFF: Final = "power-off"
-"""The fault of a disconnected mains adapter, which the emulator handles."""
+"""The fault of a disconnected mains adapter, handled by the emulator itself."""
 
 FAULTS = np.dtype(
     [
@@ -74,7 +74,7 @@ def draw(faults: Any) -> float:
 
 
 @kernel
-def is_struck(faults: Any, kind: int) -> bool:
+def fault_occurs(faults: Any, kind: int) -> bool:
     """Return whether this fault occurs now, at random."""
     if faults.due[kind] > 0:
         faults.due[kind] -= 1
@@ -85,11 +85,9 @@ def is_struck(faults: Any, kind: int) -> bool:
 
 
 class Faults:
-    """The faults of one emulated Falcon; may be changed while it runs.
+    """The faults of one emulated Falcon, which may be changed while it runs.
 
-    Attributes
-    ----------
-    CHANCES, SWITCHES : the names of the faults
+    Those in `_CHANCES` occur at random, those in `_SWITCHES` while they are on.
     """
 
     def __init__(self, state: Any, random: Random) -> None:
@@ -100,17 +98,17 @@ class Faults:
     def chance(self, name: str, chance: float) -> None:
         if not 0.0 <= chance <= 1.0:
             raise DeviceError(f"the probability of the fault '{name}' must be from 0 to 1, not {chance}")
-        self._state.chance[_place(name)] = chance
+        self._state.chance[_chance_index(name)] = chance
 
     def once(self, name: str, times: int = 1) -> None:
         """Make the fault occur at the next ``times`` opportunities."""
-        self._state.due[_place(name)] = times
+        self._state.due[_chance_index(name)] = times
 
     def happened(self, name: str) -> int:
-        return int(self._state.happened[_place(name)])
+        return int(self._state.happened[_chance_index(name)])
 
     def on(self, name: str, on: bool = True) -> None:
-        setattr(self._state, _switch(name), int(on))
+        setattr(self._state, _checked_switch(name), int(on))
         if name == "unplugged" and on:
             self._state.was_unplugged = 1
         if name == "kernel_driver_stays" and on:
@@ -120,24 +118,24 @@ class Faults:
         self.on(name, False)
 
     def is_on(self, name: str) -> bool:
-        return bool(self._state[_switch(name)])
+        return bool(self._state[_checked_switch(name)])
 
     def last(self, *, delay_s: float | None = None, stall_s: float | None = None) -> None:
-        """Set the delay of a late reply and the duration of a stall [s]; a stall of 0 s is one packet."""
+        """Set the delay of a late reply and the duration of a stall [s]; a stall of 0 s skips one packet."""
         if delay_s is not None:
             self._state.delay_ns = round(delay_s * 1e9)
         if stall_s is not None:
             self._state.stall_ns = round(stall_s * 1e9)
 
-    def ignore_pings(self, count: int) -> None:
-        """Leave the next ``count`` pings of the boot loader unanswered."""
-        self._state.ignored_pings = count
+    def ignore_pings(self, encoder_count: int) -> None:
+        """Leave the next ``encoder_count`` pings of the boot loader unanswered."""
+        self._state.ignored_pings = encoder_count
 
-    def set_fault(self, word: str) -> None:
+    def set_fault(self, fault: str) -> None:
         """Set a fault in the notation of the command line: ``drop=0.01`` or ``frozen``."""
-        name, equals, value = word.partition("=")
+        name, equals_sign, value = fault.partition("=")
         name = name.strip().replace("-", "_")
-        if name in _SWITCHES and not equals:
+        if name in _SWITCHES and not equals_sign:
             self.on(name)
             return
         try:
@@ -146,7 +144,7 @@ class Faults:
             known = ", ".join(
                 (*(f"{fault_spelling(known)}=CHANCE" for known in _CHANCES), *map(fault_spelling, _SWITCHES), POWER_OFF)
             )
-            raise DeviceError(f"fault '{word}' is not known; choose from: {known}") from None
+            raise DeviceError(f"fault '{fault}' is not known; choose from: {known}") from None
         self.chance(name, chance)
 
 
@@ -155,7 +153,7 @@ def fault_spelling(name: str) -> str:
     return name.replace("_", "-")
 
 
-def _place(name: str) -> int:
+def _chance_index(name: str) -> int:
     if name not in _CHANCES:
         raise DeviceError(
             f"fault '{name}' cannot occur at random; choose one of: {', '.join(map(fault_spelling, _CHANCES))}"
@@ -163,7 +161,7 @@ def _place(name: str) -> int:
     return _CHANCES.index(name)
 
 
-def _switch(name: str) -> str:
+def _checked_switch(name: str) -> str:
     if name not in _SWITCHES:
         raise DeviceError(
             f"fault '{name}' cannot be switched on; choose one of: {', '.join(map(fault_spelling, _SWITCHES))}"
@@ -192,7 +190,7 @@ _PONG = tuple(constants.PONG)
 _PONG_NS: Final = 2_000_000
 _ECHO_NS: Final = 10_000
 _PREFIX: Final = 0x13
-_GLUED_BYTES = (0x00, 0x0D)
+_EXTRA_BYTES = (0x00, 0x0D)
 
 
 @kernel
@@ -206,30 +204,30 @@ def reset(loader: Any) -> None:
 
 
 @kernel
-def load(loader: Any, bridge: Any, faults: Any, value: int, divisor: int, at_ns: int) -> None:
+def receive_boot_byte(loader: Any, bridge: Any, faults: Any, value: int, divisor: int, at_ns: int) -> None:
     """Receive a byte of the boot stream that arrives at ``at_ns`` over the line at this speed."""
     if loader.state == RESET:
         if divisor == constants.BAUD_9600:
-            _hear_ping(loader, bridge, faults, value, at_ns)
+            _receive_ping(loader, bridge, faults, value, at_ns)
     elif loader.state == PINGED:
         if divisor == constants.BAUD_9600:
-            _hear_ping(loader, bridge, faults, value, at_ns)
+            _receive_ping(loader, bridge, faults, value, at_ns)
         elif divisor == constants.BAUD_142857 and value == constants.AUTOBAUD[0]:
-            if is_struck(faults, ECHO_PREFIX):
-                answer(bridge, _PREFIX, at_ns + _ECHO_NS, divisor)
-            answer(bridge, value, at_ns + _ECHO_NS, divisor)
+            if fault_occurs(faults, ECHO_PREFIX):
+                queue_reply(bridge, _PREFIX, at_ns + _ECHO_NS, divisor)
+            queue_reply(bridge, value, at_ns + _ECHO_NS, divisor)
             loader.state = LOADING
     elif loader.state == LOADING:
         if divisor == constants.BAUD_142857:
-            echoed = value ^ 0x10 if is_struck(faults, ECHO) else value
-            answer(bridge, echoed, at_ns + _ECHO_NS, divisor)
+            echoed = value ^ 0x10 if fault_occurs(faults, ECHO) else value
+            queue_reply(bridge, echoed, at_ns + _ECHO_NS, divisor)
             _process_byte(loader, value)
         else:
             loader.state = STUCK
 
 
 @kernel
-def _hear_ping(loader: Any, bridge: Any, faults: Any, value: int, at_ns: int) -> None:
+def _receive_ping(loader: Any, bridge: Any, faults: Any, value: int, at_ns: int) -> None:
     if value == _PING[loader.matched]:
         loader.matched += 1
     else:
@@ -241,12 +239,12 @@ def _hear_ping(loader: Any, bridge: Any, faults: Any, value: int, at_ns: int) ->
         faults.ignored_pings -= 1
         return
     if faults.leading_zero:
-        answer(bridge, 0, at_ns + _PONG_NS, constants.BAUD_9600)
+        queue_reply(bridge, 0, at_ns + _PONG_NS, constants.BAUD_9600)
     for k in range(len(_PONG)):
-        answer(bridge, _PONG[k], at_ns + _PONG_NS, constants.BAUD_9600)
-    if is_struck(faults, GLUED):
-        for k in range(len(_GLUED_BYTES)):
-            answer(bridge, _GLUED_BYTES[k], at_ns + _PONG_NS, constants.BAUD_9600)
+        queue_reply(bridge, _PONG[k], at_ns + _PONG_NS, constants.BAUD_9600)
+    if fault_occurs(faults, GLUED):
+        for k in range(len(_EXTRA_BYTES)):
+            queue_reply(bridge, _EXTRA_BYTES[k], at_ns + _PONG_NS, constants.BAUD_9600)
     loader.state = PINGED
 
 
@@ -293,8 +291,8 @@ RUN = np.dtype(
         ("shown", np.int64, (3,)),  # counts as last sent
         ("before_rad", np.float64, (3,)),  # angles at the packet before
         ("stalled_ns", np.int64),  # time until which nothing is received
-        ("stroke", np.int64),  # of homing, by an emulated hand with no other orders: STROKES[stroke - 1]
-        ("stroke_due", np.int64),  # STROKE_NOW, STROKE_ASKED: when lights or arms ask for it, or 0: not
+        ("stroke", np.int64),  # of the homing motion by a hand without other orders: _STROKES_M[stroke - 1]
+        ("stroke_due", np.int64),  # STROKE_NOW; STROKE_ASKED: if lights or arms require it; 0: not at all
     ],
     align=True,
 )
@@ -303,9 +301,9 @@ _INDEX_RAD: Final = 0.0  # arms are at their index here, further in than any pos
 _ANSWER_NS: Final = 20_000  # from the end of a packet to the start of its reply
 
 _STROKES_M: Final = (0.047, -0.045, 0.047, 0.0)  # along z: out, in, out, and to the middle
-_STROKE_NS: Final = 500_000_000
+_STROKE_DURATION_NS: Final = 500_000_000
 _STEP_NS: Final = 2_000_000  # longest step with the same force
-LONGEST_NS: Final = 50_000_000  # longest motion computed after a time without access
+LONGEST_NS: Final = 50_000_000  # longest motion that is computed after a time without transfers
 _NIBBLES: Final = 4
 
 
@@ -319,16 +317,16 @@ def receive_byte(e: Any, value: int, divisor: int, at_ns: int) -> None:
     run.heard[run.held] = value
     run.held += 1
     while run.held > 0 and run.heard[0] != constants.START:
-        _skip(run)
+        _drop_byte(run)
     if run.held < constants.PACKET:
         return
-    if not _well_formed(run.heard):
-        _skip(run)
+    if not _is_well_formed(run.heard):
+        _drop_byte(run)
         while run.held > 0 and run.heard[0] != constants.START:
-            _skip(run)
+            _drop_byte(run)
         return
     run.held = 0
-    if is_struck(e.faults, STALL):
+    if fault_occurs(e.faults, STALL):
         run.stalled_ns = at_ns + e.faults.stall_ns
         return
     _execute_packet(e, at_ns)
@@ -336,7 +334,7 @@ def receive_byte(e: Any, value: int, divisor: int, at_ns: int) -> None:
 
 
 @kernel
-def _skip(run: Any) -> None:
+def _drop_byte(run: Any) -> None:
     run.refused += 1
     run.held -= 1
     for k in range(run.held):
@@ -344,14 +342,14 @@ def _skip(run: Any) -> None:
 
 
 @kernel
-def _well_formed(heard: Any) -> bool:
-    if heard[constants.PACKET - 1] != constants.STOP:
+def _is_well_formed(packet: Any) -> bool:
+    if packet[constants.PACKET - 1] != constants.STOP:
         return False
-    wrong = 0
+    wrong_bytes = 0
     for k in range(1, constants.PACKET - 2):
-        if not constants.ZERO <= heard[k] < constants.ZERO + 16:
-            wrong += 1
-    return wrong == 0
+        if not constants.ZERO <= packet[k] < constants.ZERO + 16:
+            wrong_bytes += 1
+    return wrong_bytes == 0
 
 
 @kernel
@@ -368,7 +366,7 @@ def _execute_packet(e: Any, at_ns: int) -> None:
         run.homed = 0
         if e.faults.forgets:
             for arm in range(3):
-                run.origin[arm] = count(e.arms, arm)
+                run.origin[arm] = encoder_count(e.arms, arm)
     run.homing = homing
     excessive = 0
     for arm in range(3):
@@ -406,21 +404,21 @@ def _reply(e: Any, at_ns: int) -> None:
     run, faults = e.run, e.faults
     if not faults.frozen:
         for arm in range(3):
-            run.shown[arm] = count(e.arms, arm) - run.origin[arm]
-    if is_struck(faults, DROP):
+            run.shown[arm] = encoder_count(e.arms, arm) - run.origin[arm]
+    if fault_occurs(faults, DROP):
         return
-    length = constants.PACKET - 2 if is_struck(faults, TRUNCATE) else constants.PACKET
-    wrong = int(draw(faults) * length) if is_struck(faults, CORRUPT) else -1
+    length = constants.PACKET - 2 if fault_occurs(faults, TRUNCATE) else constants.PACKET
+    wrong_index = int(draw(faults) * length) if fault_occurs(faults, CORRUPT) else -1
     since_ns = at_ns + _ANSWER_NS
-    if is_struck(faults, DELAY):
+    if fault_occurs(faults, DELAY):
         since_ns += faults.delay_ns
-    times = 2 if is_struck(faults, DUPLICATE) else 1
+    times = 2 if fault_occurs(faults, DUPLICATE) else 1
     for _ in range(times):
         for k in range(length):
             value = _byte_of_reply(e, k)
-            if k == wrong:
+            if k == wrong_index:
                 value ^= 1 + int(draw(faults) * 255)
-            answer(e.bridge, value, since_ns, constants.BAUD_1500000)
+            queue_reply(e.bridge, value, since_ns, constants.BAUD_1500000)
 
 
 @kernel
@@ -439,7 +437,7 @@ def _byte_of_reply(e: Any, k: int) -> int:
 
 @kernel
 def move_until(e: Any, now_ns: int, longest_ns: int) -> None:
-    """Let hand and handle move up to ``now_ns``, but for no longer than ``longest_ns``."""
+    """Move hand and handle until ``now_ns``, but for no longer than ``longest_ns``."""
     elapsed_ns = min(now_ns - e.moved_ns, longest_ns)
     if elapsed_ns <= 0:
         return
@@ -447,16 +445,16 @@ def move_until(e: Any, now_ns: int, longest_ns: int) -> None:
     step_s = elapsed_ns * 1e-9 / steps
     for k in range(steps):
         then_ns = now_ns - elapsed_ns + elapsed_ns * (k + 1) // steps
-        _stroke(e, then_ns)
+        _advance_homing_stroke(e, then_ns)
         move_hand(e.hand, then_ns, step_s)
-        _load(e)
+        _apply_load(e)
         move(e.handle, e.hand.was_m, e.hand.place_m, step_s)
         stop(e.arms, e.handle)
     e.moved_ns = now_ns
 
 
 @kernel
-def _load(e: Any) -> None:
+def _apply_load(e: Any) -> None:
     """Apply the force of the motors and of the load to the handle."""
     if e.run.acting[0] == 0.0 and e.run.acting[1] == 0.0 and e.run.acting[2] == 0.0:
         push(e.handle, 0.0, -e.weight_n, 0.0)
@@ -469,10 +467,10 @@ def _load(e: Any) -> None:
 
 
 @kernel
-def _stroke(e: Any, now_ns: int) -> None:
-    """Pull out, push in, pull out and go to the centre, if homing needs it and no other command is active.
+def _advance_homing_stroke(e: Any, now_ns: int) -> None:
+    """Continue the homing motion of the hand (out, in, out, to the centre) if it is needed and there is no order.
 
-    Repeat it, like a person, whenever an arm is not homed or the blue light requests a pull.
+    Like a person, the hand repeats it whenever an arm is not homed or the blue light requests a pull.
     """
     run, hand = e.run, e.hand
     if hand.serial != hand.taken:
@@ -483,8 +481,8 @@ def _stroke(e: Any, now_ns: int) -> None:
     if hand.moving:
         return
     if run.stroke == 0:
-        asked = run.homed != 0b111 or run.lights & constants.FLAG_BLUE
-        if not run.homing or run.stroke_due == 0 or (run.stroke_due == STROKE_ASKED and not asked):
+        needed = run.homed != 0b111 or run.lights & constants.FLAG_BLUE
+        if not run.homing or run.stroke_due == 0 or (run.stroke_due == STROKE_ASKED and not needed):
             return
     if run.stroke == len(_STROKES_M):
         run.stroke = 0
@@ -495,7 +493,7 @@ def _stroke(e: Any, now_ns: int) -> None:
     hand.order.target_m[0] = 0.0
     hand.order.target_m[1] = 0.0
     hand.order.target_m[2] = _STROKES_M[run.stroke - 1]
-    hand.order.duration_ns = _STROKE_NS
+    hand.order.duration_ns = _STROKE_DURATION_NS
     hand.began_ns = now_ns
     for i in range(3):
         hand.began_m[i] = hand.aim_m[i]

@@ -1,7 +1,8 @@
-"""The driver in front of emulated library functions, whose handle is that of the scripted device.
+"""The Force Dimension driver with emulated library functions, whose handle is that of the scripted device.
 
-The servo's part of the driver is the real one: it calls these functions, compiled with the signatures of the maker's,
-at their addresses. No C compiler is needed. Opening through a loaded library is not part of it.
+The part of the driver that runs in the servo is the real one: it calls these functions at their addresses; they are
+compiled with the signatures of the maker's functions. No C compiler is needed. Opening a device through a loaded
+library is not emulated.
 """
 
 from functools import cache
@@ -22,15 +23,15 @@ from study_app.haptics.model.layout import COMMAND, MEASURED_VELOCITY, READING, 
 NO_FAULT, FAULT_ERROR, FAULT_NAN, FAULT_FORCE_OFF, FAULT_TIMEGUARD = range(5)
 FAULTS = {"error": FAULT_ERROR, "nan": FAULT_NAN, "force-off": FAULT_FORCE_OFF, "time-guard": FAULT_TIMEGUARD}
 _FAULT_AFTER = 1000  # readings
-_VELOCITY_THRESHOLD = 2  # its cause in dhdc.h 3.17.5, line 202
+_VELOCITY_THRESHOLD = 2  # cause of a switched-off force: dhdc.h 3.17.5, line 202
 
 EMULATED = np.dtype(
     [
         ("clock", np.intp),  # address of the time [ns]
         ("force_on", np.int64),
         ("fault", np.int64),
-        ("fault_after", np.int64),  # readings until it appears
-        ("read", np.intp),  # of the simulated device
+        ("fault_after", np.int64),  # number of readings before the fault begins
+        ("read", np.intp),  # functions of the simulated device
         ("write", np.intp),
         ("context", np.intp),
         ("reading", READING),
@@ -50,7 +51,7 @@ _READING, _COMMAND = int(_fields["reading"][1]), int(_fields["command"][1])
 
 
 class _EmulatedFunctions:
-    """The library's functions, emulated for one device, whose handle is that of ``hand``."""
+    """The emulated library functions of one device, whose handle is that of ``hand``."""
 
     def __init__(self, hand: ScriptedDevice) -> None:
         self.memory = records(EMULATED, 1)
@@ -64,15 +65,19 @@ class _EmulatedFunctions:
 
     def prepare(self, force_limit_n: float) -> dict[str, Any]:
         self.state.force_on = 1
-        names, handle = ("wrist", "gripper", "active_wrist", "active_gripper"), self._hand.dynamics
-        known = {"delay_s": handle.delay_s, "count_m": handle.count_m, "mass_kg": handle.mass_kg}
-        return {"sdk": None, "system": "emulated"} | dict.fromkeys(names, False) | known
+        absent, hand_dynamics = ("wrist", "gripper", "active_wrist", "active_gripper"), self._hand.dynamics
+        dynamics = {
+            "delay_s": hand_dynamics.delay_s,
+            "count_m": hand_dynamics.count_m,
+            "mass_kg": hand_dynamics.mass_kg,
+        }
+        return {"sdk": None, "system": "emulated"} | dict.fromkeys(absent, False) | dynamics
 
     def address(self, name: str) -> int:
         return int(_functions()[name].address)
 
     def set_fault(self, fault: str, after: int = 0) -> None:
-        """Simulate a fault after so many readings.
+        """Simulate a fault that begins after ``after`` readings.
 
         Raises
         ------
@@ -95,7 +100,7 @@ class EmulatedForceDimension(ForceDimensionDevice):
     ----------
     random : random numbers for the hand's tremor; None: fixed ones
     tremor_m : amplitude of the tremor's waves [m]
-    given : arguments of a `ForceDimensionDevice`
+    given : further arguments of `ForceDimensionDevice`
     """
 
     name = "force-dimension-emulated"
@@ -107,7 +112,7 @@ class EmulatedForceDimension(ForceDimensionDevice):
         self.hand = ScriptedDevice(random, tremor_m=tremor_m, **limits)
         self.hand.measure_velocity()
         self.emulated = _EmulatedFunctions(self.hand)
-        self.emulated.state.clock = self.context  # FORCE_DIMENSION begins with the time of the tick
+        self.emulated.state.clock = self.context  # the record there begins with the time of the tick
 
     @classmethod
     def of(cls, request: OpenRequest) -> Self:
@@ -151,9 +156,9 @@ def _get_position(x_at: int, y_at: int, z_at: int, device: int) -> int:
     if faulty and state.fault == FAULT_FORCE_OFF:
         state.force_on = 0
     state.reading.measured = 0
-    got = np.int32(_call_read(state.read, state.context, _time_at(state.clock).ns, device + _READING))
-    if got != READ_NEW:
-        return TIMEGUARD if got > READ_NEW else -1
+    status = np.int32(_call_read(state.read, state.context, _time_at(state.clock).ns, device + _READING))
+    if status != READ_NEW:
+        return TIMEGUARD if status > READ_NEW else -1
     position_m = state.reading.position_m
     _number_at(x_at).value = np.nan if faulty and state.fault == FAULT_NAN else position_m[2]
     _number_at(y_at).value = position_m[0]

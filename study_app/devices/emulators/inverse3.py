@@ -1,7 +1,7 @@
-"""The Inverse3's driver in front of an emulated Inverse Service, whose handle a simulated hand holds.
+"""The Inverse3's driver with an emulated Inverse Service, whose handle is held by a simulated hand.
 
-All of the driver is the real one, down to the bytes of the WebSocket; in place of the socket's functions it calls those
-of the emulator. Once it is open, the emulator's time is that of the servo's ticks.
+The driver is the real one, down to the bytes of the WebSocket; it calls functions of the emulator in place of the
+socket's. Once the device is open, the emulator's time is that of the servo's ticks.
 """
 
 from random import Random
@@ -50,7 +50,7 @@ class EmulatedInverse3(Inverse3Device):
     ----------
     random : random numbers for the hand's tremor; None: fixed ones
     service : an existing service; by default a new one
-    given : arguments of an `Inverse3Device`
+    given : further arguments of `Inverse3Device`
     """
 
     name = "inverse3-emulated"

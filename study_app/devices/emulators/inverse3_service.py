@@ -1,13 +1,14 @@
-"""An emulated Inverse Service with one Inverse3, whose handle a simulated hand holds.
+"""An emulated Inverse Service with one Inverse3, whose handle is held by a simulated hand.
 
-Written from docs.haply.co: "WebSocket Protocol" 3.5.x, step 1 (inventory) and core rule; "Simulation Channel" 3.5.x
-(a state update has ``state`` and ``status``, a full state ``config``, too); "HTTP" 3.4.x, Devices (``status``, grips).
-Not shown there, so a guess: that a state update has a ``session_id``, and the values of ``control_mode`` but "idle".
+Written from docs.haply.co: "WebSocket Protocol" 3.5.x, step 1 (inventory) and core rule; "Simulation Channel" 3.5.x (a
+state update has ``state`` and ``status``; a full state also has ``config``); "HTTP" 3.4.x, Devices (``status``, grips).
+Not documented there, and therefore guessed: that a state update has a ``session_id``, and all values of
+``control_mode`` except "idle".
 
-What a session is opened with is read by the standard library's JSON; the commands afterwards are compiled
-(``inverse3_stream``). Documents: "Device Configuration" 3.5.x for what ``configure`` takes, "Simulation Channel" 3.5.x
-for ``session.force_render_full_state``, "Filters" and "Settings Reference" for the force scale, RFC 6455 §4.2 for the
-handshake.
+The messages that open a session are parsed with the standard library's JSON; the later commands are processed by
+compiled code (``inverse3_stream``). Documents: "Device Configuration" 3.5.x for what ``configure`` takes, "Simulation
+Channel" 3.5.x for ``session.force_render_full_state``, "Filters" and "Settings Reference" for the force scale, RFC 6455
+§4.2 for the handshake.
 """
 
 import base64
@@ -29,7 +30,7 @@ from study_app.errors import DeviceError
 from study_app.haptics.model.layout import records
 
 _DEVICE_ID: Final = "EMU1"
-_SLOTS: Final = tuple(f"{name}_{axis}" for name in ("position", "velocity", "force") for axis in "xyz")
+_SLOT_NAMES: Final = tuple(f"{name}_{axis}" for name in ("position", "velocity", "force") for axis in "xyz")
 _SLOT_WIDTH: Final = 14
 _UNIT: Final = {"x": 0, "y": 0, "z": 0}
 _FACTORY_CONFIG: Final[dict[str, Any]] = {
@@ -52,8 +53,8 @@ _STATUS: Final = {"calibrated": True, "in_use": False, "power_supply": True, "re
 _LEGACY_STATE: Final[dict[str, Any]] = {
     "inverse3": {_DEVICE_ID: {"config": {"device_info": {"id": _DEVICE_ID}}, "state": {}, "status": {}}}
 }
-"""Messages of format 3.0: an object by device id ("Haply Inverse Service" 3.0.x, Devices)."""
-_OF_OPENING: Final = (
+"""Message in format 3.0: devices as an object by device id ("Haply Inverse Service" 3.0.x, Devices)."""
+_OPENING_FAULTS: Final = (
     "not-websocket",
     "version-3.0",
     "version-3.1",
@@ -66,15 +67,15 @@ _OF_OPENING: Final = (
     "force-scale",
     "unknown-scale",  # no answer about the force scale
 )
-_OF_TIME: Final = (
+_TIMING_FAULTS: Final = (
     "late",  # each state 30 ms late
-    "slow",  # each state 1.5 ms late: within what the servo is stable with
+    "slow",  # each state 1.5 ms late, with which the servo is still stable
     "torn",  # each state in pieces of 300 bytes
 )
-_OF_STREAM: Final = (
+_STREAM_FAULTS: Final = (
     "silent",  # no more states
     "closes",  # a close frame (RFC 6455 §5.5.1, status 1001), and the end
-    "drops",  # the end of the stream without one
+    "drops",  # the end of the stream without a close frame
     "nan",  # a position NaN, which JSON does not have
     "null",  # a position null
     "infinite",  # a position 1e999
@@ -86,13 +87,17 @@ _OF_STREAM: Final = (
     "binary",  # a binary frame
     "masked",  # a masked frame
     "fragment",  # a message in two frames
-    "too-long",  # a frame that says it is 2^63 - 1 bytes long, the most that RFC 6455 permits
+    "too-long",  # a frame with a stated length of 2^63 - 1 bytes, the most that RFC 6455 permits
 )
-FAULTS: Final = (*_OF_OPENING, *_OF_TIME, *_OF_STREAM)
-_STATUS_OF: Final = {"off": {"power_supply": False}, "uncalibrated": {"calibrated": False}, "in-use": {"in_use": True}}
+FAULTS: Final = (*_OPENING_FAULTS, *_TIMING_FAULTS, *_STREAM_FAULTS)
+_FAULT_STATUS: Final = {
+    "off": {"power_supply": False},
+    "uncalibrated": {"calibrated": False},
+    "in-use": {"in_use": True},
+}
 
 
-def config() -> dict[str, Any]:
+def new_config() -> dict[str, Any]:
     """Return a new configuration with factory values."""
     return copy.deepcopy(_FACTORY_CONFIG)
 
@@ -100,12 +105,12 @@ def config() -> dict[str, Any]:
 def _state_message(
     status: dict[str, Any], buttons: int, full: dict[str, Any] | None = None, session_id: int = 7
 ) -> dict[str, Any]:
-    """Return a state whose numbers are the words of `_SLOTS`.
+    """Return a state message with the names in `_SLOT_NAMES` in place of its numbers.
 
     Parameters
     ----------
     buttons : pressed buttons of the wireless grip; a is bit 0
-    full : its configuration, for an inventory or a full state
+    full : the configuration, for an inventory or a full state
     """
 
     def vector(name: str) -> dict[str, str]:
@@ -136,19 +141,19 @@ def _state_message(
             "wireless_verse_grip": [grip]}  # fmt: skip
 
 
-def template(message: dict[str, Any]) -> tuple[bytes, list[int]]:
-    """Return a message as text with space for its numbers, and the offset of each of `_SLOTS`; -1 if missing."""
+def message_template(message: dict[str, Any]) -> tuple[bytes, list[int]]:
+    """Return a message as text with space for its numbers, and the offset of each number; -1 if it is missing."""
     text = json.dumps(message)
-    for slot in _SLOTS:
+    for slot in _SLOT_NAMES:
         text = text.replace(f'"{slot}"', "#" + slot.ljust(_SLOT_WIDTH - 1))
-    places = [text.find(f"#{slot}") for slot in _SLOTS]
-    for slot in _SLOTS:
+    offsets = [text.find(f"#{slot}") for slot in _SLOT_NAMES]
+    for slot in _SLOT_NAMES:
         text = text.replace("#" + slot.ljust(_SLOT_WIDTH - 1), "0.0".ljust(_SLOT_WIDTH))
-    return text.encode(), places
+    return text.encode(), offsets
 
 
 def faulty_bytes(fault: str, message: dict[str, Any]) -> bytes:
-    """Return the bytes sent instead of a state for a fault of `_OF_STREAM`."""
+    """Return the bytes sent instead of a state for a fault of `_STREAM_FAULTS`."""
     device = message["inverse3"][0]
     if fault == "no-position":
         del device["state"]["cursor_position"]
@@ -160,8 +165,8 @@ def faulty_bytes(fault: str, message: dict[str, Any]) -> bytes:
         device["status"] = device["status"] | {"calibrated": False}
     text = json.dumps(message)
     number = {"nan": "NaN", "null": "null", "infinite": "1e999"}.get(fault, "0.01")
-    text = text.replace(f'"{_SLOTS[0]}"', number)
-    for slot in _SLOTS:
+    text = text.replace(f'"{_SLOT_NAMES[0]}"', number)
+    for slot in _SLOT_NAMES:
         text = text.replace(f'"{slot}"', "0.0")
     if fault == "bad-json":
         text = text[:-2]
@@ -209,7 +214,7 @@ class Service(HandOrders):
         self.state.handle = new_scripted_handle(quantum_m)
         self.state.handle.stop_m = _STOPS_M
         self._tremble(random, tremor_m)
-        self.config = config()
+        self.config = new_config()
         self.status = dict(_STATUS)
         self.force_scale: Any = {"value": 1.0}
         self.version = "3.5"
@@ -218,7 +223,7 @@ class Service(HandOrders):
         self.state.id[: quoted.size] = quoted
         self.state.id_size = quoted.size
         self._upgraded = False
-        self._asked = b""
+        self._handshake = b""
         self._fault: tuple[str, int] | None = None
         self.hold(0.0, 0.0, 0.0)
 
@@ -228,7 +233,7 @@ class Service(HandOrders):
         return int(self.memory.ctypes.data)
 
     def compile(self) -> None:
-        """Compile all functions that answer a client, or load them from the cache: a client waits only for seconds."""
+        """Compile all functions that answer a client, or load them from the cache, since a client waits only seconds."""
         self.connected()
         self._answer_message(
             {"inverse3": [{"device_id": _DEVICE_ID, "commands": {"set_cursor_force": {"vector": _ZERO}}}]}
@@ -244,10 +249,10 @@ class Service(HandOrders):
     def press(self, buttons: int) -> None:
         """Hold down exactly these buttons of the grip: button 1 (a) is bit 0."""
         super().press(buttons)
-        self._refresh()
+        self._update_text()
 
     def set_fault(self, fault: str, after: int = 0) -> None:
-        """Simulate a fault: at once if it concerns opening, else after so many commands.
+        """Simulate a fault: at once if it concerns opening or timing, else after ``after`` commands.
 
         Raises
         ------
@@ -258,9 +263,9 @@ class Service(HandOrders):
             raise DeviceError(f"fault '{fault}' is not known; choose from: {', '.join(FAULTS)}")
         versions = {"version-3.0": "3.0", "version-3.1": "3.1", "not-websocket": "http", "no-device": "empty"}
         self.version = versions.get(fault, self.version)
-        if fault in _STATUS_OF:
-            self.status |= _STATUS_OF[fault]
-            self._refresh()
+        if fault in _FAULT_STATUS:
+            self.status |= _FAULT_STATUS[fault]
+            self._update_text()
         elif fault == "gravity-off":
             self.config["gravity_compensation"]["enabled"] = False
         elif fault == "disobeys":
@@ -269,14 +274,14 @@ class Service(HandOrders):
             self.force_scale = {"value": 2.0} if fault == "force-scale" else None
         elif fault == "torn":
             self.state.portion = 300
-        elif fault in _OF_TIME:
+        elif fault in _TIMING_FAULTS:
             self.state.lag_ns = 30_000_000 if fault == "late" else 1_500_000
-        elif fault in _OF_STREAM:
+        elif fault in _STREAM_FAULTS:
             self._fault = (fault, after)
             if self._upgraded:
-                self._arm()
+                self._schedule_fault()
 
-    def _arm(self) -> None:
+    def _schedule_fault(self) -> None:
         if self._fault is None:
             return
         (fault, after), state = self._fault, self.state
@@ -291,50 +296,52 @@ class Service(HandOrders):
         state = self.state
         for name in ("in_size", "written", "visible", "read", "queue_first", "queue_next", "complex_size", "ended"):
             setattr(state, name, 0)
-        self._upgraded, self._asked = False, b""
-        self._refresh()
+        self._upgraded, self._handshake = False, b""
+        self._update_text()
 
     def take_bytes(self, data: bytes) -> None:
-        """Receive bytes from the client."""
+        """Process bytes from the client."""
         state = self.state
         if not self._upgraded:
-            self._asked += data
-            if b"\r\n\r\n" in self._asked:
-                self._answer_handshake(self._asked)
+            self._handshake += data
+            if b"\r\n\r\n" in self._handshake:
+                self._answer_handshake(self._handshake)
             return
-        came = np.frombuffer(data, np.uint8)
-        state.inbox[state.in_size : state.in_size + came.size] = came
-        state.in_size += came.size
-        self.work()
+        received = np.frombuffer(data, np.uint8)
+        state.inbox[state.in_size : state.in_size + received.size] = received
+        state.in_size += received.size
+        self.process_inbox()
 
     def give_bytes(self) -> bytes:
         """Return all bytes that are due for the client."""
         state = self.state
         if state.clock == 0 and state.visible == state.read and state.queue_first < state.queue_next:
-            state.now_ns = max(state.now_ns, state.queue_ns[state.queue_first % state.queue_ns.size])  # reading waits
-        inverse3_stream.let_pass(state)
-        places = np.arange(state.read, state.visible) % state.outbox.size
+            state.now_ns = max(
+                state.now_ns, state.queue_ns[state.queue_first % state.queue_ns.size]
+            )  # reading waits until then
+        inverse3_stream.release_due_frames(state)
+        indices = np.arange(state.read, state.visible) % state.outbox.size
         state.read = state.visible
-        return bytes(state.outbox[places].tobytes())
+        return bytes(state.outbox[indices].tobytes())
 
     def disconnected(self) -> None:
-        """Handle the end of the stream: the session is over and the device idle."""
+        """Handle the end of the stream: the session ends and the device becomes idle."""
         inverse3_stream.remove_force(self.state)
         self.state.ended = 1
 
-    def work(self) -> None:
+    def process_inbox(self) -> None:
         inverse3_stream.take_frames(self.state)
         while self.state.complex_size:
             state = self.state
             text = state.inbox[state.complex_at : state.complex_at + state.complex_size].tobytes()
             self._answer_message(json.loads(text))
-            inverse3_stream.drop(state, int(state.complex_end))
+            inverse3_stream.drop_frame(state, int(state.complex_end))
             state.complex_size = 0
             inverse3_stream.take_frames(state)
 
-    def _answer_handshake(self, asked: bytes) -> None:
+    def _answer_handshake(self, request: bytes) -> None:
         """Answer RFC 6455's opening handshake (§4.2.2), then send the inventory."""
-        lines = asked.decode("latin-1").split("\r\n")
+        lines = request.decode("latin-1").split("\r\n")
         fields = {name.strip().lower(): value.strip() for name, _, value in (line.partition(":") for line in lines[1:])}
         if self.version == "http" or fields.get("upgrade", "").lower() != "websocket":
             self._send_raw(b"HTTP/1.1 404 Not Found\r\nContent-Length: 0\r\n\r\n")
@@ -350,7 +357,7 @@ class Service(HandOrders):
         self._send(self.inventory())
 
     def inventory(self) -> dict[str, Any]:
-        """Return the first message of a session, with the words of ``_SLOTS`` for its numbers."""
+        """Return the first message of a session, with the names in `_SLOT_NAMES` in place of its numbers."""
         if self.version == "3.0":
             return _LEGACY_STATE
         message = self._message(full=True)
@@ -373,13 +380,13 @@ class Service(HandOrders):
             if entry.get("device_id") == _DEVICE_ID:
                 if self.obeys:
                     self._configure(entry.get("configure", {}), session.get("configure", {}))
-                inverse3_stream.go_on(self.state)
+                inverse3_stream.advance_handle(self.state)
                 force = entry.get("commands", {}).get("set_cursor_force", {}).get("vector")
                 if force is not None:
-                    inverse3_stream.act(self.state, float(force["x"]), float(force["y"]), float(force["z"]))
+                    inverse3_stream.apply_force(self.state, float(force["x"]), float(force["y"]), float(force["z"]))
         self._send(self._message(full="force_render_full_state" in session))
         if "configure" in session:
-            self._arm()
+            self._schedule_fault()
 
     def _configure(self, device: dict[str, Any], session: dict[str, Any]) -> None:
         """Apply the settings that "Device Configuration" lists for WebSocket ``configure``."""
@@ -394,18 +401,18 @@ class Service(HandOrders):
             self.config["basis"] = session["basis"]
 
     def _send(self, message: dict[str, Any]) -> None:
-        text, slots = template(message)
-        data, places = np.frombuffer(text, np.uint8).copy(), np.array(slots, np.int64)
-        inverse3_stream.fill(self.state, data, places)
+        text, slots = message_template(message)
+        data, offsets = np.frombuffer(text, np.uint8).copy(), np.array(slots, np.int64)
+        inverse3_stream.fill_numbers(self.state, data, offsets)
         inverse3_stream.put_frame(self.state, 1, data, data.size, 0)
-        inverse3_stream.let_pass(self.state)
+        inverse3_stream.release_due_frames(self.state)
 
     def _send_raw(self, data: bytes) -> None:
         inverse3_stream.put_bytes(self.state, np.frombuffer(data, np.uint8), len(data))
-        inverse3_stream.let_pass(self.state)
+        inverse3_stream.release_due_frames(self.state)
 
-    def _refresh(self) -> None:
-        text, slots = template(self._message())
+    def _update_text(self) -> None:
+        text, slots = message_template(self._message())
         data = np.frombuffer(text, np.uint8)
         self.state.text[: data.size] = data
         self.state.slots[:] = slots

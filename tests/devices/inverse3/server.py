@@ -17,7 +17,7 @@ import numpy as np
 from numba import types
 
 from study_app.devices.emulators.inverse3_service import Service
-from study_app.devices.emulators.inverse3_stream import INBOX, OUTBOX, SERVICE, let_pass, take_frames
+from study_app.devices.emulators.inverse3_stream import INBOX, OUTBOX, SERVICE, release_due_frames, take_frames
 from study_app.haptics.kernels.c_functions import NOW, call_at
 from study_app.haptics.kernels.compiled import kernel
 from study_app.haptics.runtime.clocks import SystemClock, raise_priority
@@ -142,7 +142,7 @@ def serve(memory: Any, file: int, send: int, receive: int, clock: Any, time: Any
         while service.read < service.written:
             time[0] = _NOW(clock[0], clock[1])
             service.now_ns = time[0]
-            let_pass(service)
+            release_due_frames(service)
             begin = service.read % OUTBOX
             size = min(service.visible - service.read, OUTBOX - begin)
             if size == 0:
