@@ -1,8 +1,7 @@
-"""How devices may be named, and the name of the default device.
+"""Device descriptors: what the program knows about a device outside its driver.
 
-The descriptor of a device, as a value.
-
-Loads neither compiler nor driver; only `DeviceDescriptor.open`, ``probe`` and ``doctor`` do.
+Importing this module loads neither the compiler nor a driver; only `DeviceDescriptor.open`, ``probe`` and ``doctor``
+do.
 """
 
 from __future__ import annotations
@@ -41,8 +40,9 @@ _Opened = TypeVar("_Opened", bound="Device")
 class Backend:
     """One connection to a device, as found by its probe.
 
-    ``name`` is for ``--device``, ``by`` the library, ``state`` one of the words above or "connected: ...". ``can``
-    describes its capabilities, ``why`` why it cannot be used now ("" if it can).
+    ``name`` is the value for ``--device``, ``by`` the library that finds the device, and ``state`` one of the texts
+    above or "connected: ...". ``can`` describes its capabilities; ``why`` tells why it cannot be used now ("" if it
+    can).
     """
 
     name: str
@@ -97,15 +97,15 @@ class OpenRequest:
 
     @property
     def limits(self) -> dict[str, Any]:
-        given = {"workspace_m": self.workspace_m, "force_limit_n": self.force_limit_n}
-        return {name: value for name, value in given.items() if value is not None}
+        limits = {"workspace_m": self.workspace_m, "force_limit_n": self.force_limit_n}
+        return {name: value for name, value in limits.items() if value is not None}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Doctor:
     """Examines a device.
 
-    ``findings()`` returns the list of tests before any was run. ``examine(name, options=, faults=, progress=)`` returns
+    ``findings()`` returns all tests as not yet run. ``examine(name, options=, faults=, progress=)`` returns
     a `Report`; ``faults`` are those of an emulated device.
     """
 
@@ -159,10 +159,10 @@ class DeviceDescriptor:
             raise DeviceError(
                 f"the device name {self.name!r} is not permitted: use lowercase letters, digits and hyphens"
             )
-        for called, value, permitted in (("icon", self.icon, get_args(Icon)), ("kind", self.kind, get_args(Kind))):
-            if value not in permitted:
+        for field_name, value, choices in (("icon", self.icon, get_args(Icon)), ("kind", self.kind, get_args(Kind))):
+            if value not in choices:
                 raise DeviceError(
-                    f"device '{self.name}': unknown {called} {value!r}; choose one of {', '.join(permitted)}"
+                    f"device '{self.name}': unknown {field_name} {value!r}; choose one of {', '.join(choices)}"
                 )
 
     @property

@@ -48,7 +48,7 @@ def _felt_and_emulated(
     emulated_options: tuple[DeviceOption, ...] = (),
 ) -> tuple[DeviceDescriptor, DeviceDescriptor]:
     """Return the descriptors of a device with force and of its emulation, whose capabilities ``can`` describes."""
-    package, twin = "study_app.devices.", f"{name}-emulated"
+    package, emulated_name = "study_app.devices.", f"{name}-emulated"
     failures = package + failures
     return (
         framed(
@@ -64,13 +64,13 @@ def _felt_and_emulated(
             options=options,
         ),
         framed(
-            twin,
+            emulated_name,
             f"Emulated {title.removeprefix('Haply ').removeprefix('Novint ')}",
             package + emulated,
             failures,
             icon="fast_forward",
             kind="simulated",
-            probe=lambda: [Backend(twin, "the program", state=READY, can=can)],
+            probe=lambda: [Backend(emulated_name, "the program", state=READY, can=can)],
             moves_by_itself=True,
             stop_button=stop_button,
             options=emulated_options,

@@ -41,7 +41,10 @@ class Finding:
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """Observations (``seen``) as text; all ``findings`` in order; the driver's ``failure``, or None."""
+    """The result of a diagnosis.
+
+    ``seen`` are observations as text, ``findings`` all failure modes in order, ``failure`` the driver's error or None.
+    """
 
     seen: tuple[str, ...]
     findings: tuple[Finding, ...]
@@ -84,7 +87,7 @@ def report_lines(report: Report) -> list[str]:
             lines.append(_indent_text(f"cure: {finding.cure}", 19))
             lines.append(_indent_text(f"known by: {finding.known_by}", 19))
             if finding.paste:
-                lines += ["", finding.paste, ""]  # in one line, to be copied
+                lines += ["", finding.paste, ""]  # on one line, to be copied
     lines.append("")
     if report.failure is not None:
         lines.append(_indent_text(report.failure, 0))
@@ -92,9 +95,9 @@ def report_lines(report: Report) -> list[str]:
     return lines
 
 
-def _indent_text(text: str, by: int) -> str:
-    space = " " * by
-    return fill(text, WIDTH, initial_indent=space, subsequent_indent=space, break_long_words=False)
+def _indent_text(text: str, indent: int) -> str:
+    prefix = " " * indent
+    return fill(text, WIDTH, initial_indent=prefix, subsequent_indent=prefix, break_long_words=False)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -134,18 +137,18 @@ class FailureTable:
     not_found: frozenset[str]
 
     def mode(self, mode: str) -> FailureMode:
-        return next(known for known in self.modes if known.id == mode)
+        return next(entry for entry in self.modes if entry.id == mode)
 
     def before(self, mode: str) -> set[str]:
         """Return the ids of the modes that are tested before this one."""
-        ids = [known.id for known in self.modes]
+        ids = [entry.id for entry in self.modes]
         return set(ids[: ids.index(mode)])
 
     def sentence(self, mode: str, seen: str = "") -> str:
         """Return symptom, observation (``seen``), cause and remedy of a mode in one line."""
-        known = self.mode(mode)
+        failure_mode = self.mode(mode)
         detail = f" ({seen})" if seen else ""
-        return f"{known.symptom}{detail}: {known.cause}; {known.cure}"
+        return f"{failure_mode.symptom}{detail}: {failure_mode.cause}; {failure_mode.cure}"
 
     def failure(self, mode: str, seen: str = "") -> DeviceFailure:
         kind = _DeviceFailureNotFound if mode in self.not_found else DeviceFailure
@@ -174,15 +177,18 @@ class FailureTable:
 def read_failures(file: Path, platform: str = sys.platform, **phrases: object) -> FailureTable:
     """Return the table in a TOML file.
 
-    ``[[mode]]`` has the fields of a `FailureMode`, and ``only``, the systems on which it occurs. A text that differs
-    between systems is a table by system, with ``other``; names in braces are ``phrases`` or entries of ``[words]``.
+    Each ``[[mode]]`` has the fields of a `FailureMode` and optionally ``only``, the systems on which it occurs. A text
+    that differs between systems is a table with a key per system and ``other`` for the rest. Names in braces in a text
+    are replaced by ``phrases`` or by entries of ``[words]``.
     """
 
-    def here(text: str | dict[str, str]) -> str:
+    def for_platform(text: str | dict[str, str]) -> str:
         return text if isinstance(text, str) else text.get(platform, text.get("other", ""))
 
     document = tomllib.loads(file.read_text("utf-8"))
-    phrases |= {name: here(text) for name, text in document.get("words", {}).items()}
+    phrases |= {name: for_platform(text) for name, text in document.get("words", {}).items()}
     modes = [mode for mode in document["mode"] if platform in mode.pop("only", [platform])]
-    filled = [FailureMode(**{name: here(text).format_map(phrases) for name, text in mode.items()}) for mode in modes]
+    filled = [
+        FailureMode(**{name: for_platform(text).format_map(phrases) for name, text in mode.items()}) for mode in modes
+    ]
     return FailureTable(document["device"], tuple(filled), frozenset(document["not_found"]))

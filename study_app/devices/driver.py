@@ -1,8 +1,8 @@
-"""The common part of the drivers whose tick is compiled: opening, gate, guard, failures, receipt, diagnosis, closing.
+"""The common part of drivers with a compiled tick: opening, closing, guard, failures, receipt and diagnosis.
 
-A driver has a record that begins with the fields of `COMMON`, and two C functions, which the servo calls. A call uses
-the connection between `enter` and `leave` only. `release` rejects further calls and waits for a running one; a call
-that outlasts it ends the force before it returns.
+Such a driver has a record that begins with the fields of `COMMON`, and two C functions, which the servo calls. A call
+uses the connection only between `enter` and `leave`. `release` rejects further calls and waits for a running one; a
+call that outlasts it ends the force before it returns.
 """
 
 import json
@@ -29,9 +29,9 @@ from study_app.haptics.runtime.servo import Servo
 from study_app.user_folder import settings_file
 
 RUNS, RELEASED, FINISHED = range(3)
-"""Values of ``ended``: open; closed by the program or not open; closed and ended by a call that ran longer."""
+"""Values of ``ended``: open; closed by the program; not open, or closed during a call that then ended the force."""
 FIRST_CAUSE: Final = 3
-"""First value of a driver's own causes for ending the exchange."""
+"""First value of ``ended`` that a driver may use for its own causes."""
 LEAVE_S: Final = 0.5  # a read or a write takes a few milliseconds at most
 _SILENT_NS: Final = 40_000_000  # after 50 ms without a new position the servo ends the force
 SECONDS: Final = 3.0
@@ -43,7 +43,7 @@ COMMON: Final[list[tuple[Any, ...]]] = [
     ("now_ns", np.int64),  # time of the tick; stays first: an emulator reads it here
     ("ended", np.int64),  # RUNS, or the reason why calls are rejected
     ("inside", np.int64),  # 1 while a read or write runs, which may use the connection
-    ("unguarded", np.int64),  # 1: the guard has died: no force may be sent
+    ("unguarded", np.int64),  # 1: the guard has died, so no force may be sent
     ("sent_n", np.float64, (3,)),  # the force that acts since the last command [N, hand frame]
     ("force_limit_n", np.float64),
     ("fresh_ns", np.int64),  # time of the last tick with a new position
@@ -182,16 +182,16 @@ class FramedDevice(Device):
             return
         connection, self.connection = self.connection, None
         guard, self.guard = self.guard, None
-        then: AtClose = "release"
+        guard_action: AtClose = "release"
         try:
-            then = self._finish(connection)
+            guard_action = self._finish(connection)
         finally:  # an interrupt prevents neither closing nor the guard
             try:
                 connection.close()
             finally:
                 if guard is not None:
-                    self._left_guard = guard if then == "leave" else None
-                    getattr(guard, then)()
+                    self._left_guard = guard if guard_action == "leave" else None
+                    getattr(guard, guard_action)()
 
     def _start_guard(self, *arguments: str, needed: bool = True) -> None:
         """Start the guard, if ``needed``, with its function's arguments, and end a guard that was left running."""
@@ -317,17 +317,17 @@ def examine(
     table = device.failures
     try:
         device.open()
-    except DeviceFailure as failed:
-        return Report((), table.findings({failed.mode}, table.before(failed.mode)), str(failed))
+    except DeviceFailure as error:
+        return Report((), table.findings({error.mode}, table.before(error.mode)), str(error))
     with device:
         progress(_MOVE)
         samples, fault_found = _run_at_rest(device, seconds)
         modes, fresh_hz = device.appeared(samples), _fresh_rate_hz(samples)
-        seen = (*device.observed(), f"new positions per second: {fresh_hz:.0f}")
+        observations = (*device.observed(), f"new positions per second: {fresh_hz:.0f}")
     if not modes and fresh_hz < _LEAST_HZ:
         modes = {"rate"}
     passed = {mode.id for mode in table.modes} if fault_found is None else table.before(device.running)
-    return Report(seen, table.findings(modes, passed), fault_found)
+    return Report(observations, table.findings(modes, passed), fault_found)
 
 
 def _run_at_rest(device: Device, seconds: float) -> tuple[Any, str | None]:
@@ -336,22 +336,22 @@ def _run_at_rest(device: Device, seconds: float) -> tuple[Any, str | None]:
     Return the samples (n,) and the reason why the servo stopped itself, or None.
     """
     hand = hand_of(device)
-    kept: list[Any] = []
+    chunks: list[Any] = []
     with Servo(device, clock=None if hand is None else VirtualClock()) as servo:
         reader = servo.telemetry.reader()
         for _ in range(max(round(seconds / _CHUNK_S), 1)):
             if hand is None:
                 time.sleep(_CHUNK_S)
             else:
-                hand.reach_to(0.01 * (-1) ** len(kept), 0.005, 0.0)
+                hand.reach_to(0.01 * (-1) ** len(chunks), 0.005, 0.0)
                 servo.advance(round(_CHUNK_S * servo.rate_hz))
-            kept.append(np.asarray(reader.read()).copy())
+            chunks.append(np.asarray(reader.read()).copy())
         fault = None
         try:
             servo.check()
-        except (DeviceLost, ServoFault) as failed:
-            fault = str(failed)
-    return np.concatenate(kept), fault
+        except (DeviceLost, ServoFault) as error:
+            fault = str(error)
+    return np.concatenate(chunks), fault
 
 
 def _fresh_rate_hz(samples: Any) -> float:

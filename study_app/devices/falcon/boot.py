@@ -1,12 +1,12 @@
-"""The Falcon's firmware file, checked before a byte of it is sent, and the boot after power-up.
+"""The check of the Falcon's firmware file, and the boot after power-up.
 
-None comes with this software: the owner of a Falcon has it. The stream is little-endian words: the key 0x08AA, eight
-zeros, the entry point, then blocks of (count, destination, words) and a count of 0; addresses are two words, the high
-one first (TI SPRUI33, boot data stream of 8 bits).
+The firmware is not part of this software; the owner of a Falcon has it. Its file is checked before any of it is sent.
+It consists of little-endian words: the key 0x08AA, eight zeros, the entry point, then blocks of (count, destination,
+words) and a count of 0. Addresses are two words, the high one first (TI SPRUI33, boot data stream of 8 bits).
 
-Boot is ping, speed, upload with its echo, first reply. Each step reads its answer as a stream, independent of the
-bridge's packets. A step that fails ends the attempt; the next one begins with reopening the bridge, which succeeds
-according to owners of a Falcon.
+The steps of the boot are a ping, setting the speed, the upload with its echo, and a first reply. Each step reads its
+answer as a stream, independent of the bridge's packets. A step that fails ends the attempt. The next attempt begins by
+reopening the bridge, which helps according to owners of a Falcon.
 """
 
 import hashlib
@@ -54,7 +54,7 @@ class Block:
 class Firmware:
     """The content of a firmware file: size [bytes], hash, entry point and blocks.
 
-    ``name`` is that of a file known to work, None for others.
+    ``name`` is the name of a known file, None for others.
     """
 
     size: int
@@ -71,7 +71,7 @@ def check_firmware(data: bytes) -> Firmware:
     high, low = struct.unpack_from("<HH", data, _HEADER_BYTES - 4)
     digest = hashlib.sha256(data).hexdigest()
     name = KNOWN.get((digest[:16], digest[-8:]))
-    return Firmware(len(data), digest, high << 16 | low, _blocks(data), name)
+    return Firmware(len(data), digest, high << 16 | low, _parse_blocks(data), name)
 
 
 def _refuse_other_files(data: bytes) -> None:
@@ -98,31 +98,31 @@ def _refuse_wrong_header(data: bytes) -> None:
         raise _refusal("its header has non-zero values in fields that must be zero")
 
 
-def _blocks(data: bytes) -> tuple[Block, ...]:
+def _parse_blocks(data: bytes) -> tuple[Block, ...]:
     blocks: list[Block] = []
-    at = _HEADER_BYTES
+    offset = _HEADER_BYTES
     while True:
         number = len(blocks) + 1
-        if len(data) < at + 2:
+        if len(data) < offset + 2:
             raise _refusal(
                 f"it is truncated: it ends at byte {len(data)}, after {len(blocks)} blocks, without an end marker"
             )
-        (word_count,) = struct.unpack_from("<H", data, at)
+        (word_count,) = struct.unpack_from("<H", data, offset)
         if word_count == 0:
             break
-        end = at + _BLOCK_HEAD.size + 2 * word_count
+        end = offset + _BLOCK_HEAD.size + 2 * word_count
         if len(data) < end:
             raise _refusal(
                 f"it is truncated in block {number}: it has {len(data)} bytes, but that block ends at byte {end}"
             )
-        _, high, low = _BLOCK_HEAD.unpack_from(data, at)
+        _, high, low = _BLOCK_HEAD.unpack_from(data, offset)
         blocks.append(Block(high << 16 | low, word_count))
-        at = end
+        offset = end
     if not blocks:
         raise _refusal("it does not contain any blocks to load")
-    extra = len(data) - at - 2
+    extra = len(data) - offset - 2
     if extra:
-        raise _refusal(f"{extra} bytes follow the end marker at byte {at}")
+        raise _refusal(f"{extra} bytes follow the end marker at byte {offset}")
     return tuple(blocks)
 
 
@@ -130,9 +130,9 @@ def _refusal(reason: str) -> DeviceFailure:
     return FAILURES.failure("not-firmware", reason)
 
 
-_ATTEMPTS: Final = 10
+_MAX_ATTEMPTS: Final = 10
 PINGS: Final = 20
-_PROBES: Final = 10
+_RUNNING_PROBES: Final = 10
 _ROUND_TRIPS: Final = 50
 
 _PING_S: Final = 0.25
@@ -155,8 +155,8 @@ class BootFailure(DeviceFailure):
         super().__init__("upload", str(FAILURES.failure("upload", f"in {attempts}: {reason}{check_file}")))
 
 
-class _Ended(Exception):
-    """A step of an attempt was not completed."""
+class _StepFailed(Exception):
+    """A step of a boot attempt failed."""
 
     def __init__(self, step: str, reason: str) -> None:
         self.step, self.reason = step, reason
@@ -166,8 +166,8 @@ class _Ended(Exception):
 class _Line:
     """The bytes received over a bridge, without its status bytes, and the packets in them.
 
-    It reads one USB packet at a time: a longer read does not end with a full packet, such as the echo of a chunk, but
-    waits for the bridge's timer.
+    It reads one USB packet at a time, since a longer read would not end after a full packet, such as the echo of a
+    chunk, but wait for the bridge's timer.
     """
 
     def __init__(self, transport: Transport) -> None:
@@ -175,14 +175,14 @@ class _Line:
         self._memory = np.zeros(constants.USB_PACKET, np.uint8)
         self._parser, self._status = records(PARSER, 1), records(STATUS, 1)
 
-    def until(self, complete: Callable[[bytes], bool], timeout_s: float, came: bytes = b"") -> bytes:
-        """Return ``came`` and the bytes received after it, until they are complete or the time-out is reached."""
+    def read_until(self, complete: Callable[[bytes], bool], timeout_s: float, received: bytes = b"") -> bytes:
+        """Return ``received`` and the bytes received after it, until they are complete or the time-out is reached."""
         ends_s = self._transport.now_s() + timeout_s
-        while not complete(came) and (left_s := ends_s - self._transport.now_s()) > 0.0:
-            came += self._memory[: self._read(left_s)].tobytes()
-        return came
+        while not complete(received) and (left_s := ends_s - self._transport.now_s()) > 0.0:
+            received += self._memory[: self._read(left_s)].tobytes()
+        return received
 
-    def answers(self, timeout_s: float) -> bool:
+    def gets_reply(self, timeout_s: float) -> bool:
         """Send a quiet packet; return whether a reply arrives in time."""
         try:
             self._transport.write(constants.quiet_packet(constants.FLAG_HOMING), timeout_s)
@@ -217,8 +217,8 @@ def set_event_character(transport: Transport, on: bool) -> None:
 
 def is_running(transport: Transport) -> bool:
     """Return whether the Falcon runs its firmware, that is, answers a quiet packet. The bridge must be configured."""
-    for _ in range(_PROBES):
-        if _Line(transport).answers(PROBE_S):
+    for _ in range(_RUNNING_PROBES):
+        if _Line(transport).gets_reply(PROBE_S):
             return True
         _purge(transport)
     return False
@@ -234,27 +234,31 @@ def choose_event_character(transport: Transport) -> tuple[float, dict[str, Any]]
 
     Return the shorter round trip [s] and the fields for the receipt.
     """
-    taken_s = {}
+    trip_s = {}
     for on in (False, True):
         set_event_character(transport, on)
-        taken_s[on] = measure_round_trip(transport)
-    better = taken_s[True] < taken_s[False]
-    if not better:
+        trip_s[on] = measure_round_trip(transport)
+    is_shorter = trip_s[True] < trip_s[False]
+    if not is_shorter:
         set_event_character(transport, on=False)
-    trips = {"with": round(1000 * taken_s[True], 3), "without": round(1000 * taken_s[False], 3)}
-    return min(taken_s.values()), {"event_character": better, "round_trip_ms": trips}
+    trips = {"with": round(1000 * trip_s[True], 3), "without": round(1000 * trip_s[False], 3)}
+    return min(trip_s.values()), {"event_character": is_shorter, "round_trip_ms": trips}
 
 
 def _round_trip_s(transport: Transport) -> float:
     began_s = transport.now_s()
-    if _Line(transport).answers(PROBE_S):
+    if _Line(transport).gets_reply(PROBE_S):
         return transport.now_s() - began_s
-    _purge(transport)  # a late reply must not count as that of the next packet
+    _purge(transport)  # a late reply must not count as the reply to the next packet
     return PROBE_S
 
 
 def boot_falcon(
-    transport: Transport, firmware: bytes, *, attempts: int = _ATTEMPTS, progress: Callable[[str], object] | None = None
+    transport: Transport,
+    firmware: bytes,
+    *,
+    attempts: int = _MAX_ATTEMPTS,
+    progress: Callable[[str], object] | None = None,
 ) -> Firmware:
     """Load ``firmware`` and check that it runs; return its description.
 
@@ -269,11 +273,13 @@ def boot_falcon(
     for attempt in range(1, attempts + 1):
         try:
             _attempt_boot(transport, firmware)
-        except _Ended as ended:
+        except _StepFailed as failure:
             if attempt == attempts:
-                raise BootFailure(ended.step, attempt, ended.reason) from None
+                raise BootFailure(failure.step, attempt, failure.reason) from None
             if progress is not None:
-                progress(f"Attempt {attempt} of {attempts} to load the firmware failed: {ended.reason}. Trying again.")
+                progress(
+                    f"Attempt {attempt} of {attempts} to load the firmware failed: {failure.reason}. Trying again."
+                )
             transport.reopen()
             transport.pause(_BETWEEN_ATTEMPTS_S)
         else:
@@ -287,11 +293,11 @@ def _attempt_boot(transport: Transport, firmware: bytes) -> None:
     _upload(transport, firmware)
     configure(transport)
     if not is_running(transport):
-        raise _Ended("start", "the firmware was sent, but the Falcon does not respond")
+        raise _StepFailed("start", "the firmware was sent, but the Falcon does not respond")
 
 
 def _ping(transport: Transport) -> None:
-    """Reset the processor by an edge of DTR, and ping until its loader answers."""
+    """Reset the processor with an edge of DTR, and ping its loader until it answers."""
     _purge(transport)
     set_event_character(transport, on=False)
     transport.control(constants.REQUEST_LATENCY, constants.LATENCY_BOOT_MS)
@@ -299,14 +305,14 @@ def _ping(transport: Transport) -> None:
     for level in (constants.RTS_LOW, constants.DTR_LOW, constants.DTR_HIGH):
         transport.control(constants.REQUEST_MODEM, level)
     line = _Line(transport)
-    came = b""
+    received = b""
     for _ in range(PINGS):
         _send(transport, constants.PING, "ping")
-        came = line.until(lambda data: constants.PONG in data, _PING_S, came)
-        if constants.PONG in came:
+        received = line.read_until(lambda data: constants.PONG in data, _PING_S, received)
+        if constants.PONG in received:
             return
-    heard = f"answers with {came[:8].hex(' ')}" if came else "does not answer"
-    raise _Ended("ping", f"its boot loader {heard}")
+    heard = f"answers with {received[:8].hex(' ')}" if received else "does not answer"
+    raise _StepFailed("ping", f"its boot loader {heard}")
 
 
 def _send_autobaud(transport: Transport) -> None:
@@ -315,30 +321,32 @@ def _send_autobaud(transport: Transport) -> None:
     transport.control(constants.REQUEST_BAUD, constants.BAUD_142857)
     _purge(transport)
     _send(transport, constants.AUTOBAUD, "autobaud")
-    came = _Line(transport).until(lambda data: data.endswith(constants.AUTOBAUD), _STEP_S)
-    if not came.endswith(constants.AUTOBAUD):
-        heard = f"answers with {came[:8].hex(' ')}" if came else "does not answer"
-        raise _Ended("autobaud", f"after the byte that sets the speed, its boot loader {heard}")
+    received = _Line(transport).read_until(lambda data: data.endswith(constants.AUTOBAUD), _STEP_S)
+    if not received.endswith(constants.AUTOBAUD):
+        heard = f"answers with {received[:8].hex(' ')}" if received else "does not answer"
+        raise _StepFailed("autobaud", f"after the byte that sets the speed, its boot loader {heard}")
 
 
 def _upload(transport: Transport, firmware: bytes) -> None:
     """Send the firmware in pieces, and check the echo of each."""
     line = _Line(transport)
-    for at in range(0, len(firmware), constants.CHUNK):
-        chunk = firmware[at : at + constants.CHUNK]
+    for offset in range(0, len(firmware), constants.CHUNK):
+        chunk = firmware[offset : offset + constants.CHUNK]
         _send(transport, chunk, "echo")
-        _expect_echo(line, chunk, at)
+        _expect_echo(line, chunk, offset)
 
 
-def _expect_echo(line: _Line, chunk: bytes, at: int) -> None:
-    echo = line.until(lambda data: len(data) >= len(chunk), _STEP_S)
-    for number, (sent, heard) in enumerate(zip(chunk, echo, strict=False), at):
-        if heard != sent:
-            raise _Ended("echo", f"byte {number} of the firmware came back as {heard:02x}, not {sent:02x}")
+def _expect_echo(line: _Line, chunk: bytes, offset: int) -> None:
+    echo = line.read_until(lambda data: len(data) >= len(chunk), _STEP_S)
+    for number, (sent, received_byte) in enumerate(zip(chunk, echo, strict=False), offset):
+        if received_byte != sent:
+            raise _StepFailed("echo", f"byte {number} of the firmware came back as {received_byte:02x}, not {sent:02x}")
     if len(echo) < len(chunk):
-        raise _Ended("echo", f"the bridge returned nothing from byte {at + len(echo)} of the firmware onwards")
+        raise _StepFailed("echo", f"the bridge returned nothing from byte {offset + len(echo)} of the firmware onwards")
     if len(echo) > len(chunk):
-        raise _Ended("echo", f"the bridge returned extra data after byte {at + len(chunk) - 1} of the firmware")
+        raise _StepFailed(
+            "echo", f"the bridge returned extra data after byte {offset + len(chunk) - 1} of the firmware"
+        )
 
 
 def _send(transport: Transport, data: bytes, step: str) -> None:
@@ -347,7 +355,7 @@ def _send(transport: Transport, data: bytes, step: str) -> None:
     except UsbFailure as failure:
         if failure.kind != "timeout":
             raise
-        raise _Ended(step, "the bridge did not accept the data in time") from failure
+        raise _StepFailed(step, "the bridge did not accept the data in time") from failure
 
 
 def _set_line(transport: Transport, divisor: int) -> None:
