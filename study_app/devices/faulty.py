@@ -1,8 +1,8 @@
-"""A device that goes wrong on purpose: another device's readings, now and then broken in a way that hardware knows.
+"""A device that injects faults on purpose: it passes on another device's readings and sometimes falsifies them.
 
-It draws what goes wrong, when and for how long from numbers of its own, inside the servo's loop; so the same seed on a
-virtual clock goes wrong at the same readings again. What it did is counted in its memory, to be compared with what
-telemetry has of it, and so is every force that was written: the last witness before the hand.
+The kind, time and duration of each fault are drawn from its own random numbers inside the servo's loop, so with a
+virtual clock the same seed gives the same faults at the same readings. Its memory counts the injected faults, which are
+compared with telemetry, and records the forces that were written, as they would reach the hand.
 """
 
 import math
@@ -34,8 +34,8 @@ KINDS: Final = ("non_finite", "glitch", "silence", "clock_jump", "stop_button", 
 _NONE: Final = -1
 
 GLITCH_M: Final = 0.1  # per millisecond: 100 m/s
-_SHORTEST_JUMP_NS: Final = 1_000_000
-_LONGEST_JUMP_NS: Final = 2_000_000_000
+_MIN_JUMP_NS: Final = 1_000_000
+_MAX_JUMP_NS: Final = 2_000_000_000
 
 FAULTS = np.dtype(
     [
@@ -44,19 +44,19 @@ FAULTS = np.dtype(
         ("read", np.intp),
         ("write", np.intp),
         ("clock", np.intp),
-        # the permitted faults; written by the host
+        # permitted faults, written by the host
         ("share", np.float64, (len(KINDS),)),  # share of each kind of fault; all 0: no faults
-        ("least", np.int64, (len(KINDS),)),  # readings that one lasts
+        ("least", np.int64, (len(KINDS),)),  # least and greatest number of readings of a fault
         ("most", np.int64, (len(KINDS),)),
-        ("gap", np.int64, (2,)),  # fewest and most sound readings between two
-        # where it is
+        ("gap", np.int64, (2,)),  # least and greatest number of sound readings between two faults
+        # current state
         ("random", np.uint64),
         ("kind", np.int64),  # of the current fault or the next one
         ("wait", np.int64),  # sound readings before it
         ("left", np.int64),  # readings it still lasts
-        ("choice", np.int64),  # drawn once per fault: axis, and which invalid number
-        ("losing", np.int64),  # 1: the next write says that the device is lost
-        # what was done
+        ("choice", np.int64),  # drawn once per fault: selects the axis and the invalid number
+        ("losing", np.int64),  # 1: the next write returns that the device is lost
+        # counts
         ("reads", np.int64),
         ("injected", np.int64, (len(KINDS),)),  # readings
         ("episodes", np.int64, (len(KINDS),)),
@@ -102,10 +102,10 @@ class FaultyDevice:
         return self._kept[0].failure
 
     def allow(self, faults: dict[int, tuple[float, int, int]], gap: tuple[int, int]) -> None:
-        """Inject these kinds of faults from the next one onwards.
+        """Permit these kinds of faults from the next one on.
 
-        Each kind has its share of all faults, and its least and greatest number of readings; ``gap`` is the least and
-        greatest number of sound readings between two faults. A clock that advances by itself does not jump.
+        ``faults`` gives for each kind its share of all faults, and its least and greatest number of readings. ``gap``
+        is the least and greatest number of sound readings between two faults.
         """
         state = self.state
         state.share = 0.0
@@ -118,11 +118,11 @@ class FaultyDevice:
 
 
 @kernel
-def _due(faults: Any) -> int:
-    """Return the fault of this reading, or NONE."""
+def _next_fault(faults: Any) -> int:
+    """Return the kind of fault of this reading, or `_NONE`."""
     kind: int = faults.kind  # read once: the host may allow other faults meanwhile
     if kind == _NONE:
-        kind = _draw(faults)
+        kind = _draw_fault(faults)
     if kind == _NONE:
         return _NONE
     if faults.wait > 0:
@@ -137,17 +137,17 @@ def _due(faults: Any) -> int:
 
 
 @kernel
-def _draw(faults: Any) -> int:
-    """Draw the kind and the start of the next fault; return its kind, or NONE."""
+def _draw_fault(faults: Any) -> int:
+    """Draw kind, start and duration of the next fault; return its kind, or `_NONE`."""
     total = 0.0
     for share in faults.share:
         total += share
     if total <= 0.0:
         return _NONE
-    place = total * random(faults)
+    point = total * random(faults)
     kind = 0
-    while kind < len(KINDS) - 1 and place >= faults.share[kind]:
-        place -= faults.share[kind]
+    while kind < len(KINDS) - 1 and point >= faults.share[kind]:
+        point -= faults.share[kind]
         kind += 1
     faults.wait = _between(faults, faults.gap[0], faults.gap[1])
     faults.left = _between(faults, faults.least[kind], faults.most[kind])
@@ -162,8 +162,8 @@ def _between(faults: Any, least: int, most: int) -> int:
 
 
 @kernel
-def _no_number(choice: int) -> float:
-    """Return a value that is no possible hand position, such as NaN or infinity."""
+def _non_finite(choice: int) -> float:
+    """Return NaN, infinity or minus infinity."""
     if choice < 3:
         return math.nan
     return math.inf if choice < 6 else -math.inf
@@ -172,7 +172,7 @@ def _no_number(choice: int) -> float:
 def _read(context: int, now_ns: int, reading: int) -> int:
     faults = _faults_at(context)
     faults.reads += 1
-    kind = _due(faults)
+    kind = _next_fault(faults)
     if kind == LOST:
         return READ_LOST
     if kind == SILENCE:
@@ -181,7 +181,7 @@ def _read(context: int, now_ns: int, reading: int) -> int:
     out = reading_at(reading)
     axis = faults.choice % 3
     if kind == NON_FINITE:
-        out.position_m[axis] = _no_number(faults.choice)
+        out.position_m[axis] = _non_finite(faults.choice)
     elif kind == GLITCH:
         out.position_m[axis] += math.copysign(GLITCH_M, out.position_m[axis])
     elif kind == BUTTON:
@@ -189,7 +189,7 @@ def _read(context: int, now_ns: int, reading: int) -> int:
     elif kind == LOST_AT_WRITE:
         faults.losing = 1
     elif kind == JUMP:
-        jump_ns = _between(faults, _SHORTEST_JUMP_NS, _LONGEST_JUMP_NS)
+        jump_ns = _between(faults, _MIN_JUMP_NS, _MAX_JUMP_NS)
         _virtual_at(faults.clock).now_ns += jump_ns
         faults.jumped_ns += jump_ns
     return answer

@@ -1,8 +1,8 @@
 """The guard: a small process that ends a device's force if the program dies.
 
-A device without a watchdog may keep its last force. So a child process waits on a pipe from the program; if the pipe
-ends without ``_WORD``, the program has died, and the child calls the driver's function that opens the device and ends
-its force. Run as ``python -m study_app.devices.guard NAME MODULE:FUNCTION ARGUMENT...``.
+A device without a watchdog may keep its last force. Therefore a child process waits on a pipe from the program. If the
+pipe ends without ``_DISMISSAL``, the program has died, and the child calls the driver's function that opens the device
+and ends its force. It is run as ``python -m study_app.devices.guard NAME MODULE:FUNCTION ARGUMENT...``.
 """
 
 import pkgutil
@@ -20,28 +20,28 @@ from study_app.ending_signals import ENDING_SIGNALS
 from study_app.errors import DeviceError
 from study_app.haptics.runtime.grants import allow_suspension, refuse_suspension
 
-_WORD: Final = b"done\n"
+_DISMISSAL: Final = b"done\n"
 READY: Final = b"ready\n"
 PATIENCE_S: Final = 10.0
 """Time in which the guard tries to open the device [s]: the system needs a moment to release it from a dead program."""
 
 _RETRY_S = 0.02
-_LEAVE_S = 5.0
+_EXIT_TIMEOUT_S = 5.0
 
 
 class Guard:
     """A process that ends the force of a device if the program dies.
 
-    It can act when the program has died, not while it is suspended; therefore Ctrl-Z has no effect until it is
-    dismissed. As a context manager it starts on entry and is dismissed on exit; after an exception it is not dismissed,
-    but ends the force as soon as the device is closed.
+    It can act when the program has died, but not while the program is suspended; therefore Ctrl-Z has no effect until
+    the guard is dismissed. As a context manager it starts on entry and is dismissed on exit; after an exception it is
+    not dismissed, but ends the force as soon as the device is closed.
 
     Parameters
     ----------
     name : name of the device, for messages
     ends_force : "MODULE:FUNCTION" of a function that opens the device and ends its force, or raises ``DeviceError``
     arguments : arguments of this function
-    died : called in a separate thread if the guard ends before it is dismissed: then no force may be sent
+    died : called in a separate thread if the guard ends before it is dismissed; no force may be sent after that
     """
 
     def __init__(self, name: str, ends_force: str, *arguments: str, died: Callable[[], object] | None = None) -> None:
@@ -62,8 +62,8 @@ class Guard:
         """
         if self.child is not None:
             return
-        command = [sys.executable, "-P", "-m", __spec__.name, *self._words]  # -P: no modules of the present folder
-        # In a separate session or console: closing the program's terminal does not end its guard.
+        command = [sys.executable, "-P", "-m", __spec__.name, *self._words]  # -P: no modules from the current folder
+        # In a separate session or console, so that closing the program's terminal does not end the guard.
         child = subprocess.Popen(  # noqa: S603 - our own module, and no shell
             command,
             stdin=subprocess.PIPE,
@@ -89,14 +89,14 @@ class Guard:
     def watching(self) -> bool:
         return self.child is not None and self.child.poll() is None
 
-    def _listen(self, child: subprocess.Popen[bytes], said: IO[bytes]) -> None:
-        said.read()  # it sends no more data; so this returns when the guard ends
+    def _listen(self, child: subprocess.Popen[bytes], output: IO[bytes]) -> None:
+        output.read()  # the guard sends no more data, so this returns when it ends
         if self.child is child and self._died is not None:
             self._died()
 
     def stand_down(self) -> None:
-        """Dismiss the guard: the force is zero and the device closed. A second call does nothing."""
-        self._end(_WORD)
+        """Dismiss the guard, since the force is zero and the device is closed. A second call does nothing."""
+        self._end(_DISMISSAL)
 
     def release(self) -> None:
         """Make the guard end the force after the device is closed; wait for it to exit."""
@@ -105,7 +105,8 @@ class Guard:
     def leave(self) -> None:
         """Make the guard end the force once the device is reconnected, within a limited time; return at once.
 
-        For a lost link: the device may still exert force, and may reconnect before any program opens it.
+        This is for a lost connection: the device may still exert force when it is reconnected, before a program opens
+        it.
         """
         child, self.child = self.child, None
         allow_suspension(self)
@@ -118,23 +119,23 @@ class Guard:
     def recall(self) -> None:
         """End the process left by `leave`, since the program has opened the device again with another guard.
 
-        Otherwise it would try until its time limit to open a device that is in use, and report a danger.
+        Otherwise it would try to open the device, which is in use, until its time limit, and then report a danger.
         """
-        left, self._left = self._left, None
-        if left is not None:
-            left.kill()
+        left_child, self._left = self._left, None
+        if left_child is not None:
+            left_child.kill()
 
-    def _end(self, word: bytes) -> None:
+    def _end(self, message: bytes) -> None:
         child, self.child = self.child, None
         allow_suspension(self)
         if child is None or child.stdin is None:
             return
         with suppress(OSError):  # it may have ended
-            child.stdin.write(word)
+            child.stdin.write(message)
             child.stdin.flush()
         child.stdin.close()
         try:
-            child.wait(_LEAVE_S if word else PATIENCE_S + _LEAVE_S)
+            child.wait(_EXIT_TIMEOUT_S if message else PATIENCE_S + _EXIT_TIMEOUT_S)
         except subprocess.TimeoutExpired:
             child.kill()
             child.wait()
@@ -169,20 +170,23 @@ def _close(child: subprocess.Popen[bytes]) -> None:
 
 
 def watch_program(name: str, ends_force: str, *arguments: str) -> int:
-    """Wait for the end of the standard input; without ``_WORD`` in it, end the device's force. Return an exit code."""
+    """Wait until the standard input ends; unless it ends with ``_DISMISSAL``, end the device's force.
+
+    Return the exit code.
+    """
     for number in ENDING_SIGNALS:
-        signal.signal(number, signal.SIG_IGN)  # it ends when the program has ended
+        signal.signal(number, signal.SIG_IGN)  # it ends only after the program
     end_force = pkgutil.resolve_name(ends_force)
     sys.stdout.buffer.write(READY)
     sys.stdout.flush()
-    if sys.stdin.buffer.read().endswith(_WORD):
+    if sys.stdin.buffer.read().endswith(_DISMISSAL):
         return 0
-    ends_s = time.perf_counter() + PATIENCE_S
+    deadline_s = time.perf_counter() + PATIENCE_S
     while True:
         try:
             end_force(*arguments)
         except DeviceError as error:
-            if time.perf_counter() > ends_s:
+            if time.perf_counter() > deadline_s:
                 sys.stderr.write(f"the device '{name}' may still exert force: {error}; turn it off\n")
                 return 2
         else:

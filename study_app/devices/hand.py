@@ -1,11 +1,11 @@
-"""A simulated hand: its target at a time (at the pointer, along a motion, on a reach, at its place), and its orders.
+"""A simulated hand: its motion (to the pointer, along a given motion, on a reach, or at rest), and its orders.
 
-Orders come from any thread, one at a time, through a seqlock: the writer makes the serial odd, writes, makes it even;
-the reader, inside the servo, reads an order only when it is complete, else at the next tick; so neither ever waits for
-the other.
+Orders may come from any thread, one at a time, through a seqlock: the writer makes the serial odd, writes the order,
+and makes the serial even. The reader, inside the servo, takes an order only if it is complete, and otherwise tries
+again at the next tick, so neither ever waits for the other.
 
-It only uses sums, products, divisions and square roots, which IEEE 754 rounds alike everywhere; so a scripted hand
-moves identically on every machine.
+Only sums, products, divisions and square roots are used, which IEEE 754 rounds alike everywhere, so that a scripted
+hand moves identically on every machine.
 """
 
 import math
@@ -21,16 +21,16 @@ from study_app.haptics.model.ranges import Vector
 
 STAY, POINT, HOLD, REACH, FOLLOW = range(5)
 
-_WAVES = 3  # tremor: waves per axis
-_LONGEST_STEP_S = 0.05  # longest simulated time after a pause of the loop [s]
+_WAVES = 3  # number of waves of the tremor per axis
+_MAX_STEP_S = 0.05  # longest simulated time after a pause of the loop [s]
 
 _ORDER = np.dtype(
     [
         ("kind", np.int64),  # STAY ... FOLLOW
         ("target_m", np.float64, (3,)),  # of POINT, HOLD and REACH
-        ("duration_ns", np.int64),  # of REACH; 0: as long as such a reach takes
+        ("duration_ns", np.int64),  # of REACH; 0: chosen from the distance
         ("rows", np.intp),  # of FOLLOW: address of MOTION_ROW records
-        ("count", np.int64),  # of FOLLOW: how many
+        ("count", np.int64),  # of FOLLOW: number of rows
     ],
     align=True,
 )
@@ -45,7 +45,7 @@ HAND = np.dtype(
         ("order", _ORDER),
         ("began_ns", np.int64),
         ("began_m", np.float64, (3,)),  # position of the hand when the order began
-        ("row", np.int64),  # of FOLLOW: the row before now
+        ("row", np.int64),  # of FOLLOW: the last row up to now
         ("moving", np.int64),  # 1 while an order is not yet fulfilled
         ("lag_s", np.float64),  # of POINT: time constant of each of two low-passes that smooth the pointer
         ("smooth_m", np.float64, (3,)),  # of POINT: after the first low-pass
@@ -62,8 +62,8 @@ HAND = np.dtype(
 _row_at = record_at(_MOTION_ROW)
 _ROW_BYTES = _MOTION_ROW.itemsize
 
-_REACH_START_S = 0.3  # a reach takes this time [s], and
-_REACH_PACE_MPS = 0.25  # this time per distance [s/m]: 60 mm in 0.54 s with a peak of 0.21 m/s
+_REACH_BASE_S = 0.3  # a reach takes this time [s]
+_REACH_SPEED_MPS = 0.25  # plus distance / speed: 60 mm in 0.54 s with a peak of 0.21 m/s
 
 
 @kernel
@@ -82,15 +82,15 @@ def move_hand(hand: Any, now_ns: int, elapsed_s: float) -> None:
     _take_order(hand, now_ns)
     since_s = (now_ns - hand.began_ns) * 1e-9
     if hand.order.kind == POINT:
-        _point(hand, elapsed_s)
+        _follow_pointer(hand, elapsed_s)
     elif hand.order.kind == HOLD:
         for i in range(3):
             hand.aim_m[i] = hand.order.target_m[i]
         hand.moving = 0
     elif hand.order.kind == REACH:
-        _reach(hand, since_s)
+        _move_by_reach(hand, since_s)
     elif hand.order.kind == FOLLOW:
-        _follow(hand, since_s)
+        _move_along_motion(hand, since_s)
     else:
         hand.moving = 0
     for i in range(3):
@@ -101,7 +101,7 @@ def move_hand(hand: Any, now_ns: int, elapsed_s: float) -> None:
 @kernel
 def move_held_handle(simulated: Any, now_ns: int, elapsed_s: float) -> None:
     """Update ``simulated.hand`` and its ``simulated.handle`` to ``now_ns``, ``elapsed_s`` after the last call."""
-    elapsed_s = min(max(elapsed_s, 0.0), _LONGEST_STEP_S)
+    elapsed_s = min(max(elapsed_s, 0.0), _MAX_STEP_S)
     move_hand(simulated.hand, now_ns, elapsed_s)
     move(simulated.handle, simulated.hand.was_m, simulated.hand.place_m, elapsed_s)
 
@@ -114,24 +114,24 @@ def _take_order(hand: Any, now_ns: int) -> None:
     fence()
     hand.order = hand.posted
     fence()
-    if hand.serial != serial:  # it was overwritten during the read: the next tick reads the newer one
+    if hand.serial != serial:  # it was overwritten meanwhile: the next tick takes the newer one
         hand.order.kind = STAY
         return
     hand.taken = serial
     hand.began_ns = now_ns
     hand.row = 0
     hand.moving = 1
-    square = 0.0
+    square_m2 = 0.0
     for i in range(3):
         hand.began_m[i] = hand.aim_m[i]
-        way = hand.order.target_m[i] - hand.aim_m[i]
-        square += way * way
+        distance = hand.order.target_m[i] - hand.aim_m[i]
+        square_m2 += distance * distance
     if hand.order.kind == REACH and hand.order.duration_ns <= 0:
-        hand.order.duration_ns = int(1e9 * (_REACH_START_S + math.sqrt(square) / _REACH_PACE_MPS))
+        hand.order.duration_ns = int(1e9 * (_REACH_BASE_S + math.sqrt(square_m2) / _REACH_SPEED_MPS))
 
 
 @kernel
-def _point(hand: Any, elapsed_s: float) -> None:
+def _follow_pointer(hand: Any, elapsed_s: float) -> None:
     gain = elapsed_s / (hand.lag_s + elapsed_s) if elapsed_s > 0.0 else 0.0
     for i in range(3):
         hand.smooth_m[i] += gain * (hand.order.target_m[i] - hand.smooth_m[i])
@@ -139,32 +139,32 @@ def _point(hand: Any, elapsed_s: float) -> None:
 
 
 @kernel
-def _reach(hand: Any, since_s: float) -> None:
+def _move_by_reach(hand: Any, since_s: float) -> None:
     """Minimum jerk: x = x_0 + (x_1 - x_0)(10 s^3 - 15 s^4 + 6 s^5), Flash & Hogan 1985, eq. 10."""
-    share = since_s * 1e9 / hand.order.duration_ns
-    if share >= 1.0:
-        share = 1.0
+    progress = since_s * 1e9 / hand.order.duration_ns
+    if progress >= 1.0:
+        progress = 1.0
         hand.moving = 0
-    done = share * share * share * (10.0 + share * (6.0 * share - 15.0))
+    fraction = progress * progress * progress * (10.0 + progress * (6.0 * progress - 15.0))
     for i in range(3):
-        hand.aim_m[i] = hand.began_m[i] + done * (hand.order.target_m[i] - hand.began_m[i])
+        hand.aim_m[i] = hand.began_m[i] + fraction * (hand.order.target_m[i] - hand.began_m[i])
 
 
 @kernel
-def _follow(hand: Any, since_s: float) -> None:
-    time = _row_at(hand.order.rows).t_s + since_s
+def _move_along_motion(hand: Any, since_s: float) -> None:
+    motion_s = _row_at(hand.order.rows).t_s + since_s
     last = hand.order.count - 1
-    while hand.row < last and _row_at(hand.order.rows + (hand.row + 1) * _ROW_BYTES).t_s <= time:
+    while hand.row < last and _row_at(hand.order.rows + (hand.row + 1) * _ROW_BYTES).t_s <= motion_s:
         hand.row += 1
     before = _row_at(hand.order.rows + hand.row * _ROW_BYTES)
     after = _row_at(hand.order.rows + min(hand.row + 1, last) * _ROW_BYTES)
-    share = 0.0
+    fraction = 0.0
     if hand.row == last:
         hand.moving = 0
     else:
-        share = (time - before.t_s) / (after.t_s - before.t_s)
+        fraction = (motion_s - before.t_s) / (after.t_s - before.t_s)
     for i in range(3):
-        hand.aim_m[i] = before.position_m[i] + share * (after.position_m[i] - before.position_m[i])
+        hand.aim_m[i] = before.position_m[i] + fraction * (after.position_m[i] - before.position_m[i])
 
 
 @kernel
@@ -179,15 +179,15 @@ def tremor(hand: Any, axis: int, time_s: float) -> Any:
 
 @kernel
 def wave(turn: float) -> float:
-    """Return sin(2 pi turn) to within 0.0012, by two parabolas, with the same bits on every machine."""
-    phase = 2.0 * (turn - math.floor(turn)) - 1.0  # half turns, [-1, 1): shifted by half a turn, hence the sign
+    """Return sin(2 pi turn) with an error below 0.0012, by two parabolas, bit-identical on every machine."""
+    phase = 2.0 * (turn - math.floor(turn)) - 1.0  # in half turns, [-1, 1), shifted by half a turn, hence the sign
     arch = 4.0 * phase * (1.0 - abs(phase))
     return -(0.225 * (arch * abs(arch) - arch) + arch)
 
 
 _TREMOR_HZ = (8.0, 12.0)
 
-_KEPT_MOTIONS = 8
+_MOTIONS_TO_KEEP = 8
 
 
 class HandOrders:
@@ -228,7 +228,7 @@ class HandOrders:
 
     def hold(self, x_m: float, y_m: float, z_m: float) -> None:
         """Hold the handle at a position at once [m, hand frame]."""
-        self._post(HOLD, target_m=self._inside(x_m, y_m, z_m))
+        self._post(HOLD, target_m=self._within_workspace(x_m, y_m, z_m))
 
     def follow(self, t_s: Any, position_m: Any) -> None:
         """Move along straight lines between the given positions from the next tick onwards, and stay at the last.
@@ -259,8 +259,8 @@ class HandOrders:
             )
         motion = records(_MOTION_ROW, times.size)
         motion.t_s, motion.position_m = times, places
-        # The servo may still read the last motion, which is kept until several newer ones were given.
-        self._motions = [*self._motions[1 - _KEPT_MOTIONS :], motion]
+        # The servo may still read an earlier motion, so the last few are kept.
+        self._motions = [*self._motions[1 - _MOTIONS_TO_KEEP :], motion]
         self._post(FOLLOW, rows=int(motion.ctypes.data), count=times.size)
 
     def reach_to(self, x_m: float, y_m: float, z_m: float, duration_s: float | None = None) -> None:
@@ -271,7 +271,7 @@ class HandOrders:
         if duration_s is not None and not duration_s > 0.0:
             raise DeviceError(f"a reach must last longer than 0 s, not {duration_s} s")
         nanoseconds = 0 if duration_s is None else max(1, round(duration_s * 1e9))
-        self._post(REACH, target_m=self._inside(x_m, y_m, z_m), duration_ns=nanoseconds)
+        self._post(REACH, target_m=self._within_workspace(x_m, y_m, z_m), duration_ns=nanoseconds)
 
     def rest(self) -> None:
         self._post(STAY)
@@ -288,7 +288,7 @@ class HandOrders:
         return bool(hand.moving) or bool(hand.serial != hand.taken)
 
     def _tremble(self, random: Random | None, tremor_m: float) -> None:
-        """Draw frequencies and phases of a tremor with this amplitude; with None they are always the same."""
+        """Draw the frequencies and phases of a tremor with this amplitude; if ``random`` is None they are fixed."""
         draw = (random or Random(0)).random  # noqa: S311 - a simulated tremor, not a secret
         hand = self.state.hand
         hand.tremor_m = tremor_m
@@ -296,7 +296,7 @@ class HandOrders:
         hand.tremor_hz = [[lowest + (highest - lowest) * draw() for _ in range(_WAVES)] for _ in range(3)]
         hand.tremor_turn = [[draw() for _ in range(_WAVES)] for _ in range(3)]
 
-    def _inside(self, x_m: float, y_m: float, z_m: float) -> Vector:
+    def _within_workspace(self, x_m: float, y_m: float, z_m: float) -> Vector:
         """Return the nearest position that the handle can reach."""
         x, y, z = (min(max(v, -half), half) for v, half in zip((x_m, y_m, z_m), self.workspace_m, strict=True))
         return x, y, z

@@ -1,6 +1,6 @@
 """The devices by name: the program's own and those at entry points, described, probed, and opened.
 
-Naming and probing the devices loads no compiler, and drivers only as far as probing needs them.
+Naming and probing devices loads no compiler, and drivers only if probing needs them.
 """
 
 from __future__ import annotations
@@ -52,8 +52,8 @@ def descriptor_of(name: str) -> DeviceDescriptor:
     kind, _, argument = name.partition(":")
     descriptor = DEVICES.get(kind)
     if descriptor is None or (argument and not descriptor.argument):
-        known = ", ".join(device.usage for device in all_devices())
-        raise DeviceNotFound(f"device '{name}' is not known; choose one of: {known}")
+        available = ", ".join(device.usage for device in all_devices())
+        raise DeviceNotFound(f"device '{name}' is not known; choose one of: {available}")
     if descriptor.argument_required and not argument:
         raise DeviceNotFound(f"device '{kind}' needs an argument after its name: specify it as {descriptor.usage}")
     return descriptor
@@ -78,13 +78,13 @@ def open_device(name: str, **request: Any) -> Device:
         The device is connected but cannot be used, or it does not have an option.
     """
     device = descriptor_of(name)
-    asked = OpenRequest(**request)
-    check_options(name, asked.options)
-    opened = device.open(replace(asked, argument=name.partition(":")[2]))
-    if lacking := [part for part in ("read", "write", "failure") if not hasattr(opened, part)]:
+    open_request = OpenRequest(**request)
+    check_options(name, open_request.options)
+    opened = device.open(replace(open_request, argument=name.partition(":")[2]))
+    if missing := [attribute for attribute in ("read", "write", "failure") if not hasattr(opened, attribute)]:
         opened.close()
         raise DeviceError(
-            f"device '{name}' does not have '{lacking[0]}': derive {type(opened).__name__} from "
+            f"device '{name}' does not have '{missing[0]}': derive {type(opened).__name__} from "
             "study_app.devices.base.Device"
         )
     return opened
@@ -94,9 +94,9 @@ def check_connected(name: str) -> None:
     """Raise DeviceNotFound if the probe of a device finds none, before anything is compiled for it."""
     device = descriptor_of(name)
     states = _probe_device(device)
-    absent = [backend.why for backend in states if backend.state == NONE]
-    if absent and all(backend.state in {NONE, NOT_AVAILABLE} for backend in states):
-        raise DeviceNotFound(f"{device.title}: {NONE}{f' ({absent[0]})' if absent[0] else ''}")
+    reasons = [backend.why for backend in states if backend.state == NONE]
+    if reasons and all(backend.state in {NONE, NOT_AVAILABLE} for backend in states):
+        raise DeviceNotFound(f"{device.title}: {NONE}{f' ({reasons[0]})' if reasons[0] else ''}")
 
 
 def doctor_of(name: str) -> Doctor:
@@ -111,9 +111,9 @@ def doctor_of(name: str) -> Doctor:
     """
     doctor = descriptor_of(name).doctor
     if doctor is None:
-        examined = ", ".join(device.usage for device in all_devices() if device.doctor is not None)
+        supported = ", ".join(device.usage for device in all_devices() if device.doctor is not None)
         raise DeviceError(
-            f"the doctor command does not support '{name}', only {examined}: see 'liquid-study devices list'"
+            f"the doctor command does not support '{name}', only {supported}: see 'liquid-study devices list'"
         )
     return doctor
 
@@ -132,12 +132,16 @@ def check_options(name: str, options: Iterable[str]) -> None:
     DeviceError
         The device does not have one of these options.
     """
-    taken = {option.name for option in descriptor_of(name).options}
+    accepted = {option.name for option in descriptor_of(name).options}
     for option in options:
-        if option not in taken:
-            takers = [device.title for device in all_devices() if option in {known.name for known in device.options}]
-            only = f"; only these do: {', '.join(takers)}" if takers else ""
-            raise DeviceError(f"device '{name}' does not use {option}{only}: omit --{option}")
+        if option not in accepted:
+            accepting = [
+                device.title
+                for device in all_devices()
+                if option in {option_of_device.name for option_of_device in device.options}
+            ]
+            hint = f"; only these do: {', '.join(accepting)}" if accepting else ""
+            raise DeviceError(f"device '{name}' does not use {option}{hint}: omit --{option}")
 
 
 def backends() -> list[Backend]:

@@ -1,4 +1,4 @@
-"""Device and servo, opened together at rest and closed in a safe order; only this module does so."""
+"""Device and servo, which only this module opens together and closes in a safe order."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ if TYPE_CHECKING:
     from study_app.haptics.runtime.servo import Servo
 
 
-_open: Final = weakref.WeakSet["Rig"]()
+_open_rigs: Final = weakref.WeakSet["Rig"]()
 
 
 @atexit.register
 def _stop_open_rigs() -> None:
     """Stop all rigs that the program left open at its end, even if some of them fail to stop."""
     with ExitStack() as stops:
-        for rig in tuple(_open):
+        for rig in tuple(_open_rigs):
             stops.callback(rig.stop)
 
 
@@ -63,7 +63,7 @@ class Rig:
 
     def stop(self) -> None:
         """Send zero force, then close the device."""
-        _open.discard(self)
+        _open_rigs.discard(self)
         try:
             self.servo.stop()
         finally:
@@ -100,7 +100,7 @@ class RigSettings:
     options: Mapping[str, str | Path] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        if not self.force_limit_n > 0:  # the safety layer would push with a negative one
+        if not self.force_limit_n > 0:  # with a negative limit the safety layer would push
             raise DeviceError(f"the force limit must be greater than 0 N, not {self.force_limit_n:g} N")
 
 
@@ -131,7 +131,7 @@ def open_rig(
     Parameters
     ----------
     clock : default: the system's; on a virtual one the servo is not started, but advanced by the caller
-    progress : receives the device's requests while it is opened, one line at a time
+    progress : receives the device's instructions while it is opened, one line at a time
     cancelled : returns whether to stop opening it
 
     Raises
@@ -155,7 +155,7 @@ def open_rig(
         _check_not_cancelled(name, cancelled)
         rig = Rig(device, Servo(device, clock=clock, rate_hz=settings.rate_hz, elements=settings.elements))
         if clock is None or clock.runs:
-            _open.add(rig)
+            _open_rigs.add(rig)
             rig.servo.start()
     except BaseException:
         device.close()

@@ -1,10 +1,10 @@
 """Devices made of ``haptics.kernels.plant`` and a hand: the mouse, and the common part of it and the scripted device.
 
-The read of such a device advances hand and handle to the given time, inside the servo's loop; its write stores the
-force for the next step. With the mouse the liquid is seen instead of felt: a spring and a damper connect a simulated
-handle to the pointer, and the liquid's force acts on that handle: it lags behind the pointer by force / stiffness, and
-continues after the pointer has stopped, as the liquid moves it. In free space it follows smoothly, 20 ms behind (two
-low-passes of 10 ms, which smooth the pointer's steps).
+Reading such a device advances hand and handle to the given time, inside the servo's loop; writing stores the force for
+the next step. With the mouse the liquid is seen instead of felt: a spring and a damper connect a simulated handle to
+the pointer, and the liquid's force acts on that handle. The handle lags behind the pointer by force / stiffness, and
+keeps moving after the pointer has stopped, as the liquid moves it. In free space it follows smoothly with a delay of 20
+ms, from two low-passes of 10 ms, which smooth the pointer's steps.
 The scripted device is moved by a simulated hand: along a given motion or in human-like reaches, with tremor and
 encoders. `PlayedHand` has no handle: it replays positions.
 """
@@ -48,13 +48,13 @@ _SIMULATED = np.dtype(
 )
 _simulated_at = record_at(_SIMULATED)
 _POINTED_MASS_KG = 0.2
-_POINTED_STIFFNESS_NPM = 400.0  # 8 N hold the handle back by 20 mm, a fifth of the workspace
+_POINTED_STIFFNESS_NPM = 400.0  # 8 N displace the handle by 20 mm, a fifth of the workspace
 _POINTED_DAMPING_NSPM = 27.0  # 1.5 times critical
 _LAG_S = 0.010
 
 
 class SimulatedDevice(HandOrders, Device):
-    """A handle moved by a hand; the subclass defines ``name``, hand and parameters.
+    """A handle moved by a simulated hand; a subclass defines ``name``, the hand's motion and the parameters.
 
     Parameters
     ----------
@@ -157,7 +157,7 @@ class PointedDevice(SimulatedDevice):
 
     def point_to(self, x_m: float, y_m: float, z_m: float) -> None:
         """Set the pointer's position [m, hand frame]; outside the workspace it is moved to the border."""
-        self._post(POINT, target_m=self._inside(x_m, y_m, z_m))
+        self._post(POINT, target_m=self._within_workspace(x_m, y_m, z_m))
 
 
 class MouseDevice(PointedDevice):
@@ -215,7 +215,7 @@ class ScriptedDevice(SimulatedDevice):
 _PLACE = np.dtype([("position_m", np.float64, (3,))], align=True)
 _PLAYED = np.dtype(
     [
-        ("places", np.intp),  # address of the first
+        ("places", np.intp),  # address of the first position
         ("count", np.int64),
         ("next", np.int64),
     ],
@@ -226,7 +226,7 @@ _played_at = record_at(_PLAYED)
 
 
 class PlayedHand:
-    """A device that replays positions (n, 3) [m], one per reading, and ignores forces: its own cost is least."""
+    """A device that replays positions (n, 3) [m], one per reading, and ignores forces; its own cost is minimal."""
 
     name = "played"
     force_limit_n = 8.0

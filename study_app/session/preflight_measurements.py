@@ -44,9 +44,8 @@ def measure_servo_and_disk(
     sleep: Callable[[float], object] = time.sleep,
 ) -> Measurements:
     """Measure a running servo for ``lasts_s`` and the disk of the study folder ``results``; leave no files."""
-    law_along(
-        Scene(), np.zeros(1), np.zeros((1, 3)), np.zeros((1, 3))
-    )  # compile it now instead of at the end of a trial
+    # compile it now instead of at the end of a trial
+    law_along(Scene(), np.zeros(1), np.zeros((1, 3)), np.zeros((1, 3)))
     reader = servo.telemetry.reader()
     ages_s: list[float] = []
     for _ in range(max(1, round(lasts_s / _POLL_S))):

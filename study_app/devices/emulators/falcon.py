@@ -315,7 +315,7 @@ class EmulatedFalcon(FalconDevice):
         while still_ticks < _STILL_TICKS:
             self._tick()
             still_ticks = 0 if self.hand.moving else still_ticks + 1
-        self._begin_anew()
+        self._restart_fade()
         self._backend.follow_clock(self.context)  # the record there begins with the time of the tick
 
     def close(self) -> None:

@@ -233,7 +233,7 @@ class Service(HandOrders):
         return int(self.memory.ctypes.data)
 
     def compile(self) -> None:
-        """Compile all functions that answer a client, or load them from the cache, since a client waits only seconds."""
+        """Compile all functions that answer a client, or load them from the cache: a client waits only seconds."""
         self.connected()
         self._answer_message(
             {"inverse3": [{"device_id": _DEVICE_ID, "commands": {"set_cursor_force": {"vector": _ZERO}}}]}
@@ -316,9 +316,8 @@ class Service(HandOrders):
         """Return all bytes that are due for the client."""
         state = self.state
         if state.clock == 0 and state.visible == state.read and state.queue_first < state.queue_next:
-            state.now_ns = max(
-                state.now_ns, state.queue_ns[state.queue_first % state.queue_ns.size]
-            )  # reading waits until then
+            # reading waits until then
+            state.now_ns = max(state.now_ns, state.queue_ns[state.queue_first % state.queue_ns.size])
         inverse3_stream.release_due_frames(state)
         indices = np.arange(state.read, state.visible) % state.outbox.size
         state.read = state.visible

@@ -1,9 +1,9 @@
-"""The one C function that the compiled exchange needs: ``libusb_bulk_transfer``, or anything of its signature.
+"""The only C function that the compiled exchange needs: ``libusb_bulk_transfer``, or one with the same signature.
 
-``int32 (intp handle, uint8 endpoint, intp data, int32 length, intp transferred, uint32 timeout_ms)``: move ``length``
-bytes at address ``data`` out, or at most as many in; write how many were moved into the int32 at ``transferred``;
+``int32 (intp handle, uint8 endpoint, intp data, int32 length, intp transferred, uint32 timeout_ms)``: send ``length``
+bytes at address ``data``, or receive at most as many; write the number of bytes into the int32 at ``transferred``;
 return 0 or a negative libusb error.
-`transfer` puts FTDI's library (``FT_Read`` and ``FT_Write``) where libusb would be.
+`transfer` returns such a function for FTDI's library (``FT_Read`` and ``FT_Write``).
 """
 
 import ctypes
@@ -41,18 +41,18 @@ _BRIDGE = np.dtype(
 )
 _COUNT_AT = int(_BRIDGE.fields["count"][1])  # type: ignore[index]
 _DATA_BYTES = constants.USB_PACKET - constants.STATUS_BYTES
-_GONE = 4  # FT_STATUS 1 to 4: no such handle, device not found, not opened, input/output error
+_MAX_GONE_STATUS = 4  # FT_STATUS 1 to 4: invalid handle, device not found, device not opened, input/output error
 
 _bridge_at = record_at(_BRIDGE)
 _count_at = record_at(np.dtype([("count", np.int32)]))
 _status_at = record_at(np.dtype([("bytes", np.uint8, (constants.STATUS_BYTES,))]))
-_move = call_at(types.uint32(types.intp, types.intp, types.uint32, types.intp))
-_waiting = call_at(types.uint32(types.intp, types.intp))
-_set_timeouts = call_at(types.uint32(types.intp, types.uint32, types.uint32))
+_call_transfer = call_at(types.uint32(types.intp, types.intp, types.uint32, types.intp))
+_call_queue_status = call_at(types.uint32(types.intp, types.intp))
+_call_set_timeouts = call_at(types.uint32(types.intp, types.uint32, types.uint32))
 
 
 def bridge_record(library: Any, handle: Any) -> Any:
-    """Return the memory of an open bridge's C function, whose address is its handle."""
+    """Return the memory that the C function of an open bridge uses; its address is the function's handle."""
     memory = records(_BRIDGE, 1)
     bridge = memory[0]
     bridge.handle = handle.value
@@ -69,7 +69,7 @@ def _address(function: Any) -> int:
 
 @cache
 def transfer() -> Any:
-    """Return the C function, of ``bulk.BULK``'s signature; a read gives one packet of at most 64 bytes."""
+    """Return the C function, with the signature `BULK`; a read returns one packet of at most 64 bytes."""
     return c_function(BULK, _transfer)
 
 
@@ -77,38 +77,38 @@ def _transfer(handle: int, endpoint: int, data: int, length: int, transferred: i
     bridge = _bridge_at(handle)
     _count_at(transferred).count = 0
     if bridge.timeout_ms != timeout_ms:
-        status = _set_timeouts(bridge.set_timeouts, bridge.handle, timeout_ms, timeout_ms)
+        status = _call_set_timeouts(bridge.set_timeouts, bridge.handle, timeout_ms, timeout_ms)
         if status != 0:
-            return _code(status)
+            return _error_code(status)
         bridge.timeout_ms = timeout_ms
     if endpoint == constants.ENDPOINT_OUT:
-        status = _move(bridge.write, bridge.handle, data, length, transferred)
+        status = _call_transfer(bridge.write, bridge.handle, data, length, transferred)
         if status == 0 and _count_at(transferred).count < length:
             return constants.ERROR_TIMEOUT
-        return _code(status)
+        return _error_code(status)
     return _receive(handle, data, length, transferred)
 
 
 @kernel
 def _receive(handle: int, data: int, length: int, transferred: int) -> Any:
-    """Receive the available bytes, or wait for the first byte; put status bytes in front."""
+    """Receive the available bytes, or wait for a first byte; put status bytes in front of them."""
     bridge = _bridge_at(handle)
-    room = min(length - constants.STATUS_BYTES, _DATA_BYTES)
+    max_bytes = min(length - constants.STATUS_BYTES, _DATA_BYTES)
     received: Any = 0
     for _ in range(2):
-        status = _waiting(bridge.waiting, bridge.handle, handle + _COUNT_AT)
+        status = _call_queue_status(bridge.waiting, bridge.handle, handle + _COUNT_AT)
         if status != 0:
-            return _code(status)
-        least = 1 if received == 0 else 0
-        wanted: Any = min(max(np.int64(bridge.count), least), room - received)
+            return _error_code(status)
+        min_bytes = 1 if received == 0 else 0
+        wanted: Any = min(max(np.int64(bridge.count), min_bytes), max_bytes - received)
         if wanted > 0:
-            into = data + constants.STATUS_BYTES + received
-            status = _move(bridge.read, bridge.handle, into, wanted, handle + _COUNT_AT)
+            address = data + constants.STATUS_BYTES + received
+            status = _call_transfer(bridge.read, bridge.handle, address, wanted, handle + _COUNT_AT)
             if status != 0:
-                return _code(status)
+                return _error_code(status)
             received += np.int64(bridge.count)
         if received != 1:
-            break  # more bytes may have arrived with the byte that was waited for
+            break  # after waiting for a single byte, more may have arrived with it
     if received == 0:
         return constants.ERROR_TIMEOUT
     for i in range(constants.STATUS_BYTES):
@@ -118,7 +118,7 @@ def _receive(handle: int, data: int, length: int, transferred: int) -> Any:
 
 
 @kernel
-def _code(status: int) -> Any:
+def _error_code(status: int) -> Any:
     if status == 0:
         return constants.SUCCESS
-    return constants.ERROR_NO_DEVICE if status <= _GONE else constants.ERROR_IO
+    return constants.ERROR_NO_DEVICE if status <= _MAX_GONE_STATUS else constants.ERROR_IO

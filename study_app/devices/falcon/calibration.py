@@ -1,12 +1,13 @@
 """Calibration of one Falcon with a weight or a scale: motor units per newton metre, and its arms' offset.
 
-The Falcon holds its grip at a place against a load, and the motor units are recorded. At each place the grip comes to
-rest once from above and once from below, with nothing on it and with a load, so that friction and the grip's own weight
-are separated from the load; `fit` computes motor units per newton from the notes.
+The Falcon holds its grip at a position against a load, and the motor units are recorded. This is done at several
+positions, with and without a load, which separates the load from the grip's own weight. With a weight, the grip comes
+to rest at each position once from above and once from below, so that friction cancels. `fit` computes the motor units
+per newton metre from these measurements.
 
-Two published gains differ by half, so a force in newtons is known only for a calibrated device. Without calibration the
-gain with the weaker forces is used, and the receipt states it. A calibration is kept by the device's serial number
-among the user's settings, not with results.
+The two published gains differ by half, so a force in newtons is known only for a calibrated device. Without a
+calibration the gain that gives the weaker forces is used, and the receipt states it. A calibration is stored under the
+device's serial number in the user's settings, not with results.
 """
 
 from __future__ import annotations
@@ -31,19 +32,19 @@ from study_app.haptics.model.layout import new_command, new_reading
 from study_app.user_folder import FOLDER_VARIABLE, user_folder
 
 UNCALIBRATED_UNITS_PER_NM: Final = 6616.0
-"""Martin & Hillier 2009, quoted from another source; with libnifalcon's 10 000 forces would be half as strong again."""
+"""Martin & Hillier 2009, quoted from another source; libnifalcon's 10 000 would give forces half as strong again."""
 
-_LEAST_POSES: Final = 5
+_MIN_POSES: Final = 5
 MOST_RESIDUAL_N: Final = 0.5
 """Greatest residual of consistent weights."""
-_GAINS: Final = (1000.0, 100_000.0)  # range of every Falcon's gain
-_OFFSETS_RAD: Final = math.radians(15)  # and of its arms' offset
-_STEPS: Final = 20
+_GAINS: Final = (1000.0, 100_000.0)  # range of plausible gains
+_MAX_OFFSET_RAD: Final = math.radians(15)  # greatest plausible offset of the arms
+_MAX_ITERATIONS: Final = 20
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Calibration:
-    """The result of `fit`; ``measured`` is the day, ``residual_n`` the root mean square of the residual."""
+    """The result of `fit`; ``measured`` is the date, ``residual_n`` the root mean square of the residual force."""
 
     geometry: str
     units_per_nm: float
@@ -82,45 +83,50 @@ def fit(
     DeviceError
         There are fewer than five poses, all forces are equal, or the result is impossible for a Falcon.
     """
-    counts, pulled_n, held = (np.asarray(given, np.float64) for given in (poses, forces_n, units))
-    if counts.shape != pulled_n.shape or counts.shape != held.shape or counts.ndim != 2 or counts.shape[1:] != (3,):
+    counts, external_n, motor_units = (np.asarray(values, np.float64) for values in (poses, forces_n, units))
+    if (
+        counts.shape != external_n.shape
+        or counts.shape != motor_units.shape
+        or counts.ndim != 2
+        or counts.shape[1:] != (3,)
+    ):
         raise DeviceError(
             "a calibration needs three encoder counts, three force components and three motor values for each pose"
         )
-    if len(counts) < _LEAST_POSES:
+    if len(counts) < _MIN_POSES:
         raise DeviceError(
-            f"a calibration needs at least {_LEAST_POSES} poses, not {len(counts)}: measure at more positions"
+            f"a calibration needs at least {_MIN_POSES} poses, not {len(counts)}: measure at more positions"
         )
-    if np.ptp(pulled_n, axis=0).max() < 0.5:
+    if np.ptp(external_n, axis=0).max() < 0.5:
         raise DeviceError(
             "a calibration needs two weights at least 0.5 N apart (one may be zero): measure with another "
             "weight as well"
         )
     offset_rad = 0.0
-    for _ in range(_STEPS):
-        small = 1e-5
-        left = _solve(geometry, offset_rad, counts, pulled_n, held)[1]
-        slope = (_solve(geometry, offset_rad + small, counts, pulled_n, held)[1] - left) / small
-        step = float(slope @ left) / float(slope @ slope)
-        offset_rad = min(max(offset_rad - step, -_OFFSETS_RAD), _OFFSETS_RAD)
+    for _ in range(_MAX_ITERATIONS):
+        delta_rad = 1e-5
+        residual_n = _solve(geometry, offset_rad, counts, external_n, motor_units)[1]
+        slope = (_solve(geometry, offset_rad + delta_rad, counts, external_n, motor_units)[1] - residual_n) / delta_rad
+        step = float(slope @ residual_n) / float(slope @ slope)
+        offset_rad = min(max(offset_rad - step, -_MAX_OFFSET_RAD), _MAX_OFFSET_RAD)
         if abs(step) < 1e-9:
             break
-    (share, own_n), left = _solve(geometry, offset_rad, counts, pulled_n, held)
-    gain = 1.0 / share if share else math.inf
-    if not _GAINS[0] <= gain <= _GAINS[1] or abs(offset_rad) >= _OFFSETS_RAD:
+    (inverse_gain, own_n), residual_n = _solve(geometry, offset_rad, counts, external_n, motor_units)
+    gain = 1.0 / inverse_gain if inverse_gain else math.inf
+    if not _GAINS[0] <= gain <= _GAINS[1] or abs(offset_rad) >= _MAX_OFFSET_RAD:
         raise DeviceError(
             f"these weights imply {gain:.0f} motor units per newton metre and an arm offset of "
             f"{math.degrees(offset_rad):.1f} degrees; only {_GAINS[0]:.0f} to {_GAINS[1]:.0f} units and less than 15 "
             "degrees are plausible: check the weights, and make sure that nothing is touching the grip"
         )
-    residual_n = math.sqrt(float(left @ left) / len(counts))
+    rms_residual_n = math.sqrt(float(residual_n @ residual_n) / len(counts))
     day = (measured or date.today()).isoformat()
     return Calibration(
         geometry=geometry.name,
         units_per_nm=gain,
         arm_offset_rad=offset_rad,
         own_weight_n=float(own_n),
-        residual_n=residual_n,
+        residual_n=rms_residual_n,
         poses=len(counts),
         measured=day,
     )
@@ -128,31 +134,33 @@ def fit(
 
 def residual_forces(calibration: Calibration, poses: Any, forces_n: Any, units: Any) -> Any:
     """Return the residual forces (n, 3) [N] of ``calibration``; arguments as for `fit`."""
-    counts, pulled_n, held = (np.asarray(given, np.float64) for given in (poses, forces_n, units))
-    return _solve(mechanics.geometry_named(calibration.geometry), calibration.arm_offset_rad, counts, pulled_n, held)[
-        1
-    ].reshape(-1, 3)
+    counts, external_n, motor_units = (np.asarray(values, np.float64) for values in (poses, forces_n, units))
+    return _solve(
+        mechanics.geometry_named(calibration.geometry), calibration.arm_offset_rad, counts, external_n, motor_units
+    )[1].reshape(-1, 3)
 
 
-def _solve(geometry: mechanics.Geometry, offset_rad: float, counts: Any, pulled_n: Any, held: Any) -> tuple[Any, Any]:
-    """Return the best (1 / gain, own weight) for an offset, and the residual forces, flat [N]."""
+def _solve(
+    geometry: mechanics.Geometry, offset_rad: float, counts: Any, external_n: Any, motor_units: Any
+) -> tuple[Any, Any]:
+    """Return the best (1 / gain, own weight) for an offset, and the residual forces as a flat array [N]."""
     mechanism = mechanics.new_mechanism(geometry, 1.0, offset_rad)
-    theta, place_m, rates = np.zeros(3), np.zeros(3), np.zeros((3, 3))
-    pushed = np.zeros((len(counts), 3))
+    theta, position_m, rates = np.zeros(3), np.zeros(3), np.zeros((3, 3))
+    motor_forces = np.zeros((len(counts), 3))
     for row, count in enumerate(counts):
         mechanics.angles(mechanism, count, theta)
-        place_m[:] = mechanics.START_M
-        if mechanics.forward(mechanism, theta, place_m) != mechanics.REACHED:
+        position_m[:] = mechanics.START_M
+        if mechanics.forward(mechanism, theta, position_m) != mechanics.REACHED:
             raise DeviceError(
                 f"pose {row + 1}: the encoder counts {count.astype(int).tolist()} are impossible with the geometry "
                 f"{geometry.name!r}"
             )
-        mechanics.jacobian(mechanism, theta, place_m, rates)
-        pushed[row] = -rates.T @ held[row]
+        mechanics.jacobian(mechanism, theta, position_m, rates)
+        motor_forces[row] = -rates.T @ motor_units[row]
     down = np.tile([0.0, -1.0, 0.0], len(counts))
-    design = np.column_stack([pushed.ravel(), down])
-    best = np.linalg.lstsq(design, -pulled_n.ravel(), rcond=None)[0]
-    return best, design @ best + pulled_n.ravel()
+    design = np.column_stack([motor_forces.ravel(), down])
+    solution = np.linalg.lstsq(design, -external_n.ravel(), rcond=None)[0]
+    return solution, design @ solution + external_n.ravel()
 
 
 def calibration_file(serial: str) -> Path:
@@ -170,11 +178,11 @@ def save_calibration(serial: str, calibration: Calibration) -> Path:
         The calibration cannot be written.
     """
     file = calibration_file(serial)
-    fresh = file.with_suffix(".new")
+    new_file = file.with_suffix(".new")
     try:
         file.parent.mkdir(parents=True, exist_ok=True)
-        fresh.write_text(json.dumps(asdict(calibration), indent=2) + "\n", encoding="utf-8", newline="\n")
-        fresh.replace(file)
+        new_file.write_text(json.dumps(asdict(calibration), indent=2) + "\n", encoding="utf-8", newline="\n")
+        new_file.replace(file)
     except OSError as error:
         raise DeviceError(
             f"the calibration cannot be saved in {file.parent}: {error.strerror}; set {FOLDER_VARIABLE} to a writable "
@@ -189,12 +197,14 @@ def load_calibration(serial: str) -> Calibration | None:
     try:
         calibration = Calibration(**json.loads(file.read_text(encoding="utf-8")))
         mechanics.geometry_named(calibration.geometry)
-        whole = _GAINS[0] <= calibration.units_per_nm <= _GAINS[1] and abs(calibration.arm_offset_rad) <= _OFFSETS_RAD
+        plausible = (
+            _GAINS[0] <= calibration.units_per_nm <= _GAINS[1] and abs(calibration.arm_offset_rad) <= _MAX_OFFSET_RAD
+        )
     except FileNotFoundError:
         return None
     except (OSError, ValueError, TypeError, RecursionError) as error:
         raise _unusable_file(file) from error
-    if not whole:
+    if not plausible:
         raise _unusable_file(file)
     return calibration
 
@@ -212,23 +222,23 @@ PLACES_M: Final = (
 )
 GRAVITY_MPS2: Final = 9.80665
 LEAST_N, MOST_N = 1.0, 6.0
-"""Range of loads that can be measured, and held in addition to the grip's own weight."""
+"""Range of loads that the grip can hold in addition to its own weight, and that can be measured."""
 
 _STIFFNESS_NPM = 600.0
 _DAMPING_NSPM = 8.0
 _SMOOTHING_S = 0.005
-_PACE_MPS = 0.05
-_BESIDE_M = 0.005
+_SPEED_MPS = 0.05
+_APPROACH_M = 0.005
 _TICK_S = 0.001
 _STILL_MPS = 0.002
 _STILL_TICKS = 300
-_PATIENCE_S = 6.0
-_BLIND_TICKS = 20
-_WEIGHED_TICKS = 300
+_MAX_SETTLING_S = 6.0
+_MAX_BLIND_TICKS = 20
+_AVERAGED_TICKS = 300
 
 Ask = Callable[[str, str], Callable[[], str | None]]
-"""(the request: "let-go", "hang", "pull", "reading" or "take-off"; its text) -> a function that returns None until the
-operator has answered, then the answer."""
+"""Asks the operator: takes the kind of request ("let-go", "hang", "pull", "reading" or "take-off") and its text, and
+returns a function that returns None until the operator has answered, then the answer."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -245,7 +255,7 @@ class Grip:
 
     Parameters
     ----------
-    device : open and homed
+    device : an open and homed Falcon
     virtual : whether time is counted in ticks instead of read from the clock
     """
 
@@ -261,7 +271,7 @@ class Grip:
         self._velocity_mps = np.zeros(3)
         self._target_m: Any = None
         self._blind = 0
-        for _ in range(_BLIND_TICKS):
+        for _ in range(_MAX_BLIND_TICKS):
             self.tick()
         self._target_m = self._place_m.copy()
 
@@ -293,13 +303,13 @@ class Grip:
         self._asked_n[:] = self._sent_n[:] = self._force_n()
         device.write.ctypes(device.context, command)
 
-    def _update_motion(self, place_m: Any, elapsed_s: float) -> None:
-        moved = (place_m - self._place_m) / elapsed_s
-        self._velocity_mps += (moved - self._velocity_mps) * elapsed_s / (_SMOOTHING_S + elapsed_s)
-        self._place_m[:] = place_m
+    def _update_motion(self, position_m: Any, elapsed_s: float) -> None:
+        moved_mps = (position_m - self._place_m) / elapsed_s
+        self._velocity_mps += (moved_mps - self._velocity_mps) * elapsed_s / (_SMOOTHING_S + elapsed_s)
+        self._place_m[:] = position_m
 
     def _force_n(self) -> Any:
-        if self._target_m is None or self._blind > _BLIND_TICKS:
+        if self._target_m is None or self._blind > _MAX_BLIND_TICKS:
             return np.zeros(3)
         force_n = _STIFFNESS_NPM * (self._target_m - self._place_m) - _DAMPING_NSPM * self._velocity_mps
         size = float(np.linalg.norm(force_n))
@@ -313,17 +323,17 @@ class Grip:
 
     def move_to(self, place_m: Any) -> None:
         """Move the grip slowly to a position and wait until it rests there, possibly displaced by its load."""
-        way = np.asarray(place_m) - self._target_m
-        ticks = max(int(np.linalg.norm(way) / (_PACE_MPS * _TICK_S)), 1)
-        began = self._target_m.copy()
+        path_m = np.asarray(place_m) - self._target_m
+        ticks = max(int(np.linalg.norm(path_m) / (_SPEED_MPS * _TICK_S)), 1)
+        start_m = self._target_m.copy()
         for k in range(ticks):
-            self._target_m = began + way * ((k + 1) / ticks)
+            self._target_m = start_m + path_m * ((k + 1) / ticks)
             self.tick()
-        still = 0
-        for _ in range(round(_PATIENCE_S / _TICK_S)):
+        still_ticks = 0
+        for _ in range(round(_MAX_SETTLING_S / _TICK_S)):
             self.tick()
-            still = still + 1 if np.linalg.norm(self._velocity_mps) < _STILL_MPS else 0
-            if still >= _STILL_TICKS:
+            still_ticks = still_ticks + 1 if np.linalg.norm(self._velocity_mps) < _STILL_MPS else 0
+            if still_ticks >= _STILL_TICKS:
                 return
         raise DeviceError(
             "the grip has not come to rest: make sure that nothing is touching it, hang the weight on a short "
@@ -333,12 +343,12 @@ class Grip:
     def weigh(self) -> tuple[Any, Any]:
         """Return the mean encoder counts and motor units (each (3,)) over some tenths of a second."""
         counts, units = np.zeros(3), np.zeros(3)
-        for _ in range(_WEIGHED_TICKS):
+        for _ in range(_AVERAGED_TICKS):
             self.tick()
-            held_at, held_with = self._device.held
-            counts += held_at
-            units += held_with
-        return counts / _WEIGHED_TICKS, units / _WEIGHED_TICKS
+            encoder_counts, motor_units = self._device.held
+            counts += encoder_counts
+            units += motor_units
+        return counts / _AVERAGED_TICKS, units / _AVERAGED_TICKS
 
 
 def measure_with_weight(grip: Grip, weight_n: float, ask: Ask) -> Notes:
@@ -364,10 +374,10 @@ def measure_with_weight(grip: Grip, weight_n: float, ask: Ask) -> Notes:
 
 def _measure_round(grip: Grip, load_n: float) -> list[tuple[Any, float, Any]]:
     notes = []
-    for place in PLACES_M:
+    for position in PLACES_M:
         for side in (1.0, -1.0):
-            grip.move_to(np.add(place, (0.0, side * _BESIDE_M, 0.0)))
-            grip.move_to(place)
+            grip.move_to(np.add(position, (0.0, side * _APPROACH_M, 0.0)))
+            grip.move_to(position)
             counts, units = grip.weigh()
             notes.append((counts, load_n, units))
     return notes
@@ -377,8 +387,8 @@ def measure_with_scale(grip: Grip, ask: Ask) -> Notes:
     """Measure at each position without load and then with an operator's pull on a scale; return the measurements."""
     notes: list[tuple[Any, float, Any]] = []
     grip.wait(ask("let-go", "Let go of the grip; it will hold itself in place and move slowly. Keep clear of it."))
-    for number, place in enumerate(PLACES_M, start=1):
-        grip.move_to(place)
+    for number, position in enumerate(PLACES_M, start=1):
+        grip.move_to(position)
         counts, units = grip.weigh()
         notes.append((counts, 0.0, units))
         request = (

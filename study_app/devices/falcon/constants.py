@@ -1,7 +1,7 @@
 """Numbers of the Falcon's wire protocol: the USB bridge (FTDI FT232R), the boot loader and the 16-byte packets.
 
 Sources: FTDI AN232B-04 and the FT232R data sheet; TI SPRUI33 (boot ROM of the TMS320C28x); libnifalcon's documentation
-of the protocol (BSD). Loads neither the compiler nor a driver.
+of the protocol (BSD). Importing this module loads neither the compiler nor a driver.
 """
 
 from typing import Final

@@ -1,7 +1,7 @@
-"""The Falcon's driver: opened with its firmware loaded, homed with instructions, and guarded; closed without torque.
+"""The Falcon's driver: opening it loads the firmware, guides the homing and starts the guard; closing it ends torque.
 
-Arms find their index while the grip is pushed in; before that the encoder counts have no known origin, so no force is
-sent. The out-stroke afterwards confirms the positions, and that the hand is where the force fades in.
+The arms find their index while the grip is pushed in. Before that, the encoder counts have no known origin, so no force
+is sent. The out-stroke that follows confirms the positions, and that the hand is where the force fades in.
 """
 
 from collections.abc import Callable, Mapping
@@ -23,14 +23,14 @@ from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.layout import new_command, new_reading
 
 PATIENCE_S: Final = 120.0
-_ADVICES: Final = 6  # number of advice lines in that time
-_MOVED: Final = 60  # counts of an arm that show motion of the grip: two degrees
+_REMINDERS: Final = 6  # number of reminders in that time
+_MOVED_COUNTS: Final = 60  # counts by which an arm must turn to count as motion of the grip: two degrees
 STROKES: Final = "Homing (red light): pull the Falcon's grip all the way out, then push it all the way in."
 PULL_OUT: Final = "Homed (blue light): now pull the grip all the way out once more."
 READY: Final = "The Falcon is ready (green light)."
-_FARTHEST = 1700  # counts, slightly more than are used in practice
-_STILL_M = 5e-6  # a third of the least effect of one encoder count
-_BEGIN = 100  # samples until positions are those of the grip
+_MAX_COUNTS = 1700  # counts, slightly more than occur in practice
+_FROZEN_M = 5e-6  # a third of the least effect of one encoder count
+_SKIPPED_SAMPLES = 100  # samples before positions are those of the grip
 
 
 class FalconDevice(FramedDevice):
@@ -39,8 +39,8 @@ class FalconDevice(FramedDevice):
     Parameters
     ----------
     serial : serial number of its bridge; "": the first one
-    firmware : file of its program, which it needs after power-on
-    geometry : published dimensions, unless a calibration has others
+    firmware : firmware file, needed after power-on
+    geometry : name of published dimensions; those of a calibration have precedence
     progress : receives instructions while it is opened, one line at a time
     cancelled : returns during homing whether to stop
     patience_s : time limit of homing [s]
@@ -93,10 +93,10 @@ class FalconDevice(FramedDevice):
         serial = connection.serial
         facts: dict[str, Any] = {"serial": serial, "firmware": self._run_firmware(connection)}
         round_trip_s, event_character = boot.choose_event_character(connection)
-        used = calibration.load_calibration(serial) if serial else None
-        geometry = self._geometry if used is None else mechanics.geometry_named(used.geometry)
-        gain = calibration.UNCALIBRATED_UNITS_PER_NM if used is None else used.units_per_nm
-        mechanism = mechanics.new_mechanism(geometry, gain, 0.0 if used is None else used.arm_offset_rad)
+        stored = calibration.load_calibration(serial) if serial else None
+        geometry = self._geometry if stored is None else mechanics.geometry_named(stored.geometry)
+        gain = calibration.UNCALIBRATED_UNITS_PER_NM if stored is None else stored.units_per_nm
+        mechanism = mechanics.new_mechanism(geometry, gain, 0.0 if stored is None else stored.arm_offset_rad)
         self._dynamics = Dynamics(
             delay_s=round_trip_s,
             count_m=mechanics.count_at(mechanism, geometry.centre_m),
@@ -106,25 +106,28 @@ class FalconDevice(FramedDevice):
         self.memory[:] = exchange.new_exchange(connection.calls(), mechanism, geometry, self.force_limit_n)
         self._start_guard(connection.name)
         self._home(connection)
-        self._begin_anew()
-        calibrated = "none" if used is None else used.describe()
+        self._restart_fade()
+        calibrated = "none" if stored is None else stored.describe()
         facts |= {"geometry": geometry.name, "calibration": calibrated, "units_per_nm": gain}
         return facts | event_character
 
     def _finish(self, connection: Transport) -> AtClose:
-        """Send zero torque several times, if it was used."""
+        """Send zero torque several times, if the exchange was used."""
         falcon = self.exchange
-        gone = falcon.ended == exchange.BRIDGE_LOST
-        pushing = gone and bool(falcon.units.any())
-        used, falcon.handle = bool(falcon.handle), 0
-        quieted = not used or send_zero_torque(connection) > 0
-        if quieted:
+        is_gone = falcon.ended == exchange.BRIDGE_LOST
+        may_push = is_gone and bool(falcon.units.any())
+        was_used, falcon.handle = bool(falcon.handle), 0
+        force_ended = not was_used or send_zero_torque(connection) > 0
+        if force_ended:
             falcon.sent_n = 0.0
-        return "leave" if pushing else "stand_down" if quieted or gone else "release"
+        return "leave" if may_push else "stand_down" if force_ended or is_gone else "release"
 
     @property
     def failure_mode(self) -> str | None:
-        """The id of the failure that ended the exchange; without positions from homed bits and transfer errors."""
+        """The id of the failure that ended the exchange.
+
+        If there are no new positions, the homed bits and the transfer errors tell why.
+        """
         mode, state = super().failure_mode, self.exchange
         if mode != self.silent:
             return mode
@@ -134,34 +137,34 @@ class FalconDevice(FramedDevice):
 
     @property
     def held(self) -> tuple[Any, Any]:
-        """The encoder counts of its last reply and its last torque command in motor units, each (3,)."""
+        """The encoder counts of the last reply and the last torque command in motor units, each (3,)."""
         return self.exchange.status.encoders.copy(), self.exchange.units.copy()
 
     def describe(self) -> dict[str, Any]:
         return super().describe() | {"delay_ticks": int(self.exchange.delay)}
 
     def observed(self) -> tuple[str, ...]:
-        facts, serial = self.found, self.found["serial"]
-        used = facts["calibration"]
+        facts, serial_number = self.found, self.found["serial"]
+        calibration_facts = facts["calibration"]
         return (
-            f"opened, serial number {serial}" if serial else "opened",
+            f"opened, serial number {serial_number}" if serial_number else "opened",
             f"program: {facts['firmware']}",
             f"round trip {min(facts['round_trip_ms'].values()):.2f} ms; event character "
             f"{'kept' if facts['event_character'] else 'not used'}",
-            f"calibration: {used['measured'] if isinstance(used, dict) else 'none'}",
+            f"calibration: {calibration_facts['measured'] if isinstance(calibration_facts, dict) else 'none'}",
             f"incomplete replies: {self._broken_share:.2%}",
         )
 
     def appeared(self, samples: Any) -> set[str]:
         if self.failure_mode is not None:
             return {self.failure_mode}
-        moved_m = np.ptp(samples["position_m"][_BEGIN:], axis=0).max()
-        shown = {
-            "frozen": moved_m <= _STILL_M,
+        moved_m = np.ptp(samples["position_m"][_SKIPPED_SAMPLES:], axis=0).max()
+        detected = {
+            "frozen": moved_m <= _FROZEN_M,
             "broken-packets": self._broken_share > MOST_BROKEN,
             "slow": min(self.found["round_trip_ms"].values()) >= 1000 * LONGEST_ROUND_TRIP_S,
         }
-        return {mode for mode, seen in shown.items() if seen}
+        return {mode for mode, is_present in detected.items() if is_present}
 
     @property
     def _broken_share(self) -> float:
@@ -177,13 +180,13 @@ class FalconDevice(FramedDevice):
                 mechanics.inverse(mechanism, np.add(corner, [0.0, 0.0, self._geometry.centre_m]), theta)
                 == mechanics.REACHED
             )
-            if not reached or np.abs((theta - mechanism.zero_rad) / mechanism.rad_per_count).max() > _FARTHEST:
-                asked, known = (
+            if not reached or np.abs((theta - mechanism.zero_rad) / mechanism.rad_per_count).max() > _MAX_COUNTS:
+                requested, reachable = (
                     " x ".join(f"{2000 * half:g}" for half in size)
                     for size in (self.workspace_m, mechanics.WORKSPACE_M)
                 )
                 raise DeviceError(
-                    f"a workspace of {asked} mm exceeds a Falcon's reach (about {known} mm): reduce the "
+                    f"a workspace of {requested} mm exceeds a Falcon's reach (about {reachable} mm): reduce the "
                     f"protocol's workspace_mm"
                 )
 
@@ -206,32 +209,32 @@ class FalconDevice(FramedDevice):
     def _home(self, transport: Transport) -> None:
         """Run ticks without force until all arms are homed and the grip was pulled out once more."""
         falcon = self.exchange
-        began_s = advised_s = transport.now_s()
+        began_s = reminded_s = transport.now_s()
         lowest, highest = np.zeros(3), np.zeros(3)
-        announced = False
+        pull_out_announced = False
         self._progress(STROKES)
         while not falcon.pulled_out:
             self._tick()
             counts = falcon.status.encoders
             if falcon.status.count <= 1:
                 lowest, highest = counts.copy(), counts.copy()
-            elif falcon.status.homed != ALL_HOMED:  # the origin jumps when an arm is homed: that is not motion
+            elif falcon.status.homed != ALL_HOMED:  # not afterwards: homing an arm shifts its origin
                 lowest, highest = np.minimum(lowest, counts), np.maximum(highest, counts)
-            if falcon.homed and not announced:
-                announced = True
+            if falcon.homed and not pull_out_announced:
+                pull_out_announced = True
                 self._progress(PULL_OUT)
-            moved = (highest - lowest).max() > _MOVED
-            mode = "power" if falcon.status.count == 0 else "stroke-in" if moved else "frozen"
+            has_moved = (highest - lowest).max() > _MOVED_COUNTS
+            mode = "power" if falcon.status.count == 0 else "stroke-in" if has_moved else "frozen"
             if falcon.homed:
                 mode = "stroke-out"
             if transport.now_s() - began_s > self._patience_s:
                 raise FAILURES.failure(mode)
-            if transport.now_s() - advised_s > self._patience_s / _ADVICES:
-                advised_s = transport.now_s()
+            if transport.now_s() - reminded_s > self._patience_s / _REMINDERS:
+                reminded_s = transport.now_s()
                 self._progress(f"Still homing: {FAILURES.sentence(mode)}.")
         self._progress(READY)
 
-    def _begin_anew(self) -> None:
+    def _restart_fade(self) -> None:
         """Fade the force in over half a second from the next tick onwards, and reset the counters."""
         self.exchange.share = 0.0
         self.exchange.started = 0

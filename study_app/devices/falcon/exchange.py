@@ -1,13 +1,14 @@
 """The Falcon's compiled tick: read the reply to the last packet, return the grip's position, send the next torques.
 
-The servo limits the change of its force, except when its passivity controller reduces force or adds damping. So does
-the driver: after packets that were not sent, or for a caller without such a limit, a force grows by at most the servo's
-slew limit per tick; reductions, and forces that take energy from the moving grip, pass at once.
+The servo limits the change of its force, except when its passivity controller reduces the force or adds damping. The
+driver does the same, for the case that packets were not sent or that the caller has no such limit: a force grows by at
+most the servo's slew limit per tick. Reductions, and forces that take energy from the moving grip, pass at once.
 
-The device answers each packet with one, so `_read` collects the reply to the last tick's packet, and `_write` sends the
-force as soon as it is known; a position is one tick old. Of several replies the newest counts; without one there is no
-new position, and none is returned twice. Force is enabled after all arms are homed and the grip was pulled out once,
-and then fades in over half a second. ``replies`` decides which replies are accepted.
+The device answers each packet with one packet, so `_read` collects the reply to the packet of the last tick, and
+`_write` sends the force as soon as it is known; a position is therefore one tick old. If there are several replies, the
+newest is used; if there is none, there is no new position, and no position is returned twice. The force is enabled once
+all arms are homed and the grip was pulled out, and then fades in over half a second. ``replies`` decides which replies
+are accepted.
 """
 
 import math
@@ -40,20 +41,20 @@ from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.layout import READING, records
 from study_app.haptics.model.slope_limits import SLEW_S, slew_limit_n
 
-_MOST_WAITING_N: Final = 0.5
-"""Greatest difference between a force and the motors' present force at which a delay measurement may omit it."""
+_MAX_WAITING_N: Final = 0.5
+"""Greatest difference between a force and the motors' current force with which it need not be sent at once."""
 
-_SHORTEST_TICK_S: Final = 1e-3
-_LONGEST_TICK_S: Final = 4e-3
-"""Time that limits the growth of a force in a tick, even if the tick is late."""
+_MIN_TICK_S: Final = 1e-3
+_MAX_TICK_S: Final = 4e-3
+"""Limits of the tick duration that is used for the growth of a force, however late the tick is."""
 
 
 @kernel
 def set_motor_units(falcon: Any) -> None:
     """Convert ``force_n``, limited by the gate, into motor ``units``.
 
-    ``held_n`` is then the motors' force until the next command at the grip's current position, and ``sent_n`` the force
-    after it [N].
+    Afterwards ``held_n`` is the force of the previous units at the grip's current position, and ``sent_n`` that of the
+    new units [N].
     """
     mechanics.jacobian(falcon.mechanism, falcon.theta, falcon.position_m, falcon.rates)
     _motor_force(falcon, falcon.held_n)
@@ -63,9 +64,9 @@ def set_motor_units(falcon: Any) -> None:
 
 @kernel
 def can_wait(falcon: Any) -> bool:
-    """Return whether the motors may keep their force for a tick: it is close to the requested non-zero force."""
-    near: bool = square_distance(falcon.sent_n, falcon.held_n) <= _MOST_WAITING_N * _MOST_WAITING_N
-    return near and (square(falcon.sent_n) > 0.0 or square(falcon.held_n) == 0.0)
+    """Return whether the motors may keep their force for a tick, since it is close to the requested non-zero force."""
+    is_close: bool = square_distance(falcon.sent_n, falcon.held_n) <= _MAX_WAITING_N * _MAX_WAITING_N
+    return is_close and (square(falcon.sent_n) > 0.0 or square(falcon.held_n) == 0.0)
 
 
 @kernel
@@ -83,8 +84,8 @@ def _motor_force(falcon: Any, force_n: Any) -> None:
 def _choose_units(falcon: Any) -> None:
     for axis in range(3):
         falcon.force_n[axis] *= falcon.share
-    none = square(falcon.force_n) == 0.0
-    if none or falcon.homed == 0 or falcon.unguarded != 0:
+    is_zero = square(falcon.force_n) == 0.0
+    if is_zero or falcon.homed == 0 or falcon.unguarded != 0:
         for i in range(3):
             falcon.units[i] = 0
         return
@@ -97,11 +98,11 @@ def _choose_units(falcon: Any) -> None:
 @kernel
 def _limit_to_rounding(falcon: Any) -> None:
     """Keep ``force_n`` below the limit by the rounding error, which grows toward the edge of the reach."""
-    most_n = max(falcon.force_limit_n - mechanics.rounding_at(falcon.mechanism, falcon.rates), 0.0)
-    if square(falcon.force_n) > most_n * most_n:
-        shorter = most_n / math.sqrt(square(falcon.force_n))
+    max_n = max(falcon.force_limit_n - mechanics.rounding_at(falcon.mechanism, falcon.rates), 0.0)
+    if square(falcon.force_n) > max_n * max_n:
+        factor = max_n / math.sqrt(square(falcon.force_n))
         for axis in range(3):
-            falcon.force_n[axis] *= shorter
+            falcon.force_n[axis] *= factor
 
 
 @kernel
@@ -112,53 +113,53 @@ def limit_growth(falcon: Any) -> None:
     drops at once and grows in steps. A grip slower than ``SURE_MPS`` may be encoder noise, and is not braked.
     """
     held_n, force_n, v_mps = falcon.held_n, falcon.force_n, falcon.velocity_mps
-    kept = 0.0
+    kept_share = 0.0
     if square(held_n) > 0.0:
-        kept = min(max(dot(force_n, held_n) / square(held_n), 0.0), 1.0)
+        kept_share = min(max(dot(force_n, held_n) / square(held_n), 0.0), 1.0)
     braking = 0.0  # [N s/m]
     if square(v_mps) > SURE_MPS * SURE_MPS:
-        braking = min((dot(force_n, v_mps) - kept * dot(held_n, v_mps)) / square(v_mps), 0.0)
-    square_n2 = 0.0
+        braking = min((dot(force_n, v_mps) - kept_share * dot(held_n, v_mps)) / square(v_mps), 0.0)
+    new_n2 = 0.0
     for axis in range(3):
-        square_n2 += (force_n[axis] - kept * held_n[axis] - braking * v_mps[axis]) ** 2
-    asked_n2 = square(force_n)
-    most_n = falcon.slew_n_per_s * min(max(falcon.tick_s, _SHORTEST_TICK_S), _LONGEST_TICK_S)
-    if square_n2 > most_n * most_n:
-        share = most_n / math.sqrt(square_n2)
+        new_n2 += (force_n[axis] - kept_share * held_n[axis] - braking * v_mps[axis]) ** 2
+    requested_n2 = square(force_n)
+    max_step_n = falcon.slew_n_per_s * min(max(falcon.tick_s, _MIN_TICK_S), _MAX_TICK_S)
+    if new_n2 > max_step_n * max_step_n:
+        new_share = max_step_n / math.sqrt(new_n2)
         for axis in range(3):
-            given_n = kept * held_n[axis] + braking * v_mps[axis]
-            force_n[axis] = given_n + share * (force_n[axis] - given_n)
-        shorter = math.sqrt(min(asked_n2 / max(square(force_n), asked_n2), 1.0))
+            base_n = kept_share * held_n[axis] + braking * v_mps[axis]
+            force_n[axis] = base_n + new_share * (force_n[axis] - base_n)
+        shrink = math.sqrt(min(requested_n2 / max(square(force_n), requested_n2), 1.0))
         for axis in range(3):  # the previous force may be greater, or the braking part may have another direction
-            force_n[axis] *= shorter
+            force_n[axis] *= shrink
 
 
 FORCE_LIMIT_N: Final = 8.0
 LEAST_MASS_KG: Final = 0.1
-"""The least effective mass at the grip in any direction [kg], about that of arms and platform of this size. Nobody
-published a measured value; the limits of the loop are held for 30 to 250 g."""
+"""The least effective mass at the grip in any direction [kg], about that of arms and platform of this size. No
+measured value is published; the loop stays within its limits for 30 to 250 g."""
 _RAMP_S: Final = 0.5
 _SMOOTHING_S: Final = 2e-3
-"""Time constant of the grip's velocity, which separates a braking force from a driving one."""
+"""Time constant of the grip's velocity, which distinguishes a braking force from a driving one."""
 BRIDGE_LOST: Final = FIRST_CAUSE
-_LONGEST_GAP_NS: Final = 20_000_000
-"""Greatest waiting time of a reply before the loop reads it: older ones are not used."""
-_BEYOND = 2  # consecutive positions that show an out-stroke, since a single one may come from a corrupted packet
-_READS = 2  # most reads of the bridge per tick: an answer may contain only status bytes
+_MAX_GAP_NS: Final = 20_000_000
+"""Longest time between two ticks; after a longer one the waiting replies are too old to be used."""
+_OUT_STROKE_POSITIONS = 2  # consecutive positions that prove it, since a single packet may be corrupted
+_MAX_READS = 2  # greatest number of reads per tick: a read may return only status bytes
 _TIMEOUT_MS = 1
 _NORM_SLACK = 1.001
-_DATA = 4 * constants.USB_PACKET
+_DATA_BYTES = 4 * constants.USB_PACKET
 
 _FALCON = np.dtype(
     [
-        *COMMON,  # the force sent: at the grip's place at the last command
+        *COMMON,  # sent_n: the force at the grip's position at the last command
         ("handle", np.intp),  # of the bridge, and
         ("transfer", np.intp),  # address of its function (``bulk.BULK``)
         ("mechanism", mechanics.MECHANISM),
         ("centre_m", np.float64),  # z of the hand's origin in the Falcon's frame
         ("started", np.int64),  # 1 after the first tick
         # the stream
-        ("data", np.uint8, (_DATA,)),
+        ("data", np.uint8, (_DATA_BYTES,)),
         ("packet", np.uint8, (constants.PACKET,)),
         ("transferred", np.int32),
         ("parser", replies.PARSER),
@@ -282,20 +283,20 @@ def _read(context: int, now_ns: int, reading: int) -> int:
 
 
 def _write(context: int, command: int) -> int:
-    falcon, asked = _falcon_at(context), command_at(command)
+    falcon, record = _falcon_at(context), command_at(command)
     answer = READ_LOST
     if enter(falcon):
-        answer = _send_force(falcon, context, asked.force_n)
+        answer = _send_force(falcon, context, record.force_n)
         if closed_during_call(falcon):
             finish(falcon, context)
         leave(falcon)
-    copy(falcon.sent_n, asked.sent_n)
+    copy(falcon.sent_n, record.sent_n)
     return answer
 
 
 @kernel
 def finish(falcon: Any, context: int) -> None:
-    """Send zero torque."""
+    """End the exchange with zero torque."""
     clear(falcon.force_n)
     _send_packet(falcon, context)
 
@@ -311,7 +312,7 @@ def _take_reply(falcon: Any, context: int, now_ns: int, out: Any) -> int:
     packets = _receive(falcon, context)
     if falcon.ended != RUNS or falcon.unguarded != 0:
         return READ_LOST
-    gap = falcon.started == 0 or elapsed_ns <= 0 or elapsed_ns > _LONGEST_GAP_NS
+    gap = falcon.started == 0 or elapsed_ns <= 0 or elapsed_ns > _MAX_GAP_NS
     falcon.started = 1
     if gap:
         falcon.posed_ns = 0
@@ -325,7 +326,7 @@ def _take_reply(falcon: Any, context: int, now_ns: int, out: Any) -> int:
     if not (replies.take_status(falcon) and replies.is_plausible(falcon) and _locate(falcon)):
         falcon.refused += 1
         return READ_NOTHING_NEW
-    _follow(falcon)
+    _update_velocity(falcon)
     _open_gate(falcon, elapsed_ns * 1e-9)
     for axis in range(3):
         out.position_m[axis] = falcon.position_m[axis]
@@ -340,8 +341,8 @@ def _take_reply(falcon: Any, context: int, now_ns: int, out: Any) -> int:
 
 @kernel
 def _send_force(falcon: Any, context: int, force_n: Any) -> int:
-    most_n = _NORM_SLACK * falcon.force_limit_n
-    if square(force_n) <= most_n * most_n:
+    max_n = _NORM_SLACK * falcon.force_limit_n
+    if square(force_n) <= max_n * max_n:
         copy(force_n, falcon.force_n)
     else:  # nor NaN: the servo sends neither
         clear(falcon.force_n)
@@ -354,11 +355,11 @@ def _send_packet(falcon: Any, context: int) -> None:
     """Send ``force_n`` or, to measure the delay, keep the motors' force; ``sent_n`` is the force actually sent."""
     before = falcon.units[0], falcon.units[1], falcon.units[2]
     set_motor_units(falcon)
-    waits = falcon.testing > 0 and can_wait(falcon)
-    if falcon.testing > 0 and not waits:
+    keep_force = falcon.testing > 0 and can_wait(falcon)
+    if falcon.testing > 0 and not keep_force:
         replies.give_up_measurement(falcon)
     replies.pack(falcon.units, _lights(falcon), falcon.packet)
-    if waits or not _send(falcon, context):
+    if keep_force or not _send(falcon, context):
         falcon.units[0], falcon.units[1], falcon.units[2] = before
         copy(falcon.held_n, falcon.sent_n)
 
@@ -375,14 +376,14 @@ def _lights(falcon: Any) -> int:
 def _receive(falcon: Any, context: int) -> Any:
     """Read the bridge's bytes; return the number of packets."""
     packets = 0
-    for _ in range(_READS):
+    for _ in range(_MAX_READS):
         falcon.transferred = 0
         code = _transfer(
             falcon.transfer,
             falcon.handle,
             np.uint8(constants.ENDPOINT_IN),
             np.intp(context + _DATA_AT),
-            np.int32(_DATA),
+            np.int32(_DATA_BYTES),
             np.intp(context + _TRANSFERRED_AT),
             np.uint32(_TIMEOUT_MS),
         )
@@ -392,9 +393,9 @@ def _receive(falcon: Any, context: int) -> Any:
         if code not in (constants.SUCCESS, constants.ERROR_TIMEOUT):
             falcon.read_errors += 1
             break
-        kept = replies.strip(falcon.data, falcon.transferred, falcon.data)
-        packets += replies.feed(falcon.parser, falcon.data, kept, falcon.status)
-        if kept > 0 and falcon.parser.held > 0:
+        length = replies.strip(falcon.data, falcon.transferred, falcon.data)
+        packets += replies.feed(falcon.parser, falcon.data, length, falcon.status)
+        if length > 0 and falcon.parser.held > 0:
             falcon.cut_short += 1
         if packets > 0:
             break
@@ -414,13 +415,13 @@ def _locate(falcon: Any) -> bool:
 
 
 @kernel
-def _follow(falcon: Any) -> None:
+def _update_velocity(falcon: Any) -> None:
     interval_s = (falcon.now_ns - falcon.posed_ns) * 1e-9
-    known, weight = falcon.posed_ns != 0, interval_s / (interval_s + _SMOOTHING_S)
+    is_tracked, weight = falcon.posed_ns != 0, interval_s / (interval_s + _SMOOTHING_S)
     for axis in range(3):
         moved_mps = (falcon.position_m[axis] - falcon.previous_m[axis]) / interval_s
         falcon.velocity_mps[axis] += weight * (moved_mps - falcon.velocity_mps[axis])
-        if not known:
+        if not is_tracked:
             falcon.velocity_mps[axis] = 0.0
         falcon.previous_m[axis] = falcon.position_m[axis]
     falcon.posed_ns = falcon.now_ns
@@ -429,7 +430,7 @@ def _follow(falcon: Any) -> None:
 @kernel
 def _open_gate(falcon: Any, elapsed_s: float) -> None:
     falcon.beyond = falcon.beyond + 1 if falcon.position_m[2] > mechanics.OUT_STROKE_M else 0
-    if falcon.beyond >= _BEYOND:
+    if falcon.beyond >= _OUT_STROKE_POSITIONS:
         falcon.pulled_out = 1
     if falcon.pulled_out != 0:
         falcon.share = min(falcon.share + elapsed_s / _RAMP_S, 1.0)

@@ -1,7 +1,7 @@
-"""What can go wrong with a Falcon, on each system.
+"""The failure modes of a Falcon on each system.
 
-Collected from what owners of Falcons reported of other drivers, and from the documentation of FTDI, libusb and systemd;
-none was seen by us on a Falcon. Loads neither the compiler nor a driver.
+They were collected from reports of owners of Falcons about other drivers, and from the documentation of FTDI, libusb
+and systemd; none was observed by us on a Falcon. Importing this module loads neither the compiler nor a driver.
 """
 
 import sys
@@ -66,7 +66,7 @@ class UsbFailure(DeviceFailure):
         mode = modes.get(kind, "transfer" if kind in KINDS.values() and kind != "busy" else kind)
         libusb = "" if code is None else f", libusb error {code}"
         tables = FAILURES, failures_on("win32"), failures_on("linux")
-        table = next(table for table in tables if mode in {known.id for known in table.modes})
+        table = next(table for table in tables if mode in {entry.id for entry in table.modes})
         super().__init__(mode, str(table.failure(mode, f"while {where}{libusb}")))
 
 

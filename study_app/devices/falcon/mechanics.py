@@ -1,13 +1,13 @@
 """The Falcon's mechanics: published dimensions, the grip's position from arm angles, and torques from a force.
 
-Three published sets disagree, so they are data and the receipt names the one used. Frame of the Falcon: x right, y up,
-z toward the user, origin at the base [m]. Arms 1, 2, 3 are at the top, right and left, seen from the user. The frame of
-the hand is the same, moved so that its origin is ``centre_m`` in front of the base: there the tank of the protocols
-(100 x 60 x 60 mm) is reached with equal margin in and out.
+Three published sets of dimensions disagree, so they are data, and the receipt names the one used. The Falcon's frame
+has x to the right, y up, z toward the user, and its origin at the base [m]. Seen from the user, arms 1, 2 and 3 are at
+the top, right and left. The hand frame is the same, moved so that its origin is ``centre_m`` in front of the base,
+where the tank of the protocols (100 x 60 x 60 mm) is reached with equal margins in and out.
 
-Sources: ``libnifalcon`` and ``zm-redux``: libnifalcon's geometry of 2019 and of its branch of that name;
+Sources: ``libnifalcon`` and ``zm-redux``: libnifalcon's geometry of 2019, and of its branch with the name ``zm-redux``;
 ``martin-hillier``: Martin & Hillier, "Characterisation of the Novint Falcon Haptic Device for Application as a Robot
-Manipulator", ACRA 2009, at second hand.
+Manipulator", ACRA 2009, quoted from another source.
 
 For arm i at azimuth phi, with u, v, w as in `Geometry` and ``L = ends + sqrt(rod^2 - v^2)``::
 
@@ -16,7 +16,7 @@ For arm i at azimuth phi, with u, v, w as in `Geometry` and ``L = ends + sqrt(ro
 Inverse: ``theta = atan2(w, u) - arccos((u^2 + w^2 + a^2 - L^2) / (2 a sqrt(u^2 + w^2)))``, the branch with the elbow
 outside. Forward: Newton's method on the three g for p, from the position before. Statics, by virtual work: with
 ``J = d theta / d p = -(dg/dp) / (dg/d theta)`` the arm torques tau that hold the force F obey ``J^T tau = F``. The
-Jacobian was derived for this program: the widely used one has a wrong column for z.
+Jacobian was derived for this program, since the widely used one has a wrong column for z.
 """
 
 import itertools
@@ -60,8 +60,8 @@ class Geometry:
 
 
 GEOMETRIES: Final = {
-    known.name: known
-    for known in (
+    geometry.name: geometry
+    for geometry in (
         Geometry(
             name="libnifalcon",
             arm_m=0.060,
@@ -84,7 +84,7 @@ GEOMETRIES: Final = {
             drum_ratio=110 / 14.25,
             zero_rad=math.radians(35),
         ),
-        # Its lateral offsets have a sign convention of their own; their difference is about a millimetre.
+        # Its lateral offsets have another sign convention; only their difference, about a millimetre, is used.
         Geometry(
             name="martin-hillier",
             arm_m=0.060,
@@ -101,7 +101,7 @@ GEOMETRIES: Final = {
 DEFAULT_GEOMETRY: Final = "libnifalcon"
 
 OUT_STROKE_M: Final = 0.170
-"""The grip counts as pulled out beyond this z in the Falcon's frame: no force before that."""
+"""The grip counts as pulled out beyond this z in the Falcon's frame; before that there is no force."""
 
 SAFE_BOX_M: Final = ((-0.045, 0.045), (-0.045, 0.045), (0.085, 0.165))
 """Limits of x, y and z in the Falcon's frame within which the mechanism moves freely [m]."""
@@ -119,8 +119,8 @@ def geometry_named(name: str) -> Geometry:
         There is no geometry with this name.
     """
     if name not in GEOMETRIES:
-        known = ", ".join(GEOMETRIES)
-        raise DeviceError(f"{name!r} is not a known Falcon geometry; choose one of: {known}")
+        names = ", ".join(GEOMETRIES)
+        raise DeviceError(f"{name!r} is not a known Falcon geometry; choose one of: {names}")
     return GEOMETRIES[name]
 
 
@@ -147,13 +147,13 @@ OUTSIDE: Final = 1
 START_M: Final = (0.0, 0.0, 0.12)
 """Start position from which `forward` finds every pose of the workspace."""
 
-_STEPS = 30
-_LEAST_ROD_M = 1e-6  # projection of a rod across its arm
-_ENOUGH_M = 1e-12  # step at which Newton's method ends: the error is then of the order of rounding
+_MAX_STEPS = 30
+_MIN_ROD_M = 1e-6  # projection of a rod across its arm
+_CONVERGED_M = 1e-12  # length of the step at which Newton's method ends, with an error of the order of rounding
 
 
 def new_mechanism(geometry: Geometry, units_per_nm: float, arm_offset_rad: float = 0.0) -> Any:
-    """Return the record of a Falcon: published dimensions, and gain and offset of its calibration."""
+    """Return the record of a mechanism with these dimensions and the gain and offset of a calibration."""
     mechanism = records(MECHANISM, 1)[0]
     mechanism.arm_m, mechanism.rod_m, mechanism.ends_m = geometry.arm_m, geometry.rod_m, geometry.ends_m
     mechanism.base_m = geometry.base_m - geometry.platform_m
@@ -180,11 +180,11 @@ def inverse(mechanism: Any, position_m: Any, theta: Any) -> int:
     w = position_m[2]
     for i in range(3):
         u, v = _along(mechanism, i, position_m), _across(mechanism, i, position_m)
-        inside = mechanism.rod_m * mechanism.rod_m - v * v
+        projection_m2 = mechanism.rod_m * mechanism.rod_m - v * v
         distance = math.sqrt(u * u + w * w)
-        if not (inside > 0.0 and distance > 0.0):
+        if not (projection_m2 > 0.0 and distance > 0.0):
             return OUTSIDE
-        length = mechanism.ends_m + math.sqrt(inside)
+        length = mechanism.ends_m + math.sqrt(projection_m2)
         cosine = (distance * distance + a * a - length * length) / (2.0 * a * distance)
         if not -1.0 < cosine < 1.0:
             return OUTSIDE
@@ -213,7 +213,7 @@ def forward(mechanism: Any, theta: Any, position_m: Any) -> int:
 def _newton(mechanism: Any, theta: Any, x: float, y: float, z: float) -> tuple[float, float, float, int]:
     a0, a1, a2 = math.cos(theta[0]), math.cos(theta[1]), math.cos(theta[2])
     b0, b1, b2 = math.sin(theta[0]), math.sin(theta[1]), math.sin(theta[2])
-    for _ in range(_STEPS):
+    for _ in range(_MAX_STEPS):
         p = (x, y, z)
         g0, x0, y0, z0, turn0 = _constraint(mechanism, 0, a0, b0, p)
         g1, x1, y1, z1, turn1 = _constraint(mechanism, 1, a1, b1, p)
@@ -228,10 +228,10 @@ def _newton(mechanism: Any, theta: Any, x: float, y: float, z: float) -> tuple[f
         dz = (g0 * c0z + g1 * c1z + g2 * c2z) / determinant
         x, y, z = x - dx, y - dy, z - dz
         step = abs(dx) + abs(dy) + abs(dz)
-        if step < _ENOUGH_M:
-            folded = turn0 < 0.0 and turn1 < 0.0 and turn2 < 0.0
-            return x, y, z, REACHED if folded else OUTSIDE
-        if not step < 1.0:  # far away, or NaN: a rod does not reach
+        if step < _CONVERGED_M:
+            is_elbow_outside = turn0 < 0.0 and turn1 < 0.0 and turn2 < 0.0
+            return x, y, z, REACHED if is_elbow_outside else OUTSIDE
+        if not step < 1.0:  # far away or NaN: the pose is out of reach
             break
     return x, y, z, OUTSIDE
 
@@ -241,10 +241,12 @@ def jacobian(mechanism: Any, theta: Any, position_m: Any, rates: Any) -> None:
     """Write the rotation of arm i (row) per motion of the grip along x, y, z (column) into ``rates`` (3, 3) [rad/m]."""
     p = (position_m[0], position_m[1], position_m[2])
     for i in range(3):
-        _g, along_x, along_y, along_z, turn = _constraint(mechanism, i, math.cos(theta[i]), math.sin(theta[i]), p)
-        rates[i, 0] = -along_x / turn
-        rates[i, 1] = -along_y / turn
-        rates[i, 2] = -along_z / turn
+        _g, along_x, along_y, along_z, along_angle = _constraint(
+            mechanism, i, math.cos(theta[i]), math.sin(theta[i]), p
+        )
+        rates[i, 0] = -along_x / along_angle
+        rates[i, 1] = -along_y / along_angle
+        rates[i, 2] = -along_z / along_angle
 
 
 def count_at(mechanism: Any, z_m: float) -> float:
@@ -301,20 +303,20 @@ def motor_units(mechanism: Any, torque_nm: Any, units: Any) -> int:
     Commands that are too large are reduced by a common factor, so that the force keeps its direction. Torques that are
     not finite give zero.
     """
-    most = 0.0
+    greatest = 0.0
     for i in range(3):
-        most = max(most, abs(torque_nm[i] * mechanism.units_per_nm))
+        greatest = max(greatest, abs(torque_nm[i] * mechanism.units_per_nm))
         if not math.isfinite(torque_nm[i] * mechanism.units_per_nm):
-            most = math.inf
-    if not math.isfinite(most):
+            greatest = math.inf
+    if not math.isfinite(greatest):
         for i in range(3):
             units[i] = 0
         return 1
-    share = 1.0 if most <= MOST_TORQUE else MOST_TORQUE / most
+    factor = 1.0 if greatest <= MOST_TORQUE else MOST_TORQUE / greatest
     for i in range(3):
-        wanted = -mechanism.units_per_nm * torque_nm[i] * share
-        units[i] = int(min(max(math.floor(wanted + 0.5), -MOST_TORQUE), MOST_TORQUE))
-    return 0 if share == 1.0 else 1
+        command = -mechanism.units_per_nm * torque_nm[i] * factor
+        units[i] = int(min(max(math.floor(command + 0.5), -MOST_TORQUE), MOST_TORQUE))
+    return 0 if factor == 1.0 else 1
 
 
 @kernel
@@ -331,19 +333,20 @@ def _across(mechanism: Any, arm: int, p: Any) -> Any:
 def _constraint(mechanism: Any, arm: int, cos: float, sin: float, p: Any) -> Any:
     """Return g of an arm whose angle has this cosine and sine, its slopes along x, y, z and along the angle.
 
-    If the lateral offset exceeds the rod there is no such arm; the slope along the angle is then 0, unlike in any pose.
+    If the lateral offset exceeds the rod, the pose is impossible, and the slope along the angle is 0, as in no real
+    pose.
     """
     u, v, w = _along(mechanism, arm, p), _across(mechanism, arm, p), p[2]
     a = mechanism.arm_m
     square = mechanism.rod_m * mechanism.rod_m - v * v
-    rod = math.sqrt(max(square, _LEAST_ROD_M * _LEAST_ROD_M))
-    turn = 2.0 * a * (u * sin - w * cos) if square > 0.0 else 0.0
+    rod = math.sqrt(max(square, _MIN_ROD_M * _MIN_ROD_M))
+    along_angle = 2.0 * a * (u * sin - w * cos) if square > 0.0 else 0.0
     length = mechanism.ends_m + rod
     du, dw = u - a * cos, w - a * sin
     along_u, along_v, along_w = 2.0 * du, 2.0 * length * v / rod, 2.0 * dw
     along_x = along_u * mechanism.cos[arm] - along_v * mechanism.sin[arm]
     along_y = along_u * mechanism.sin[arm] + along_v * mechanism.cos[arm]
-    return du * du + dw * dw - length * length, along_x, along_y, along_w, turn
+    return du * du + dw * dw - length * length, along_x, along_y, along_w, along_angle
 
 
 @kernel

@@ -1,9 +1,9 @@
 """Access to the Falcon's USB bridge, and which Falcons are connected.
 
 `PyUsbTransport` uses pyusb, with libusb or another backend, such as the emulator's. `FtdiTransport` uses FTDI's own
-driver (D2XX) on Windows, where Novint's driver keeps libusb out; D2XX removes the status bytes from the stream, so they
-are put back as zeros. Written from FTDI's "D2XX Programmer's Guide", tested against a stand-in of the library only.
-Loads no compiler before `calls` are asked for: the guard process must be small.
+driver (D2XX) on Windows, where Novint's driver blocks libusb. D2XX removes the status bytes from the stream, so they
+are put back as zeros. It was written from FTDI's "D2XX Programmer's Guide" and tested only against a stand-in of the
+library. No compiler is loaded before `calls` is used, since the guard process must be small.
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ if TYPE_CHECKING:
     from study_app.devices.falcon.bulk import BulkCalls
 
 PACKETS: Final = 10
-_BETWEEN_S: Final = 0.002
-_WRITE_S: Final = 0.1
+_PACKET_INTERVAL_S: Final = 0.002
+_WRITE_TIMEOUT_S: Final = 0.1
 
 
 class Transport(Protocol):
@@ -80,8 +80,8 @@ def open_transport(name: str = "") -> Transport:
             raise
         try:
             return FtdiTransport(serial=serial)
-        except UsbFailure as also:
-            if also.kind == "not-found" and _find_falcons(libusb_package.get_libusb1_backend()):
+        except UsbFailure as ftdi_failure:
+            if ftdi_failure.kind == "not-found" and _find_falcons(libusb_package.get_libusb1_backend()):
                 raise UsbFailure("two-drivers", "opening it") from None
             raise failure from None
 
@@ -89,14 +89,14 @@ def open_transport(name: str = "") -> Transport:
 def send_zero_torque(transport: Transport) -> int:
     """Send ``PACKETS`` packets of zero torque; return the number sent.
 
-    They keep the homing flag, and the bridge's settings are unchanged, so that the Falcon stays loaded and homed.
+    The packets keep the homing flag, and the bridge's settings are unchanged, so the Falcon stays loaded and homed.
     """
     sent = 0
     for _ in range(PACKETS):
         with suppress(DeviceError):
-            transport.write(quiet_packet(FLAG_HOMING), _WRITE_S)
+            transport.write(quiet_packet(FLAG_HOMING), _WRITE_TIMEOUT_S)
             sent += 1
-        transport.pause(_BETWEEN_S)
+        transport.pause(_PACKET_INTERVAL_S)
     return sent
 
 
@@ -147,11 +147,11 @@ class PyUsbTransport(Transport):
 
     def reopen(self) -> None:
         self.close()
-        with _failures("looking for it"):
+        with _converted_errors("looking for it"):
             devices = _find_falcons(self._backend)
         if self.serial is None:
             devices = devices[self._index :]
-        else:  # a device without a readable number may be the right one; opening it reports the error
+        else:  # a device with an unreadable number may be the right one; opening it then shows the error
             devices = [device for device in devices if _serial_of(device) in {self.serial, None}]
             devices.sort(key=lambda device: _serial_of(device) is None)
         if not devices:
@@ -160,8 +160,8 @@ class PyUsbTransport(Transport):
 
     def _open(self, device: Any) -> None:
         try:
-            with _failures("opening it"):
-                _claim(device)
+            with _converted_errors("opening it"):
+                _claim_interface(device)
             serial = _serial_of(device)
             if self.serial not in {None, serial}:
                 raise FalconNotFound("not-found", f"looking for serial number {self.serial}")
@@ -171,11 +171,11 @@ class PyUsbTransport(Transport):
         self._device, self.serial = device, serial
 
     def control(self, request: int, value: int) -> None:
-        with _failures("configuring the USB bridge"):
+        with _converted_errors("configuring the USB bridge"):
             self._open_device().ctrl_transfer(constants.REQUEST_TYPE, request, value, 0, None, _CONTROL_TIMEOUT_MS)
 
     def write(self, data: bytes, timeout_s: float) -> None:
-        with _failures("sending"):
+        with _converted_errors("sending"):
             sent = self._open_device().write(constants.ENDPOINT_OUT, data, constants.milliseconds(timeout_s))
         if sent < len(data):
             raise usb_failure(constants.ERROR_TIMEOUT, "sending")
@@ -185,7 +185,7 @@ class PyUsbTransport(Transport):
         if size <= 0 or size % constants.USB_PACKET:
             raise ValueError(f"the size of a read must be a multiple of {constants.USB_PACKET} bytes, not {size}")
         try:
-            with _failures("receiving"):
+            with _converted_errors("receiving"):
                 return bytes(self._open_device().read(constants.ENDPOINT_IN, size, constants.milliseconds(timeout_s)))
         except UsbFailure as failure:
             if failure.kind == "timeout":
@@ -194,14 +194,14 @@ class PyUsbTransport(Transport):
 
     def calls(self) -> BulkCalls:
         handle = self._open_device()._ctx.handle  # noqa: SLF001 - pyusb has no public way to it
-        own = getattr(self._backend, "c_calls", None)
-        if own is not None:
-            return own(handle)  # type: ignore[no-any-return]
+        backend_calls = getattr(self._backend, "c_calls", None)
+        if backend_calls is not None:
+            return backend_calls(handle)  # type: ignore[no-any-return]
         return libusb_calls(self._backend.lib, handle.handle)
 
     def now_s(self) -> float:
-        own = getattr(self._backend, "now_s", None)
-        return time.perf_counter() if own is None else float(own())
+        backend_now_s = getattr(self._backend, "now_s", None)
+        return time.perf_counter() if backend_now_s is None else float(backend_now_s())
 
     def pause(self, seconds: float) -> None:
         getattr(self._backend, "pause", time.sleep)(seconds)
@@ -241,36 +241,36 @@ def libusb_calls(library: Any, handle: Any) -> BulkCalls:
     return BulkCalls(handle=handle.value or 0, transfer=transfer.value or 0)
 
 
-def _claim(device: Any) -> None:
+def _claim_interface(device: Any) -> None:
     """Open and claim pyusb's ``device`` without a reset, so that a running Falcon continues."""
     try:
         device.get_active_configuration()
     except usb.core.USBError as error:
         if error.backend_error_code is not None or error.errno is not None:
             raise
-        device.set_configuration()  # pyusb's error for a device without a configuration
+        device.set_configuration()  # pyusb's own error: the device has no configuration yet
     try:
-        held = device.is_kernel_driver_active(_INTERFACE)
+        is_active = device.is_kernel_driver_active(_INTERFACE)
     except NotImplementedError:
-        held = False  # only Linux knows
-    if held:
+        is_active = False  # not available on this system
+    if is_active:
         try:
             device.detach_kernel_driver(_INTERFACE)
         except (usb.core.USBError, NotImplementedError) as error:
-            raise UsbFailure("kernel-driver", "opening it", _code(error)) from error
+            raise UsbFailure("kernel-driver", "opening it", _error_code(error)) from error
     usb.util.claim_interface(device, _INTERFACE)
 
 
 @contextmanager
-def _failures(where: str) -> Iterator[None]:
+def _converted_errors(where: str) -> Iterator[None]:
     """Convert pyusb's errors into `UsbFailure`."""
     try:
         yield
     except (usb.core.USBError, NotImplementedError) as error:
-        raise usb_failure(_code(error), where) from error
+        raise usb_failure(_error_code(error), where) from error
 
 
-def _code(error: Exception) -> int:
+def _error_code(error: Exception) -> int:
     """Return libusb's code of an error of pyusb, which has a separate class for "not supported"."""
     if isinstance(error, NotImplementedError):
         return constants.ERROR_NOT_SUPPORTED
@@ -333,7 +333,7 @@ class FtdiTransport(Transport):
 
     Parameters
     ----------
-    library : D2XX loaded by ctypes; None: it is loaded by name
+    library : D2XX as loaded by ctypes; None: it is loaded by its name
     serial : serial number of the Falcon; None: the first
     """
 
@@ -348,7 +348,7 @@ class FtdiTransport(Transport):
     def reopen(self) -> None:
         self.close()
         self._timeout_ms = 0
-        for index, (serial, description) in enumerate(self._listed()):
+        for index, (serial, description) in enumerate(self._list_bridges()):
             if constants.PRODUCT in description and self.serial in {None, serial}:
                 handle = ctypes.c_void_p()
                 self._check(self._library.FT_Open(index, ctypes.byref(handle)), "opening it")
@@ -357,10 +357,10 @@ class FtdiTransport(Transport):
         raise FalconNotFound("not-found", "looking for it with FTDI's driver")
 
     def control(self, request: int, value: int) -> None:
-        self._check(_SETTERS[request](self._library, self._opened(), value), "configuring the USB bridge")
+        self._check(_SETTERS[request](self._library, self._open_handle(), value), "configuring the USB bridge")
 
     def write(self, data: bytes, timeout_s: float) -> None:
-        handle, sent = self._opened(), ctypes.c_uint32()
+        handle, sent = self._open_handle(), ctypes.c_uint32()
         self._set_timeout(milliseconds(timeout_s))
         self._check(self._library.FT_Write(handle, data, len(data), ctypes.byref(sent)), "sending")
         if sent.value < len(data):
@@ -371,15 +371,15 @@ class FtdiTransport(Transport):
         if size <= 0 or size % constants.USB_PACKET:
             raise ValueError(f"the size of a read must be a multiple of {constants.USB_PACKET} bytes, not {size}")
         self._set_timeout(milliseconds(timeout_s))
-        data = self._receive(min(max(self._waiting(), 1), _DATA_BYTES))
+        data = self._receive(min(max(self._waiting_bytes(), 1), _DATA_BYTES))
         if len(data) == 1:  # more bytes may have arrived while waiting
-            data += self._receive(min(self._waiting(), _DATA_BYTES - 1))
+            data += self._receive(min(self._waiting_bytes(), _DATA_BYTES - 1))
         return bytes(constants.STATUS_BYTES) + data if data else b""
 
     def calls(self) -> BulkCalls:
         from study_app.devices.falcon.bulk import BulkCalls, bridge_record, transfer  # noqa: PLC0415 - likewise
 
-        self._memory = bridge_record(self._library, self._opened())
+        self._memory = bridge_record(self._library, self._open_handle())
         self._timeout_ms = 0  # the C function sets its own time-out
         return BulkCalls(handle=int(self._memory.ctypes.data), transfer=int(transfer().address))
 
@@ -388,14 +388,14 @@ class FtdiTransport(Transport):
         if handle is not None:
             self._library.FT_Close(handle)
 
-    def _listed(self) -> list[tuple[str, str]]:
+    def _list_bridges(self) -> list[tuple[str, str]]:
         """Return serial number and description of each bridge that the driver lists."""
         count = ctypes.c_uint32()
         self._check(self._library.FT_CreateDeviceInfoList(ctypes.byref(count)), "looking for it")
-        return [self._detail(index) for index in range(count.value)]
+        return [self._bridge_info(index) for index in range(count.value)]
 
-    def _detail(self, index: int) -> tuple[str, str]:
-        numbers = [ctypes.c_uint32() for _ in range(4)]  # flags, type, ids, place: not needed
+    def _bridge_info(self, index: int) -> tuple[str, str]:
+        numbers = [ctypes.c_uint32() for _ in range(4)]  # flags, type, ids, location: not needed
         serial = ctypes.create_string_buffer(_SERIAL_SIZE)
         description = ctypes.create_string_buffer(_DESCRIPTION_SIZE)
         references = [ctypes.byref(number) for number in numbers]
@@ -405,26 +405,26 @@ class FtdiTransport(Transport):
         self._check(status, "looking for it")
         return serial.value.decode("latin-1"), description.value.decode("latin-1")
 
-    def _waiting(self) -> int:
+    def _waiting_bytes(self) -> int:
         count = ctypes.c_uint32()
-        self._check(self._library.FT_GetQueueStatus(self._opened(), ctypes.byref(count)), "receiving")
+        self._check(self._library.FT_GetQueueStatus(self._open_handle(), ctypes.byref(count)), "receiving")
         return count.value
 
     def _receive(self, size: int) -> bytes:
         if size == 0:
             return b""
         buffer, received = ctypes.create_string_buffer(size), ctypes.c_uint32()
-        self._check(self._library.FT_Read(self._opened(), buffer, size, ctypes.byref(received)), "receiving")
+        self._check(self._library.FT_Read(self._open_handle(), buffer, size, ctypes.byref(received)), "receiving")
         return buffer.raw[: received.value]
 
     def _set_timeout(self, timeout_ms: int) -> None:
         if timeout_ms != self._timeout_ms:
             self._check(
-                self._library.FT_SetTimeouts(self._opened(), timeout_ms, timeout_ms), "configuring the USB bridge"
+                self._library.FT_SetTimeouts(self._open_handle(), timeout_ms, timeout_ms), "configuring the USB bridge"
             )
             self._timeout_ms = timeout_ms
 
-    def _opened(self) -> Any:
+    def _open_handle(self) -> Any:
         if self._handle is None:
             raise FalconLost("no-device", "using it after it had been closed")
         return self._handle

@@ -1,4 +1,4 @@
-"""A Force Dimension device: opened and checked through the maker's library, closed with zero force."""
+"""The driver of Force Dimension devices: it opens one through the maker's library, and closes it with zero force."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -16,7 +16,7 @@ _FORCE_LIMIT_N: Final = 8.0
 
 
 class Functions(Protocol):
-    """The interface of an open device of the maker's library, or an emulated one; ``id`` is passed to its functions."""
+    """The functions of an open device, in the maker's library or emulated; ``id`` is passed to them."""
 
     id: int
 
@@ -25,7 +25,7 @@ class Functions(Protocol):
     def address(self, name: str) -> int: ...
 
     def close(self) -> bool:
-        """End the force and close the device; return whether it accepted the end."""
+        """End the force and close the device; return whether the device accepted the end of the force."""
 
 
 class ForceDimensionDevice(FramedDevice):
@@ -73,8 +73,8 @@ class ForceDimensionDevice(FramedDevice):
         """Check the device and enable its force; a device without a watchdog gets a guard."""
         facts = connection.prepare(self.force_limit_n)
         serial = facts.get("serial")
-        measured = (facts.pop(name) for name in ("delay_s", "count_m", "mass_kg"))
-        self._dynamics = dynamics_of(*measured, name=self.name, serial=serial)
+        dynamics = (facts.pop(name) for name in ("delay_s", "count_m", "mass_kg"))
+        self._dynamics = dynamics_of(*dynamics, name=self.name, serial=serial)
         self.memory[:] = new_exchange(self.force_limit_n)
         for field, name in FUNCTIONS.items():
             self.exchange[field] = connection.address(name)

@@ -1,11 +1,11 @@
-"""A Force Dimension device's tick, compiled: the maker's functions are called at their addresses.
+"""The compiled tick of a Force Dimension device, which calls the maker's functions at their addresses.
 
-Each call exchanges with the device over USB before it returns. The library's time guard answers some readings from
-memory (``TIMEGUARD``); such a reading is not new. Whatever fails ends the exchange at once: zero force, then
-``dhdStop``, which takes the current off the motors.
+Each call communicates with the device over USB before it returns. The library's time guard answers some readings from
+memory (``TIMEGUARD``); such a reading is not new. Any failure ends the exchange at once: zero force is sent, then
+``dhdStop``, which switches off the motors' current.
 
-The maker's axes are x toward the participant, y to the right, z up (examples of the SDK; CHAI3D 3.3.0): the hand frame
-turned by a permutation, see ``_from_maker``.
+The maker's axes are x toward the participant, y to the right, z up (examples of the SDK; CHAI3D 3.3.0), a permutation
+of those of the hand frame: see ``_from_maker``.
 """
 
 import math
@@ -34,8 +34,8 @@ from study_app.haptics.kernels import (
 )
 from study_app.haptics.model import layout
 
-# The library's functions end with the device's id (``char ID``). It is passed as a whole word: a C function takes the
-# low byte of the register, and the emulated functions take the word as the address of their memory.
+# The library's functions end with the device's id (``char ID``). It is passed as a whole word: a C function uses
+# the low byte of the register, and the emulated functions use the word as the address of their memory.
 VECTOR = types.int32(types.intp, types.intp, types.intp, types.intp)
 """``dhdGetPosition``, ``dhdGetLinearVelocity`` (dhdc.h 3.17.5, lines 264 and 285)."""
 FILL = types.int32(types.intp, types.intp)
@@ -69,11 +69,11 @@ _FORCE_DIMENSION = np.dtype(
         ("set_force", np.intp),
         ("set_all_forces", np.intp),
         ("stop", np.intp),
-        ("wrist", np.int64),  # 1 where it measures orientation
-        ("gripper", np.int64),  # 1 where it has a gripper
-        ("active", np.int64),  # 1 where wrist or gripper have motors, whose torque and force are kept at 0
+        ("wrist", np.int64),  # 1 if it measures orientation
+        ("gripper", np.int64),  # 1 if it has a gripper
+        ("active", np.int64),  # 1 if wrist or gripper have motors, whose torque and force are kept at 0
         ("off_cause", np.int64),  # the device's reason for a switched-off force
-        ("pushes", np.int64),  # 1 where neither zero force nor ``dhdStop`` was accepted at the end
+        ("pushes", np.int64),  # 1 if neither zero force nor ``dhdStop`` was accepted at the end
         # memory filled by the library
         ("position_m", np.float64, (3,)),
         ("velocity_mps", np.float64, (3,)),
@@ -81,8 +81,8 @@ _FORCE_DIMENSION = np.dtype(
         ("gap_m", np.float64),
         ("status", np.int32, (STATUS_WORDS,)),
         # counters
-        ("guarded", np.int64),  # ticks without, because of the library's time guard
-        ("saturated", np.int64),  # forces that the library said the motors could not give
+        ("guarded", np.int64),  # ticks without a new position because of the library's time guard
+        ("saturated", np.int64),  # forces that the motors could not produce, according to the library
     ],
     align=True,
 )
@@ -134,23 +134,23 @@ def _read(context: int, now_ns: int, reading: int) -> int:
 
 
 def _write(context: int, command: int) -> int:
-    device, asked = _device_at(context), command_at(command)
+    device, record = _device_at(context), command_at(command)
     answer = READ_LOST
     if enter(device):
-        answer = _send_force(device, context, asked.force_n)
+        answer = _send_force(device, context, record.force_n)
         if closed_during_call(device):
             finish(device, context)
         leave(device)
-    copy(device.sent_n, asked.sent_n)
+    copy(device.sent_n, record.sent_n)
     return answer
 
 
 @kernel
 def finish(device: Any, _context: int) -> None:
     """Send zero force and switch off the motors' current."""
-    zeroed = _push(device, 0.0, 0.0, 0.0) >= 0
-    stopped = np.int32(_call_stop(device.stop, device.id)) >= 0
-    device.pushes = 0 if zeroed or stopped else 1
+    accepted_zero = _push(device, 0.0, 0.0, 0.0) >= 0
+    accepted_stop = np.int32(_call_stop(device.stop, device.id)) >= 0
+    device.pushes = 0 if accepted_zero or accepted_stop else 1
     clear(device.sent_n)
 
 
@@ -166,11 +166,11 @@ def _take_sample(device: Any, context: int, now_ns: int, out: Any) -> int:
         if device.status[FORCE] == 0:
             device.off_cause = device.status[FORCE_OFF_CAUSE]
             return _end(device, context, FORCE_OFF)
-    at = context + _POSITION
-    got = np.int32(_call_vector(device.get_position, at, at + 8, at + 16, device.id))
-    if got < 0:
+    address = context + _POSITION
+    status = np.int32(_call_vector(device.get_position, address, address + 8, address + 16, device.id))
+    if status < 0:
         return _end(device, context, ERROR)
-    if got == TIMEGUARD:
+    if status == TIMEGUARD:
         device.guarded += 1
         return READ_NOTHING_NEW
     if not is_finite(device.position_m):
@@ -179,8 +179,8 @@ def _take_sample(device: Any, context: int, now_ns: int, out: Any) -> int:
     device.fresh_ns = now_ns
     _from_maker(device.position_m, out.position_m)
     out.buttons = np.int64(np.uint32(_call_buttons(device.get_buttons, device.id)))
-    at = context + _VELOCITY
-    if np.int32(_call_vector(device.get_velocity, at, at + 8, at + 16, device.id)) >= 0 and is_finite(
+    address = context + _VELOCITY
+    if np.int32(_call_vector(device.get_velocity, address, address + 8, address + 16, device.id)) >= 0 and is_finite(
         device.velocity_mps
     ):
         _from_maker(device.velocity_mps, out.velocity_mps)
@@ -244,14 +244,14 @@ def _send_force(device: Any, context: int, force_n: Any) -> int:
         return _end(device, context, UNGUARDED)
     x_n, y_n, z_n = force_n[0], force_n[1], force_n[2]
     square = x_n * x_n + y_n * y_n + z_n * z_n
-    most_n = _NORM_SLACK * device.force_limit_n
-    if not square <= most_n * most_n:  # nor NaN: the servo sends neither
+    max_n = _NORM_SLACK * device.force_limit_n
+    if not square <= max_n * max_n:  # nor NaN: the servo sends neither
         x_n = y_n = z_n = 0.0
-    got = _push(device, x_n, y_n, z_n)
-    if got < 0:
+    status = _push(device, x_n, y_n, z_n)
+    if status < 0:
         return _end(device, context, ERROR)
     device.sent_n[0], device.sent_n[1], device.sent_n[2] = x_n, y_n, z_n
-    if got == MOTOR_SATURATED:
+    if status == MOTOR_SATURATED:
         device.saturated += 1
         return WRITE_SATURATED
     return 0
@@ -266,7 +266,7 @@ def _push(device: Any, x_n: float, y_n: float, z_n: float) -> Any:
 
 
 @kernel
-def _end(device: Any, context: int, why: int) -> int:
+def _end(device: Any, context: int, cause: int) -> int:
     finish(device, context)
-    device.ended = why
+    device.ended = cause
     return READ_LOST

@@ -1,7 +1,8 @@
-"""The maker's installed library: found, loaded, and called while a device is opened and closed.
+"""The maker's installed library: how it is found and loaded, and the calls that open and close a device.
 
 Signatures follow ``dhdc.h`` and ``drdc.h`` of the Force Dimension SDK 3.17.5 (public in CHAI3D 3.3.0,
-``externals/DHD/include``); nothing of the maker's is part of this program. Loads no compiler.
+``externals/DHD/include``); this program contains nothing of the maker's. Importing this module loads
+no compiler.
 """
 
 import ctypes
@@ -74,14 +75,14 @@ _SIGNATURES: Final[dict[str, tuple[Any, tuple[Any, ...]]]] = {
     "dhdGetWatchdog": (c_int, (POINTER(c_ubyte), c_byte)),  # 374
     "drdIsInitialized": (c_bool, (c_byte,)),  # drdc.h 41
 }
-_MOST_JOINTS: Final = 8  # DHD_MAX_DOF, dhdc.h 128
-_SYNC: Final = 0  # DHD_COM_MODE_SYNC, dhdc.h 194
+_MAX_JOINTS: Final = 8  # DHD_MAX_DOF, dhdc.h 128
+_SYNC_MODE: Final = 0  # DHD_COM_MODE_SYNC, dhdc.h 194
 _ROUND_TRIPS: Final = 50
-_COUNTS: Final = 10
+_COUNT_STEP: Final = 10
 """Number of counts of each encoder over which the handle's motion is computed."""
-_COUNT_M: Final = (1e-7, 1e-3)
-_MASS_KG: Final = (0.01, 5.0)
-"""Least and greatest plausible values; others count as unknown."""
+_COUNT_RANGE_M: Final = (1e-7, 1e-3)
+_MASS_RANGE_KG: Final = (0.01, 5.0)
+"""Ranges of plausible values; values outside count as unknown."""
 STATUS_WORDS: Final = 32
 """Room for more than the DHD_MAX_STATUS (17) words of 3.17.5 (dhdc.h 164)."""
 RESET, FORCE, FORCE_OFF_CAUSE = 3, 5, 14  # dhdc.h 170, 172, 181
@@ -89,7 +90,7 @@ _DEFAULT_TIME_GUARD: Final = -1
 LONGEST_WATCHDOG: Final = 255
 _WATCHDOG_S: Final = 125e-6
 """Unit of the watchdog: documentation of forcedimension_core 1.0.0, expert.setWatchdog; CHAI3D 3.3.0 sets 255, too."""
-_ENABLE_S: Final = 0.5
+_ENABLE_TIMEOUT_S: Final = 0.5
 _CAN: Final = "force up to the device's own limit, through the manufacturer's library; not yet tested on hardware"
 
 
@@ -108,9 +109,9 @@ class Library:
         missing = [name for name in _SIGNATURES if not hasattr(self._functions, name)]
         if missing:
             raise FAILURES.failure("old-library", ", ".join(missing))
-        for name, (returned, taken) in _SIGNATURES.items():
+        for name, (result_type, argument_types) in _SIGNATURES.items():
             function = getattr(self._functions, name)
-            function.restype, function.argtypes = returned, taken
+            function.restype, function.argtypes = result_type, argument_types
 
     @property
     def version(self) -> str:
@@ -150,10 +151,10 @@ class Library:
         call, device = self._functions, self.id
         if not call.drdIsInitialized(device) or self._status()[RESET]:
             raise FAILURES.failure("uncalibrated")
-        most_n = float(call.dhdGetMaxForce(device))
-        if 0.0 <= most_n < force_limit_n:
-            raise FAILURES.failure("max-force", f"{most_n:g} N instead of {force_limit_n:g} N")
-        safety = self._keep_safe()
+        max_n = float(call.dhdGetMaxForce(device))
+        if 0.0 <= max_n < force_limit_n:
+            raise FAILURES.failure("max-force", f"{max_n:g} N instead of {force_limit_n:g} N")
+        safety = self._enable_safety()
         call.dhdSetGravityCompensation(1, device)
         self._enable_force()
         serial, mass = c_ushort(), c_double()
@@ -170,7 +171,7 @@ class Library:
             "active_gripper": bool(call.dhdHasActiveGripper(device)),
             "gravity_compensation": True,
             "effector_mass_kg": mass.value if has_mass else None,
-            "max_force_n": most_n if most_n >= 0.0 else None,
+            "max_force_n": max_n if max_n >= 0.0 else None,
             **safety,
             **self._dynamics(),
         }
@@ -181,8 +182,8 @@ class Library:
         self._functions.dhdClose(self.id)
         return any(answer >= 0 for answer in answers)
 
-    def _keep_safe(self) -> dict[str, Any]:
-        """Keep the safety functions on and return their state; a watchdog is set to its longest time, 32 ms."""
+    def _enable_safety(self) -> dict[str, Any]:
+        """Enable the safety functions and return their state; a watchdog is set to its longest time, 32 ms."""
         call, device, threshold, watchdog = self._functions, self.id, c_uint(), c_ubyte()
         call.dhdEnableExpertMode()
         try:
@@ -190,48 +191,50 @@ class Library:
                 raise FAILURES.failure("safety", f"time guard: {self._last_error()}")
             if call.dhdGetVelocityThreshold(threshold, device) < 0 or threshold.value == 0:
                 raise FAILURES.failure("safety", f"the velocity threshold is {threshold.value}")
-            watched = call.dhdSetWatchdog(LONGEST_WATCHDOG, device) >= 0 and call.dhdGetWatchdog(watchdog, device) >= 0
+            has_watchdog = (
+                call.dhdSetWatchdog(LONGEST_WATCHDOG, device) >= 0 and call.dhdGetWatchdog(watchdog, device) >= 0
+            )
         finally:
             call.dhdDisableExpertMode()
         return {
             "time_guard": "default",
             "velocity_threshold": threshold.value,
-            "watchdog_s": watchdog.value * _WATCHDOG_S if watched and watchdog.value else None,
+            "watchdog_s": watchdog.value * _WATCHDOG_S if has_watchdog and watchdog.value else None,
         }
 
     def _dynamics(self) -> dict[str, Any]:
-        """Return delay [s], encoder count [m] and least mass [kg] at the handle; None for what the library lacks."""
+        """Return delay [s], encoder count [m] and least mass [kg] at the handle; None for those that are unknown."""
         mode = int(self._functions.dhdGetComMode(self.id))
         round_trip_s = self._round_trip_s()
         self._functions.dhdEnableExpertMode()
         try:
-            count_m, mass_kg = self._in_the_middle()
+            count_m, mass_kg = self._centre_dynamics()
         finally:
             self._functions.dhdDisableExpertMode()
-        # In other modes than SYNC the next exchange begins while one is under way: a position may be that much older.
-        delay_s = round_trip_s if round_trip_s is None or mode == _SYNC else 2 * round_trip_s
+        # In modes other than SYNC, the next exchange begins during the last one, so a position may be that much older.
+        delay_s = round_trip_s if round_trip_s is None or mode == _SYNC_MODE else 2 * round_trip_s
         return {"com_mode": mode, "delay_s": delay_s, "count_m": count_m, "mass_kg": mass_kg}
 
     def _round_trip_s(self) -> float | None:
         """Return the 90th percentile of the time from a zero force to a new position [s]."""
-        call, device, taken = self._functions, self.id, []
-        place = [c_double() for _ in range(3)]
+        call, device, times_s = self._functions, self.id, []
+        position = [c_double() for _ in range(3)]
         for _ in range(_ROUND_TRIPS):
-            time.sleep(0.001)  # the time guard answers earlier readings from memory
+            time.sleep(0.001)  # sooner, the time guard would answer from memory
             began_s = time.perf_counter()
             call.dhdSetForce(0.0, 0.0, 0.0, device)
-            got = call.dhdGetPosition(*place, device)
-            if got < 0:
+            status = call.dhdGetPosition(*position, device)
+            if status < 0:
                 raise FAILURES.failure("error", f"dhdGetPosition: {self._last_error()}")
-            if got == 0:
-                taken.append(time.perf_counter() - began_s)
-        return sorted(taken)[int(0.9 * len(taken))] if taken else None
+            if status == 0:
+                times_s.append(time.perf_counter() - began_s)
+        return sorted(times_s)[int(0.9 * len(times_s))] if times_s else None
 
-    def _in_the_middle(self) -> tuple[float | None, float | None]:
-        """Return the longest motion within an encoder count [m] and the least mass [kg] in the centre of the workspace.
+    def _centre_dynamics(self) -> tuple[float | None, float | None]:
+        """Return the longest motion within an encoder count [m] and the least mass [kg] at the centre of the workspace.
 
-        The maker's kinematics and inertia matrix compute both for the model and its calibration; they are not
-        documented. None if the library lacks the function or its answers are contradictory.
+        Both are computed with the maker's kinematics and inertia matrix for this model and its calibration, which are
+        not documented. A value is None if the library cannot compute it or if it is implausible.
         """
         import numpy as np  # noqa: PLC0415 - the guard, which loads this module, needs no arrays
 
@@ -239,41 +242,41 @@ class Library:
         if call.dhdDeltaPositionToEncoder(0.0, 0.0, 0.0, *encoders, device) < 0:
             return None, None
         counts = [encoder.value for encoder in encoders]
-        places = []
+        positions = []
         for axis in range(-1, 3):
-            place = [c_double() for _ in range(3)]
-            moved = (count + _COUNTS * (axis == i) for i, count in enumerate(counts))
-            if call.dhdDeltaEncoderToPosition(*moved, *place, device) < 0:
+            position = [c_double() for _ in range(3)]
+            shifted = (count + _COUNT_STEP * (axis == i) for i, count in enumerate(counts))
+            if call.dhdDeltaEncoderToPosition(*shifted, *position, device) < 0:
                 return None, None
-            places.append([coordinate.value for coordinate in place])
-        rates_m = (np.array(places[1:]) - places[0]).T / _COUNTS
-        longest_m = float(np.linalg.norm(rates_m, 2)) if np.isfinite(rates_m).all() else math.nan
-        joints, inertia = (c_double * _MOST_JOINTS)(), (c_double * 36)()
+            positions.append([coordinate.value for coordinate in position])
+        rates_m = (np.array(positions[1:]) - positions[0]).T / _COUNT_STEP
+        max_motion_m = float(np.linalg.norm(rates_m, 2)) if np.isfinite(rates_m).all() else math.nan
+        joints, inertia = (c_double * _MAX_JOINTS)(), (c_double * 36)()
         arms = [c_double() for _ in range(3)]
         if call.dhdGetJointAngles(joints, device) < 0 or call.dhdDeltaEncodersToJointAngles(*counts, *arms, device) < 0:
-            return _within(longest_m, _COUNT_M), None
+            return _value_within(max_motion_m, _COUNT_RANGE_M), None
         joints[:3] = [arm.value for arm in arms]
         if call.dhdJointAnglesToInertiaMatrix(joints, inertia, device) < 0:
-            return _within(longest_m, _COUNT_M), None
+            return _value_within(max_motion_m, _COUNT_RANGE_M), None
         matrix = np.array(inertia).reshape(6, 6)
-        least_kg = math.nan
+        min_mass_kg = math.nan
         if np.isfinite(matrix).all():
-            linear, coupled, turning = matrix[:3, :3], matrix[:3, 3:], matrix[3:, 3:]
-            least_kg = float(np.linalg.eigvalsh(linear - coupled @ np.linalg.pinv(turning) @ coupled.T).min())
-        return _within(longest_m, _COUNT_M), _within(least_kg, _MASS_KG)
+            linear, coupling, rotational = matrix[:3, :3], matrix[:3, 3:], matrix[3:, 3:]
+            min_mass_kg = float(np.linalg.eigvalsh(linear - coupling @ np.linalg.pinv(rotational) @ coupling.T).min())
+        return _value_within(max_motion_m, _COUNT_RANGE_M), _value_within(min_mass_kg, _MASS_RANGE_KG)
 
     def _enable_force(self) -> None:
         """Enable the force at zero and wait until the device confirms it."""
         call, device = self._functions, self.id
         if call.dhdEnableForce(1, device) < 0:
             raise FAILURES.failure("force-off", self._last_error())
-        patience = time.perf_counter() + _ENABLE_S
+        deadline_s = time.perf_counter() + _ENABLE_TIMEOUT_S
         while True:
             call.dhdSetForce(0.0, 0.0, 0.0, device)
             status = self._status()
             if status[FORCE]:
                 return
-            if time.perf_counter() > patience:
+            if time.perf_counter() > deadline_s:
                 raise FAILURES.failure("force-off", CAUSES.get(status[FORCE_OFF_CAUSE], ""))
             time.sleep(0.01)
 
@@ -297,22 +300,22 @@ def probe() -> Backend:
     """Return the state of the library and the number of connected devices, without opening one."""
     try:
         library = Library()
-    except DeviceFailure as failed:
-        return Backend("force-dimension", "libdrd", state=NOT_AVAILABLE, can=_CAN, why=FAILURES.sentence(failed.mode))
+    except DeviceFailure as failure:
+        return Backend("force-dimension", "libdrd", state=NOT_AVAILABLE, can=_CAN, why=FAILURES.sentence(failure.mode))
     by, count = f"libdrd {library.version}", library.devices
     if count < 1:
         return Backend("force-dimension", by, state=NONE, can=_CAN, why=FAILURES.sentence("no-device"))
     return Backend("force-dimension", by, state=f"connected: {count}", can=_CAN)
 
 
-def _within(value: float, limits: tuple[float, float]) -> float | None:
+def _value_within(value: float, limits: tuple[float, float]) -> float | None:
     return value if limits[0] <= value <= limits[1] else None
 
 
 def _load(path: str | Path | None) -> ctypes.CDLL:
-    given = path or os.environ.get(VARIABLE)
+    chosen = path or os.environ.get(VARIABLE)
     reason = ""
-    for candidate in (str(given),) if given else _usual_names():
+    for candidate in (str(chosen),) if chosen else _usual_names():
         try:
             return ctypes.CDLL(candidate)
         except OSError as error:

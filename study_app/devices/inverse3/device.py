@@ -1,4 +1,4 @@
-"""The Inverse3's driver: its session is opened with neutral settings, and ended with zero force and silence."""
+"""The Inverse3's driver, which opens a session with neutral settings and ends it with zero force."""
 
 import math
 import secrets
@@ -53,9 +53,9 @@ class Inverse3Device(FramedDevice):
         progress: Callable[[str], object] | None = None,
     ) -> None:
         if math.hypot(*workspace_m) > _REACH_M:
-            asked = " x ".join(f"{2000 * half:g}" for half in workspace_m)
+            size = " x ".join(f"{2000 * half:g}" for half in workspace_m)
             raise DeviceError(
-                f"a workspace of {asked} mm exceeds an Inverse3's reach (a sphere {2000 * _REACH_M:g} mm in diameter): "
+                f"a workspace of {size} mm exceeds an Inverse3's reach (a sphere {2000 * _REACH_M:g} mm in diameter): "
                 f"reduce the protocol's workspace_mm"
             )
         super().__init__(new_exchange("", force_limit_n, 1), workspace_m, force_limit_n, exchange_functions())
@@ -79,9 +79,9 @@ class Inverse3Device(FramedDevice):
         self._dynamics = dynamics_of(session.round_trip_s, None, None, name=self.name, serial=session.device_id)
         self.memory[:] = new_exchange(session.device_id, self.force_limit_n, secrets.randbits(64))
         self.exchange.scan.own_id = text_hash(session.device_id.encode())
-        left = np.frombuffer(messages.left, np.uint8)
-        self.exchange.inbox[: left.size] = left
-        self.exchange.filled = left.size
+        received = np.frombuffer(messages.left, np.uint8)
+        self.exchange.inbox[: received.size] = received
+        self.exchange.filled = received.size
         self.exchange.handle, self.exchange.send, self.exchange.receive = connection.calls()
         if not facts["service_settings"]["confirmed"] and self._progress is not None:
             self._progress("The service did not confirm its settings: check them in Haply Hub.")

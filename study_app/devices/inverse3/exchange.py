@@ -1,11 +1,11 @@
-"""The Inverse3's compiled tick: read the replies to earlier commands, return the newest position, send the force.
+"""The Inverse3's compiled tick: it reads the replies to earlier commands, returns the newest position, sends the force.
 
 The service answers each message with one state and pushes nothing (docs.haply.co 3.5.x, "WebSocket Protocol", core
 rule), so `_write` sends the force and asks for the state that `_read` finds at the next tick. Neither waits: the socket
-does not block. A reply older than `_LONGEST_GAP_NS` is ignored, and without replies the servo ends the force after 50
-ms. Any other fault ends the stream at once: zero force is sent, then a close frame, then nothing. Commands are applied
-once and forgotten, and a device without commands returns to idle ("Control Commands"), so the force ends without
-further commands if this program ends or hangs.
+does not block. A reply older than `_MAX_REPLY_AGE_NS` is ignored, and without replies the servo ends the force after 50
+ms. Any other fault ends the stream at once: zero force is sent, then a close frame, then nothing. The service applies
+each command only once, and a device without commands returns to idle ("Control Commands"), so the force ends if this
+program ends or hangs.
 """
 
 from functools import cache
@@ -33,18 +33,18 @@ from study_app.haptics.kernels import square as square_of
 from study_app.haptics.model.layout import MEASURED_VELOCITY, records
 
 _TRANSFER = types.intp(types.intp, types.intp, types.uintp, types.int32)
-"""``send`` and ``recv`` of a socket: (handle, address, bytes, flags) -> how many, 0: closed, below 0: none now."""
+"""``send`` and ``recv`` of a socket: (handle, address, bytes, flags) -> number of bytes (0: closed, < 0: none now)."""
 
-_LONGEST_GAP_NS: Final = 20_000_000
-_MOST_UNANSWERED: Final = 4
-"""Number of unanswered commands from which only weaker forces are sent: others would queue up."""
-_MOST_WEAKER: Final = 60
-"""Number of unanswered commands from which only zero force is sent: the servo's fade takes 45 ticks."""
-_INBOX: Final = 1 << 16
-_OUTBOX = 512
-_TEXT = 384
-_LOG = 64  # commands whose time is stored, more than can wait
-_RECEIVES = 8  # most reads of the socket per tick
+_MAX_REPLY_AGE_NS: Final = 20_000_000
+_MAX_UNANSWERED: Final = 4
+"""Number of unanswered commands from which only weaker forces are sent, since others would queue up."""
+_MAX_UNANSWERED_WEAKER: Final = 60
+"""Number of unanswered commands from which only zero force is sent; the servo's fade takes 45 ticks."""
+_INBOX_BYTES: Final = 1 << 16
+_OUTBOX_BYTES = 512
+_TEXT_BYTES = 384
+_LOG_ROWS = 64  # number of commands whose time is stored: more than can be unanswered
+_MAX_RECEIVES = 8  # greatest number of reads of the socket per tick
 _NORM_SLACK = 1.001
 
 CLOSED, BROKE_PROTOCOL, NOT_A_STATE, DEVICE_GONE, NO_POSITION, BAD_NUMBER, NOT_READY, UNCALIBRATED, TOO_LONG = range(
@@ -58,23 +58,23 @@ _INVERSE3 = np.dtype(
         ("send", np.intp),  # addresses of its functions (``_TRANSFER``)
         ("receive", np.intp),
         # received data
-        ("inbox", np.uint8, (_INBOX,)),
+        ("inbox", np.uint8, (_INBOX_BYTES,)),
         ("filled", np.int64),
         ("header", np.int64, (2,)),
         ("scan", wire.SCAN),
         # data to send
-        ("prefix", np.uint8, (_TEXT,)),  # the command up to its first number
+        ("prefix", np.uint8, (_TEXT_BYTES,)),  # the command up to its first number
         ("prefix_size", np.int64),
-        ("text", np.uint8, (_TEXT,)),
-        ("outbox", np.uint8, (_OUTBOX,)),
+        ("text", np.uint8, (_TEXT_BYTES,)),
+        ("outbox", np.uint8, (_OUTBOX_BYTES,)),
         ("out_size", np.int64),  # of the frame in it
         ("out_sent", np.int64),  # bytes of it already sent
         ("key", np.uint64, (1,)),  # of the masking keys' generator
-        # replies owed
+        # pending replies
         ("sent", np.int64),  # commands
         ("answered", np.int64),  # replies
-        ("sent_ns", np.int64, (_LOG,)),
-        ("sent_tick", np.int64, (_LOG,)),
+        ("sent_ns", np.int64, (_LOG_ROWS,)),
+        ("sent_tick", np.int64, (_LOG_ROWS,)),
         ("age_ns", np.int64),  # time since the command whose reply was used last
         ("buttons", np.int64),
         # counters
@@ -128,14 +128,14 @@ def _read(context: int, now_ns: int, reading: int) -> int:
 
 
 def _write(context: int, command: int) -> int:
-    device, asked = _device_at(context), command_at(command)
+    device, record = _device_at(context), command_at(command)
     answer = READ_LOST
     if enter(device):
-        answer = _send_force(device, context, asked.force_n)
+        answer = _send_force(device, context, record.force_n)
         if closed_during_call(device):
             finish(device, context)
         leave(device)
-    copy(device.sent_n, asked.sent_n)
+    copy(device.sent_n, record.sent_n)
     return answer
 
 
@@ -145,16 +145,16 @@ def _take_replies(device: Any, context: int, now_ns: int, out: Any) -> int:
     device.now_ns = now_ns
     device.ticks += 1
     answered = device.answered
-    for _ in range(_RECEIVES):
-        room = _INBOX - device.filled
-        came = np.int32(
+    for _ in range(_MAX_RECEIVES):
+        room = _INBOX_BYTES - device.filled
+        received = np.int32(
             _call(device.receive, device.handle, context + _INBOX_AT + device.filled, np.uintp(room), np.int32(0))
         )
-        if came == 0:
+        if received == 0:
             return _end(device, context, CLOSED)
-        if came < 0:
+        if received < 0:
             break
-        device.filled += came
+        device.filled += received
         ended = _take_frames(device, context)
         if ended != RUNS:
             return _end(device, context, ended)
@@ -163,9 +163,9 @@ def _take_replies(device: Any, context: int, now_ns: int, out: Any) -> int:
     if device.answered == answered:
         device.missing += 1
         return READ_NOTHING_NEW
-    row = (device.answered - 1) % _LOG
+    row = (device.answered - 1) % _LOG_ROWS
     device.age_ns = now_ns - device.sent_ns[row]
-    if device.age_ns > _LONGEST_GAP_NS:
+    if device.age_ns > _MAX_REPLY_AGE_NS:
         device.late += 1
         return READ_NOTHING_NEW
     device.fresh += 1
@@ -181,14 +181,14 @@ def _take_replies(device: Any, context: int, now_ns: int, out: Any) -> int:
 
 
 @kernel
-def _put_vector(value: Any, place: int, out: Any) -> None:
+def _put_vector(value: Any, index: int, out: Any) -> None:
     """Write a vector in the hand frame; the service's basis XYZ has x right, y forward, z up.
 
     Documented in docs.haply.co 3.1.x, "Haply Inverse Service", Coordinate System Convention.
     """
-    out[0] = value[place]
-    out[1] = value[place + 2]
-    out[2] = -value[place + 1]
+    out[0] = value[index]
+    out[1] = value[index + 2]
+    out[2] = -value[index + 1]
 
 
 @kernel
@@ -202,7 +202,7 @@ def _take_frames(device: Any, context: int) -> int:
         if size == wire.INCOMPLETE:
             break
         opcode, length = device.header[0], device.header[1]
-        if length > _INBOX - size:
+        if length > _INBOX_BYTES - size:
             return TOO_LONG
         at, end = begin + size, begin + size + length
         if end > device.filled:
@@ -224,13 +224,13 @@ def _take_frames(device: Any, context: int) -> int:
 
 @kernel
 def _take_state(device: Any, begin: int, end: int) -> int:
-    said = wire.scan(device.inbox, begin, end, device.scan)
-    if said != wire.UNDERSTOOD:
-        if said == wire.NOT_JSON:
+    result = wire.scan(device.inbox, begin, end, device.scan)
+    if result != wire.UNDERSTOOD:
+        if result == wire.NOT_JSON:
             return NOT_A_STATE
-        if said == wire.NO_DEVICE:
+        if result == wire.NO_DEVICE:
             return DEVICE_GONE
-        return BAD_NUMBER if said == wire.NOT_FINITE else NO_POSITION
+        return BAD_NUMBER if result == wire.NOT_FINITE else NO_POSITION
     if device.answered < device.sent:
         device.answered += 1
     else:
@@ -250,42 +250,42 @@ def _take_state(device: Any, begin: int, end: int) -> int:
 
 
 @kernel
-def _is_zero(scanned: Any, place: int) -> bool:
-    return bool(scanned.known >> place & 1 and scanned.value[place] == 0.0)
+def _is_zero(scan: Any, index: int) -> bool:
+    return bool(scan.known >> index & 1 and scan.value[index] == 0.0)
 
 
 @kernel
 def _send_force(device: Any, context: int, force_n: Any) -> int:
-    """Send a force [N, hand frame]; if that fails, the last one stays in effect and in ``sent_n``."""
-    _command(device, context, force_n[0], force_n[1], force_n[2])
+    """Send a force [N, hand frame]; if it is not sent, the last one stays in effect and in ``sent_n``."""
+    _send_command(device, context, force_n[0], force_n[1], force_n[2])
     return 0
 
 
 @kernel
-def _command(device: Any, context: int, x_n: float, y_n: float, z_n: float) -> None:
+def _send_command(device: Any, context: int, x_n: float, y_n: float, z_n: float) -> None:
     square = x_n * x_n + y_n * y_n + z_n * z_n
-    most_n = _NORM_SLACK * device.force_limit_n
-    if not square <= most_n * most_n:  # nor NaN: the servo sends neither
+    max_n = _NORM_SLACK * device.force_limit_n
+    if not square <= max_n * max_n:  # nor NaN: the servo sends neither
         x_n = y_n = z_n = square = 0.0
     unanswered = device.sent - device.answered
-    weaker = square < square_of(device.sent_n) and (square == 0.0 or unanswered < _MOST_WEAKER)
-    if unanswered >= _MOST_UNANSWERED and not weaker:
+    is_weaker = square < square_of(device.sent_n) and (square == 0.0 or unanswered < _MAX_UNANSWERED_WEAKER)
+    if unanswered >= _MAX_UNANSWERED and not is_weaker:
         device.skipped += 1
         return
     if not _flush(device, context):
         device.skipped += 1
         return
     text = device.text
-    at = 0
+    end = 0
     for k in range(device.prefix_size):
         text[k] = device.prefix[k]
-    at = wire.put_fixed(text, device.prefix_size, x_n)
-    at = wire.put_fixed(text, wire.put_text(text, at, _Y), -z_n)
-    at = wire.put_fixed(text, wire.put_text(text, at, _Z), y_n)
-    at = wire.put_text(text, at, _END)
-    device.out_size = wire.build_frame(device.outbox, wire.TEXT, text, at, wire.next_key(device.key))
+    end = wire.put_fixed(text, device.prefix_size, x_n)
+    end = wire.put_fixed(text, wire.put_text(text, end, _Y), -z_n)
+    end = wire.put_fixed(text, wire.put_text(text, end, _Z), y_n)
+    end = wire.put_text(text, end, _END)
+    device.out_size = wire.build_frame(device.outbox, wire.TEXT, text, end, wire.next_key(device.key))
     device.out_sent = 0
-    row = device.sent % _LOG
+    row = device.sent % _LOG_ROWS
     device.sent_ns[row] = device.now_ns
     device.sent_tick[row] = device.ticks
     device.sent += 1
@@ -297,7 +297,7 @@ def _command(device: Any, context: int, x_n: float, y_n: float, z_n: float) -> N
 def _flush(device: Any, context: int) -> bool:
     """Send the rest of the frame in the outbox; return whether it is complete."""
     while device.out_sent < device.out_size:
-        went = np.int32(
+        sent = np.int32(
             _call(
                 device.send,
                 device.handle,
@@ -306,9 +306,9 @@ def _flush(device: Any, context: int) -> bool:
                 np.int32(0),
             )
         )
-        if went <= 0:
+        if sent <= 0:
             return False
-        device.out_sent += went
+        device.out_sent += sent
     return True
 
 
@@ -330,18 +330,18 @@ def _answer_ping(device: Any, context: int, at: int, length: int) -> None:
 
 
 @kernel
-def _end(device: Any, context: int, why: int) -> int:
+def _end(device: Any, context: int, cause: int) -> int:
     """End the stream: send zero force and a close frame, and nothing after them."""
-    if why != CLOSED:
+    if cause != CLOSED:
         finish(device, context)
-    clear(device.sent_n)  # silence ends a force that could not be reset
-    device.ended = why
+    clear(device.sent_n)  # a force that could not be reset ends without further commands
+    device.ended = cause
     return READ_LOST
 
 
 @kernel
 def finish(device: Any, context: int) -> None:
     """Send zero force and a close frame (RFC 6455 §5.5.1, status 1000)."""
-    _command(device, context, 0.0, 0.0, 0.0)
+    _send_command(device, context, 0.0, 0.0, 0.0)
     device.text[0], device.text[1] = np.uint8(1000 >> 8), np.uint8(1000 & 0xFF)
     _send_control(device, context, wire.CLOSE, 2)

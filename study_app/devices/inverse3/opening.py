@@ -1,4 +1,4 @@
-"""How a session is opened: RFC 6455's handshake, the service's inventory, and its settings that change the force.
+"""How a session is opened: the handshake of RFC 6455, the service's inventory, and the settings that change the force.
 
 Documents: docs.haply.co 3.5.x, "Device Configuration" (availability matrix, preset, basis, damping), "Filters" (force
 pipeline), "Mount & Workspace Transforms" (presets), "WebSocket Protocol" step 1 (shape of ``config``).
@@ -24,7 +24,7 @@ _PRESET: Final = "arm_front_centered"
 _BASIS: Final = "XYZ"
 _FORCE_GATE_GAIN: Final = 0.0
 """Attenuation of the force when the service detects an oscillation; the default is 0.3. That 0 disables it is not
-documented: to be tested on the bench."""
+documented and must be tested on a device."""
 
 _SESSION_SCOPED: Final[Mapping[str, Any]] = {
     "preset": _PRESET,
@@ -40,7 +40,7 @@ _DEVICE_GLOBAL: Final[Mapping[str, Any]] = {
 """Factory values, which a message cannot set ("Device Configuration": HTTP only, device-global). They hold for every
 program on the computer, so they are required, not changed."""
 
-_RECORDED: Final = (*_SESSION_SCOPED, *_DEVICE_GLOBAL, "mount", "handedness", "home_return", "streaming_mode")
+_RECEIPT_KEYS: Final = (*_SESSION_SCOPED, *_DEVICE_GLOBAL, "mount", "handedness", "home_return", "streaming_mode")
 _ZERO: Final = {"x": 0.0, "y": 0.0, "z": 0.0}
 
 
@@ -69,40 +69,40 @@ def _zero_force(device_id: str) -> dict[str, Any]:
     return _command(device_id)
 
 
-def _command(device_id: str, **further: Any) -> dict[str, Any]:
+def _command(device_id: str, **more_fields: Any) -> dict[str, Any]:
     return {
-        "inverse3": [{"device_id": device_id, **further, "commands": {"set_cursor_force": {"vector": dict(_ZERO)}}}]
+        "inverse3": [{"device_id": device_id, **more_fields, "commands": {"set_cursor_force": {"vector": dict(_ZERO)}}}]
     }
 
 
 def _receipt_settings(config: Mapping[str, Any]) -> dict[str, Any]:
     """Return the settings of a configuration that change the force, for the receipt."""
-    return {key: config[key] for key in _RECORDED if key in config}
+    return {key: config[key] for key in _RECEIPT_KEYS if key in config}
 
 
 def _differing_settings(config: Mapping[str, Any], required: Mapping[str, Any]) -> list[str]:
     """Return a text for each setting that is not as required; numbers are compared as floats."""
-    return list(_differing("", config, required))
+    return list(_find_differences("", config, required))
 
 
-def _differing(place: str, value: Any, required: Any) -> list[str]:
+def _find_differences(path: str, value: Any, required: Any) -> list[str]:
     if isinstance(required, Mapping):
         paths: list[str] = []
         for key, wanted in required.items():
-            name = f"{place}.{key}" if place else key
+            name = f"{path}.{key}" if path else key
             inner = value.get(key) if isinstance(value, Mapping) else None
-            paths += _differing(name, inner, wanted)
+            paths += _find_differences(name, inner, wanted)
         return paths
-    return [] if value == required else [f"{place} is {shortened(value)}, but must be {required!r}"]
+    return [] if value == required else [f"{path} is {shortened(value)}, but must be {required!r}"]
 
 
 _ROUND_TRIPS: Final = 50
-_MAGIC: Final = b"258EAFA5-E914-47DA-95CA-C5AB0DC85B11"  # RFC 6455 §1.3
+_WEBSOCKET_GUID: Final = b"258EAFA5-E914-47DA-95CA-C5AB0DC85B11"  # RFC 6455 §1.3
 
 
 @dataclass(frozen=True, slots=True)
 class Session:
-    """An open session: the device's id, its fields for the receipt, and the round trip [s]."""
+    """An open session: the device's id, the fields for the receipt, and the round trip [s]."""
 
     device_id: str
     described: dict[str, Any]
@@ -121,7 +121,7 @@ class Messages:
 
     def __init__(self, link: Link) -> None:
         self._link = link
-        self._came = b""
+        self._received = b""
         self._header = np.zeros(2, np.int64)
 
     def upgrade(self, host: str) -> None:
@@ -131,28 +131,29 @@ class Messages:
             b"GET / HTTP/1.1\r\nHost: %b\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
             b"Sec-WebSocket-Key: %b\r\nSec-WebSocket-Version: 13\r\n\r\n" % (host.encode(), key)
         )
-        while b"\r\n\r\n" not in self._came:
+        while b"\r\n\r\n" not in self._received:
             self._receive_more("not-websocket")
-        head, _, self._came = self._came.partition(b"\r\n\r\n")
+        head, _, self._received = self._received.partition(b"\r\n\r\n")
         status, *lines = head.split(b"\r\n")
         fields = dict(line.lower().partition(b":")[::2] for line in lines)
         accept = dict(line.partition(b":")[::2] for line in lines if line.lower().startswith(b"sec-websocket-accept"))
-        wanted = base64.b64encode(hashlib.sha1(key + _MAGIC, usedforsecurity=False).digest())  # RFC 6455 §4.2.2
+        # RFC 6455 §4.2.2
+        expected = base64.b64encode(hashlib.sha1(key + _WEBSOCKET_GUID, usedforsecurity=False).digest())
         if (
             status.split(b" ")[1:2] != [b"101"]
             or fields.get(b"upgrade", b"").strip() != b"websocket"
-            or [value.strip() for value in accept.values()] != [wanted]
+            or [value.strip() for value in accept.values()] != [expected]
         ):
             raise FAILURES.failure("not-websocket", shortened(status.decode("latin-1")))
 
     def _receive_more(self, mode: str) -> None:
-        """Receive more of a message; one longer than `LONGEST` is the failure of a ``mode``."""
-        if len(self._came) >= LONGEST:
+        """Receive more of a message; if it is longer than `LONGEST`, raise the failure of this ``mode``."""
+        if len(self._received) >= LONGEST:
             raise FAILURES.failure(mode, f"a message of more than {LONGEST:,} bytes")
-        more = self._link.receive(LONGEST - len(self._came))
+        more = self._link.receive(LONGEST - len(self._received))
         if not more:
             raise FAILURES.failure("closed", "while it was being opened")
-        self._came += more
+        self._received += more
 
     def send(self, message: Mapping[str, Any]) -> None:
         text = np.frombuffer(json.dumps(message, separators=(",", ":")).encode(), np.uint8)
@@ -162,19 +163,19 @@ class Messages:
 
     def receive(self) -> dict[str, Any]:
         while True:
-            data = np.frombuffer(self._came, np.uint8)
+            data = np.frombuffer(self._received, np.uint8)
             size = parse_header(data, 0, data.size, self._header)
             if size == VIOLATION:
                 raise FAILURES.failure("protocol")
             opcode, length = (int(value) for value in self._header)
             if length > LONGEST:
                 raise FAILURES.failure("protocol", f"a message of {length:,} bytes; at most {LONGEST:,} are permitted")
-            if size != INCOMPLETE and len(self._came) >= size + length:
-                text, self._came = self._came[size : size + length], self._came[size + length :]
+            if size != INCOMPLETE and len(self._received) >= size + length:
+                text, self._received = self._received[size : size + length], self._received[size + length :]
                 if opcode == CLOSE:
                     raise FAILURES.failure("closed", "while it was being opened")
                 if opcode == TEXT:
-                    return _object(text)
+                    return _parse_object(text)
                 continue
             self._receive_more("protocol")
 
@@ -185,13 +186,15 @@ class Messages:
     @property
     def left(self) -> bytes:
         """The bytes received after the last message."""
-        return self._came
+        return self._received
 
 
-def _object(text: bytes) -> dict[str, Any]:
+def _parse_object(text: bytes) -> dict[str, Any]:
     try:
         message = json.loads(text)
-        json.dumps(message, ensure_ascii=False, allow_nan=False).encode()  # as written to a receipt
+        json.dumps(
+            message, ensure_ascii=False, allow_nan=False
+        ).encode()  # it must be possible to write it to a receipt
     except (ValueError, RecursionError) as error:
         raise FAILURES.failure("not-json", shortened(str(error))) from None
     if not isinstance(message, dict):
@@ -208,12 +211,12 @@ def open_session(messages: Messages, link: Link, wanted_id: str = "") -> Session
     entry = _find_device(messages.ask(full_state_request(device_id)), device_id, inventory=False)
     in_force = entry.get("config")
     snapshot = config if in_force is None else in_force
-    wrong = _differing_settings(snapshot, _DEVICE_GLOBAL)
+    differences = _differing_settings(snapshot, _DEVICE_GLOBAL)
     if in_force is not None:
-        wrong += _differing_settings(in_force, _SESSION_SCOPED)
-    if wrong:
-        raise FAILURES.failure("settings", "; ".join(wrong))
-    round_trip_s = _measure(messages, link, device_id)
+        differences += _differing_settings(in_force, _SESSION_SCOPED)
+    if differences:
+        raise FAILURES.failure("settings", "; ".join(differences))
+    round_trip_s = _measure_round_trip(messages, link, device_id)
     described = {
         "device_id": device_id,
         "serial": device_id,
@@ -231,10 +234,10 @@ def open_session(messages: Messages, link: Link, wanted_id: str = "") -> Session
 
 def _find_device(message: Mapping[str, Any], wanted_id: str = "", *, inventory: bool = True) -> dict[str, Any]:
     """Return the entry in a message of the device with this id, or of the first one."""
-    listed = message.get("inverse3", [])
-    if not isinstance(listed, list):
+    devices = message.get("inverse3", [])
+    if not isinstance(devices, list):
         raise FAILURES.failure("version", "format 3.0")
-    entries = {str(entry["device_id"]): entry for entry in listed if isinstance(entry, dict) and "device_id" in entry}
+    entries = {str(entry["device_id"]): entry for entry in devices if isinstance(entry, dict) and "device_id" in entry}
     for name, entry in entries.items():
         if not wanted_id or name == wanted_id:
             if not ID.fullmatch(name):
@@ -261,11 +264,11 @@ def _check_status(status: Mapping[str, Any], *, at_opening: bool) -> None:
         raise FAILURES.failure("in-use")
 
 
-def _measure(messages: Messages, link: Link, device_id: str) -> float:
+def _measure_round_trip(messages: Messages, link: Link, device_id: str) -> float:
     """Return the 90th percentile of the round trip of a command of zero force [s]."""
-    taken = []
+    times_s = []
     for _ in range(_ROUND_TRIPS):
         began_s = link.now_s()
         messages.ask(_zero_force(device_id))
-        taken.append(link.now_s() - began_s)
-    return sorted(taken)[int(0.9 * len(taken))]
+        times_s.append(link.now_s() - began_s)
+    return sorted(times_s)[int(0.9 * len(times_s))]

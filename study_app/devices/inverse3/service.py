@@ -1,4 +1,4 @@
-"""The Inverse Service: the byte stream to it, and which devices it lists. Loads no compiler."""
+"""The Inverse Service: the byte stream to it, and the devices that it lists. Importing it loads no compiler."""
 
 import ctypes
 import io
@@ -27,13 +27,13 @@ OPENS_S: Final = 2.0
 """Time limit for opening a session, from the connection to the last reply [s]. [choice]"""
 ANSWER_S: Final = 0.5
 """Time limit for an answer over HTTP, from the connection to its last byte [s]. [choice]"""
-_CLOSE_S: Final = 0.2
+_CLOSE_TIMEOUT_S: Final = 0.2
 LONGEST: Final = 1 << 16
 """Greatest length of a message, of an answer, and of unread data [bytes]."""
 
 
 class TransferCalls(NamedTuple):
-    """A byte stream for compiled code: the handle to pass, and the addresses of its functions (``TRANSFER``)."""
+    """A byte stream for compiled code: the handle, and the addresses of its functions (``exchange._TRANSFER``)."""
 
     handle: int
     send: int
@@ -44,7 +44,7 @@ class Link(Protocol):
     """A byte stream."""
 
     def calls(self) -> TransferCalls:
-        """Return handle and function addresses for compiled code; from then on no call waits."""
+        """Return handle and function addresses for compiled code; from then on the functions do not wait."""
 
     def send(self, data: bytes) -> None:
         """Send all data; raise a ``DeviceFailure`` at the time-out."""
@@ -59,7 +59,7 @@ class Link(Protocol):
 
 
 class SocketLink(io.RawIOBase):
-    """A TCP connection to ``host:port`` without Nagle's algorithm; after ``within_s`` only `calls` may be used."""
+    """A TCP connection to ``host:port`` without Nagle's algorithm; `send` and `receive` fail after ``within_s``."""
 
     def __init__(self, host: str = HOST, port: int = PORT, within_s: float = OPENS_S) -> None:
         self._within_s, self._until_s = within_s, time.perf_counter() + within_s
@@ -72,21 +72,21 @@ class SocketLink(io.RawIOBase):
 
     def calls(self) -> TransferCalls:
         self._socket.setblocking(False)
-        send, receive = _addresses()
+        send, receive = _socket_function_addresses()
         return TransferCalls(handle=self._socket.fileno(), send=send, receive=receive)
 
     @contextmanager
     def _in_time(self) -> Iterator[None]:
-        """Limit a call to the remaining time, and convert its errors."""
-        left_s = self._until_s - time.perf_counter()
-        late = FAILURES.failure("no-reply", f"it did not finish within {self._within_s:g} s")
-        if left_s <= 0.0:
-            raise late
+        """Limit a call to the remaining time, and convert its errors to ``DeviceFailure``."""
+        remaining_s = self._until_s - time.perf_counter()
+        timeout = FAILURES.failure("no-reply", f"it did not finish within {self._within_s:g} s")
+        if remaining_s <= 0.0:
+            raise timeout
         try:
-            self._socket.settimeout(left_s)
+            self._socket.settimeout(remaining_s)
             yield
         except TimeoutError as error:
-            raise late from error
+            raise timeout from error
         except OSError as error:
             raise FAILURES.failure("closed", str(error.strerror or error)) from error
 
@@ -116,14 +116,14 @@ class SocketLink(io.RawIOBase):
     def close(self) -> None:
         with suppress(OSError):
             self._socket.shutdown(socket.SHUT_WR)
-            self._socket.settimeout(_CLOSE_S)
-            until_s = time.perf_counter() + _CLOSE_S
-            while self._socket.recv(1 << 16) and time.perf_counter() < until_s:
+            self._socket.settimeout(_CLOSE_TIMEOUT_S)
+            deadline_s = time.perf_counter() + _CLOSE_TIMEOUT_S
+            while self._socket.recv(1 << 16) and time.perf_counter() < deadline_s:
                 pass
         self._socket.close()
 
 
-def _addresses() -> tuple[int, int]:
+def _socket_function_addresses() -> tuple[int, int]:
     library = ctypes.CDLL("ws2_32" if sys.platform == "win32" else None)
     send, receive = (ctypes.cast(function, ctypes.c_void_p).value or 0 for function in (library.send, library.recv))
     return send, receive
@@ -142,8 +142,8 @@ def probe(host: str = "127.0.0.1", ports: tuple[int, ...] = PORTS) -> Backend:
     by = "Inverse Service"
     if not isinstance(answer, dict):
         return Backend("inverse3", by, state=NOT_AVAILABLE, can=_CAN, why=FAILURES.sentence("no-service"))
-    listed = answer.get("inverse3")
-    ids = [entry.get("device_id") for entry in listed if isinstance(entry, dict)] if isinstance(listed, list) else []
+    devices = answer.get("inverse3")
+    ids = [entry.get("device_id") for entry in devices if isinstance(entry, dict)] if isinstance(devices, list) else []
     if names := [name for name in ids if isinstance(name, str) and ID.fullmatch(name)]:
         return Backend("inverse3", by, state=f"connected: {', '.join(names)}", can=_CAN)
     return Backend("inverse3", by, state=NONE, can=_CAN, why=FAILURES.sentence("no-device"))
@@ -165,8 +165,8 @@ def force_scale(host: str, ports: tuple[int, ...] = PORTS) -> Any:
 def check_force_scale(answer: Any) -> float:
     """Return the multiplier of all forces in an answer; raise an error unless it is 1.
 
-    The shape of the answer is not documented: a bare number, or an object with the number as ``value`` or under the
-    key, are understood.
+    The form of the answer is not documented. A bare number is understood, and an object with the number under
+    ``value`` or ``devices/force_scale``.
     """
     scale = answer.get("value", answer.get("devices/force_scale")) if isinstance(answer, dict) else answer
     if type(scale) not in {int, float}:  # a bool is not a number
@@ -180,13 +180,13 @@ def check_force_scale(answer: Any) -> float:
 def _get_json(host: str, path: str, ports: tuple[int, ...] = PORTS) -> Any:
     """Return the service's JSON answer to a GET request; None if no port answers within `ANSWER_S`.
 
-    The connection uses no proxy of the system: the service is in the local network.
+    The system's proxy is not used, since the service is in the local network.
     """
-    until_s = time.perf_counter() + ANSWER_S
+    deadline_s = time.perf_counter() + ANSWER_S
     for port in ports:
         with (
             suppress(DeviceFailure, HTTPException, ValueError, RecursionError),
-            closing(SocketLink(host, port, max(until_s - time.perf_counter(), 0.01))) as link,
+            closing(SocketLink(host, port, max(deadline_s - time.perf_counter(), 0.01))) as link,
         ):
             link.send(f"GET {path} HTTP/1.1\r\nHost: {host}:{port}\r\nConnection: close\r\n\r\n".encode())
             answer = HTTPResponse(link)  # type: ignore[arg-type] # only the file of a socket is needed

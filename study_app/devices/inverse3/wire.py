@@ -2,10 +2,10 @@
 
 Frames follow RFC 6455 §5.2 (layout), §5.3 (masking), §5.5 (control frames). A client masks what it sends; a server must
 not (§5.1). The service answers each message with one text frame, so fragments (§5.4) are not expected and count as a
-violation of the protocol. `scan` reads what a state message says of one device (RFC 8259). It checks the grammar of the
-whole message, in any order of its keys, and keeps the numbers at the places that it knows (``_PLACES``). Unknown keys
-are skipped, so that a later service may add some. A place is known by a hash of the keys that lead to it; an element of
-an array counts as the key ``*``.
+violation of the protocol. `scan` reads the values of one device from a state message (RFC 8259). It checks the grammar
+of the whole message, with its keys in any order, and stores the numbers at known paths (``_PLACES``). Unknown keys are
+skipped, so that a later service may add some. A path is identified by a hash of its keys; an element of an array has
+the key ``*``.
 
 Documented in docs.haply.co, version 3.5.x: "WebSocket Protocol", steps 1 and 2 (``inverse3``: ``state.cursor_position``
 [m], ``state.cursor_velocity`` [m/s], ``status``) and "HTTP", Devices (``verse_grip``, ``wireless_verse_grip``).
@@ -42,19 +42,19 @@ def parse_header(data: Any, begin: int, end: int, header: Any) -> int:
     first: Any = np.int64(data[begin])
     second: Any = np.int64(data[begin + 1])
     opcode = first & 0x0F
-    control = opcode >= CLOSE
+    is_control = opcode >= CLOSE
     if first & 0xF0 != _FIN or second & _MASKED or opcode not in (TEXT, CLOSE, PING, PONG):
         return VIOLATION
     size, length = 2, second
     if length > LONGEST_CONTROL:
-        if control:
+        if is_control:
             return VIOLATION
-        more = 2 if length == 126 else 8
-        size = 2 + more
+        length_bytes = 2 if length == 126 else 8
+        size = 2 + length_bytes
         if end - begin < size:
             return INCOMPLETE
         length = 0
-        for k in range(more):
+        for k in range(length_bytes):
             length = (length << 8) | np.int64(data[begin + 2 + k])
         if length < 0:
             return VIOLATION
@@ -111,22 +111,22 @@ def put_text(out: Any, at: int, text: Any) -> int:
 @kernel
 def put_fixed(out: Any, at: int, value: float) -> int:
     """Write a number below 10^9 as JSON with six decimals from ``at`` on; return the end."""
-    whole = int(abs(value) * _SCALE + 0.5)
-    if value < 0.0 and whole > 0:
+    scaled = int(abs(value) * _SCALE + 0.5)
+    if value < 0.0 and scaled > 0:
         out[at] = np.uint8(45)
         at += 1
     digits = _DECIMALS + 1
     power = _SCALE
-    while whole // power >= 10:
+    while scaled // power >= 10:
         power *= 10
         digits += 1
     for k in range(digits):
         if digits - k == _DECIMALS:
             out[at] = np.uint8(46)
             at += 1
-        out[at] = np.uint8(48 + whole // power)
+        out[at] = np.uint8(48 + scaled // power)
         at += 1
-        whole %= power
+        scaled %= power
         power //= 10
     return at
 
@@ -137,7 +137,7 @@ NO_DEVICE: Final = 2  # the message does not list the device
 WITHOUT_POSITION: Final = 3  # the device has no position
 NOT_FINITE: Final = 4
 
-_DEEPEST: Final = 16
+_MAX_DEPTH: Final = 16
 _OBJECT, _ARRAY = 1, 2
 _FNV_BASIS, _FNV_PRIME = 0xCBF29CE484222325, 0x100000001B3
 
@@ -153,14 +153,14 @@ _PLACES: Final = (
 )
 POSITION, VELOCITY, READY, CALIBRATED, POWER, BUTTON, BUTTONS = 0, 3, 6, 7, 8, 9, 10
 PLACES: Final = len(_PLACES)
-_OF_DEVICE = 9  # positions of the inverse3; later ones are of grips
-_NEEDED = 0b111
+_DEVICE_PLACES = 9  # number of places of the device itself; the rest are those of grips
+_POSITION_BITS = 0b111
 
 SCAN = np.dtype(
     [
         ("own_id", np.uint64),  # hash of the device's id
-        ("kinds", np.int64, (_DEEPEST,)),
-        ("paths", np.uint64, (_DEEPEST,)),
+        ("kinds", np.int64, (_MAX_DEPTH,)),
+        ("paths", np.uint64, (_MAX_DEPTH,)),
         ("candidate", np.float64, (PLACES,)),  # of the device being read
         ("seen", np.int64),  # bits of the values read for the candidate
         ("value", np.float64, (PLACES,)),  # of the device
@@ -203,26 +203,26 @@ def scan(data: Any, begin: int, end: int, state: Any) -> int:
     ``state`` is a record of `SCAN`, whose ``own_id`` identifies the device.
     """
     state.known = state.found = state.infinite = state.seen = state.is_own = 0
-    at, depth, path, value_due = _skip(data, begin, end), 0, _NOTHING, True
+    at, depth, path, value_due = _skip_space(data, begin, end), 0, _NOTHING, True
     while True:
         if at >= end:
             return NOT_JSON
         byte = data[at]
         if value_due:
             if byte == 123 or byte == 91:  # noqa: PLR1714 - { or [; compiled as it stands
-                if depth + 1 >= _DEEPEST:
+                if depth + 1 >= _MAX_DEPTH:
                     return NOT_JSON
                 depth += 1
                 state.kinds[depth] = _OBJECT if byte == 123 else _ARRAY
                 state.paths[depth] = path
                 if path == _DEVICE:
                     state.seen = state.is_own = 0
-                at = _skip(data, at + 1, end)
+                at = _skip_space(data, at + 1, end)
                 if at < end and data[at] == (125 if byte == 123 else 93):
                     value_due = False
                     continue
             else:
-                at = _skip(data, _scalar(data, at, end, path, state), end)
+                at = _skip_space(data, _parse_scalar(data, at, end, path, state), end)
                 value_due = False
                 if at < 0:
                     return NOT_JSON
@@ -230,14 +230,14 @@ def scan(data: Any, begin: int, end: int, state: Any) -> int:
                     return NOT_JSON  # a state is an object
                 continue
         elif byte == 44:  # ,
-            at = _skip(data, at + 1, end)
+            at = _skip_space(data, at + 1, end)
         elif byte == (125 if state.kinds[depth] == _OBJECT else 93):  # } ]
             if state.paths[depth] == _DEVICE:
-                _keep(state)
+                _accept_values(state)
             depth -= 1
-            at = _skip(data, at + 1, end)
+            at = _skip_space(data, at + 1, end)
             if depth == 0:
-                return _verdict(state) if at == end else NOT_JSON
+                return _result_of(state) if at == end else NOT_JSON
             continue
         else:
             return NOT_JSON
@@ -249,30 +249,30 @@ def scan(data: Any, begin: int, end: int, state: Any) -> int:
         close = _string_end(data, at, end)
         if close < 0:
             return NOT_JSON
-        path = (state.paths[depth] ^ _hash(data, at + 1, close)) * _PRIME
-        at = _skip(data, close + 1, end)
+        path = (state.paths[depth] ^ _hash_bytes(data, at + 1, close)) * _PRIME
+        at = _skip_space(data, close + 1, end)
         if at >= end or data[at] != 58:  # :
             return NOT_JSON
-        at = _skip(data, at + 1, end)
+        at = _skip_space(data, at + 1, end)
 
 
 @kernel
-def _verdict(state: Any) -> int:
+def _result_of(state: Any) -> int:
     if state.found == 0:
         return NO_DEVICE
     if state.infinite:
         return NOT_FINITE
-    return UNDERSTOOD if state.known & _NEEDED == _NEEDED else WITHOUT_POSITION
+    return UNDERSTOOD if state.known & _POSITION_BITS == _POSITION_BITS else WITHOUT_POSITION
 
 
 @kernel
-def _keep(state: Any) -> None:
+def _accept_values(state: Any) -> None:
     """Accept the values read for a device if its id matches."""
     if state.is_own == 0:
         return
     state.found = 1
     state.known |= state.seen
-    for place in range(_OF_DEVICE):
+    for place in range(_DEVICE_PLACES):
         if state.seen >> place & 1:
             state.value[place] = state.candidate[place]
             if not abs(state.value[place]) < np.inf:
@@ -280,7 +280,7 @@ def _keep(state: Any) -> None:
 
 
 @kernel
-def _skip(data: Any, at: int, end: int) -> int:
+def _skip_space(data: Any, at: int, end: int) -> int:
     """Return the end of the white space from ``at`` onwards; a negative ``at`` is returned unchanged."""
     while 0 <= at < end and data[at] <= 32:
         byte = data[at]
@@ -322,7 +322,7 @@ def _is_escape(data: Any, at: int, end: int) -> bool:
 
 
 @kernel
-def _hash(data: Any, begin: int, end: int) -> Any:
+def _hash_bytes(data: Any, begin: int, end: int) -> Any:
     value = _BASIS
     for i in range(begin, end):
         value = (value ^ np.uint64(data[i])) * _PRIME
@@ -330,41 +330,41 @@ def _hash(data: Any, begin: int, end: int) -> Any:
 
 
 @kernel
-def _scalar(data: Any, at: int, end: int, path: Any, state: Any) -> int:
+def _parse_scalar(data: Any, at: int, end: int, path: Any, state: Any) -> int:
     """Read a string, number or literal, and store it if its path is known; return the end, -1 if it is invalid."""
     byte = data[at]
     if byte == 34:
         close = _string_end(data, at, end)
         if close < 0:
             return -1
-        if path == _ID and _hash(data, at + 1, close) == state.own_id:
+        if path == _ID and _hash_bytes(data, at + 1, close) == state.own_id:
             state.is_own = 1
         return close + 1
     if byte == 116:  # true
-        return _literal(data, at, end, _TRUE, 1.0, path, state)
+        return _parse_literal(data, at, end, _TRUE, 1.0, path, state)
     if byte == 102:  # false
-        return _literal(data, at, end, _FALSE, 0.0, path, state)
+        return _parse_literal(data, at, end, _FALSE, 0.0, path, state)
     if byte == 110:  # null
-        return _literal(data, at, end, _NULL, np.nan, path, state)
-    return _number(data, at, end, path, state)
+        return _parse_literal(data, at, end, _NULL, np.nan, path, state)
+    return _parse_number(data, at, end, path, state)
 
 
 _TRUE, _FALSE, _NULL = (np.frombuffer(word, np.uint8) for word in (b"true", b"false", b"null"))
 
 
 @kernel
-def _literal(data: Any, at: int, end: int, word: Any, value: float, path: Any, state: Any) -> int:
+def _parse_literal(data: Any, at: int, end: int, word: Any, value: float, path: Any, state: Any) -> int:
     if at + word.size > end:
         return -1
     for k in range(word.size):
         if data[at + k] != word[k]:
             return -1
-    _note(state, path, value)
+    _store_value(state, path, value)
     return at + int(word.size)
 
 
 @kernel
-def _number(data: Any, at: int, end: int, path: Any, state: Any) -> int:
+def _parse_number(data: Any, at: int, end: int, path: Any, state: Any) -> int:
     """Read a number with a relative error up to 1e-15, far below a device's resolution."""
     negative = data[at] == 45
     if negative:
@@ -401,15 +401,15 @@ def _number(data: Any, at: int, end: int, path: Any, state: Any) -> int:
     if power != 0 and mantissa != 0.0:
         tens = _TENS[min(abs(power), _TENS.size - 1)]
         value = mantissa / tens if power < 0 else mantissa * tens
-    _note(state, path, -value if negative else value)
+    _store_value(state, path, -value if negative else value)
     return at
 
 
 @kernel
-def _note(state: Any, path: Any, value: float) -> None:
+def _store_value(state: Any, path: Any, value: float) -> None:
     for place in range(PLACES):
         if path == _CODES[place]:
-            if place < _OF_DEVICE:
+            if place < _DEVICE_PLACES:
                 state.candidate[place] = value
                 state.seen |= 1 << place
             else:

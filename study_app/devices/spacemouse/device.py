@@ -30,7 +30,7 @@ from study_app.devices.spacemouse.hid import (
 
 _REPORT_BYTES = 64
 _WAIT_MS = 10
-_SILENT_S = 0.5  # a held displacement is repeated every 8 or 16 ms: after a longer silence the cap was released
+_SILENT_S = 0.5  # a displacement is repeated every 8 or 16 ms, so after this silence the cap was released
 _LONGEST_STEP_S = 0.05
 
 
@@ -76,12 +76,12 @@ class SpaceMouseDevice(PointedDevice):
         hid = self._hid if self._hid is not None else load_hid()
         self._model, path = choose_interface(find_space_mice(hid))
         self._open_hid = open_interface(hid, self._model, path)
-        self._light(on=True)
+        self._set_light(on=True)
         self.point_to(*self.aim_m)
         self.release()
         super().open()
         self._ending.clear()
-        self.thread = threading.Thread(target=self._read_on, name="SpaceMouse", daemon=True)
+        self.thread = threading.Thread(target=self._read_loop, name="SpaceMouse", daemon=True)
         self.thread.start()
 
     def close(self) -> None:
@@ -92,46 +92,48 @@ class SpaceMouseDevice(PointedDevice):
             self._ending.set()
             thread.join()
         if self._open_hid is not None:
-            self._light(on=False)
+            self._set_light(on=False)
             self._open_hid.close()
             self._open_hid = None
 
     def describe(self) -> dict[str, Any]:
-        own = {
+        model_facts = {
             "model": None if self._model is None else self._model.name,
             "full_speed_mps": FULL_SPEED_MPS,
             "dead_share": DEAD_DEFLECTION / FULL_DEFLECTION,
         }
-        return super().describe() | own
+        return super().describe() | model_facts
 
-    def _read_on(self) -> None:
+    def _read_loop(self) -> None:
         """Read until the mouse is closed or lost; the servo detects a loss at its next tick."""
         assert self._model is not None  # noqa: S101 - it is open
-        moving = Displacement(right=0, toward=0, down=0)
-        place_m = self.aim_m
+        displacement = Displacement(right=0, toward=0, down=0)
+        pointer_m = self.aim_m
         now_s = heard_s = self._now_s()
         while not self._ending.is_set():
             try:
-                said = parse_report(bytes(self._open_hid.read(_REPORT_BYTES, _WAIT_MS)))
+                report = parse_report(bytes(self._open_hid.read(_REPORT_BYTES, _WAIT_MS)))
             except (OSError, ValueError):
                 self.unplug()
                 return
             before_s, now_s = now_s, self._now_s()
-            if said is not None:
+            if report is not None:
                 heard_s = now_s
             elif now_s - heard_s > _SILENT_S:
-                moving = Displacement(right=0, toward=0, down=0)
+                displacement = Displacement(right=0, toward=0, down=0)
             step_s = min(now_s - before_s, _LONGEST_STEP_S)
-            goes = velocity_mps(moving)
-            if any(goes):
-                place_m = self._inside(*(at + step_s * speed for at, speed in zip(place_m, goes, strict=True)))
-                self.point_to(*place_m)
-            if isinstance(said, Displacement):
-                moving = said
-            elif isinstance(said, Buttons):
-                self.press(program_buttons(said.held, self._model))
+            velocity = velocity_mps(displacement)
+            if any(velocity):
+                pointer_m = self._within_workspace(
+                    *(at + step_s * speed for at, speed in zip(pointer_m, velocity, strict=True))
+                )
+                self.point_to(*pointer_m)
+            if isinstance(report, Displacement):
+                displacement = report
+            elif isinstance(report, Buttons):
+                self.press(program_buttons(report.held, self._model))
 
-    def _light(self, *, on: bool) -> None:
+    def _set_light(self, *, on: bool) -> None:
         if self._model is not None and self._model.light:
             with suppress(OSError, ValueError):  # it has no light, or was unplugged
                 self._open_hid.write(bytes([LED, int(on)]))

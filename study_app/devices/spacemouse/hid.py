@@ -1,13 +1,13 @@
-"""SpaceMice as hidapi sees them: models, reports byte by byte, which are connected, and why one cannot be opened.
+"""SpaceMice as hidapi presents them: models, reports, connected devices, and reasons why one cannot be opened.
 
-Report 1 is the cap's displacement (three little-endian int16: right, toward the user, down), on newer models with its
-rotation behind it; report 2 the rotation of older models; report 3 the buttons, a bit each, the lowest first. Full
-deflection is about 350. Sources: pyspacemouse's table of devices, whose own observations these are; never seen here on
-a device.
+Report 1 is the cap's displacement (three little-endian int16: right, toward the user, down), on newer models followed
+by its rotation. Report 2 is the rotation of older models. Report 3 has one bit per button, the lowest bit first. Full
+deflection is about 350. The source is pyspacemouse's table of devices, which is based on observations; it has not been
+checked here on a device.
 
-Known ways to fail: on Linux the device's node belongs to the administrator (a rule for udev helps); on macOS
-3Dconnexion's helper seizes it, so that it does not open or stays silent; a universal receiver shows several interfaces,
-of which one reports motion. Loads no compiler, and hidapi only when asked to.
+Known problems: on Linux the device's node belongs to the administrator, which a udev rule changes; on macOS
+3Dconnexion's helper uses the device exclusively, so that it does not open or stays silent; a universal receiver has
+several interfaces, only one of which reports motion. Importing this module loads neither a compiler nor hidapi.
 """
 
 import sys
@@ -29,7 +29,7 @@ FULL_SPEED_MPS: Final = 0.25
 _USAGE: Final = (1, 8)
 """Page and usage of the collection that reports motion: generic desktop, multi-axis controller."""
 
-_PAIR: Final = 0b11
+_FIRST_TWO_BUTTONS: Final = 0b11
 _KNOWN_BUTTONS: Final = 0b11
 
 
@@ -83,7 +83,7 @@ def parse_report(report: bytes) -> Displacement | Buttons | None:
         return None
     kind, rest = report[0], report[1:]
     if kind == DISPLACEMENT and len(rest) >= 6:
-        right, toward, down = (int.from_bytes(rest[at : at + 2], "little", signed=True) for at in (0, 2, 4))
+        right, toward, down = (int.from_bytes(rest[offset : offset + 2], "little", signed=True) for offset in (0, 2, 4))
         return Displacement(right=right, toward=toward, down=down)
     if kind == BUTTONS and rest:
         return Buttons(int.from_bytes(rest, "little"))
@@ -97,7 +97,7 @@ def program_buttons(held: int, model: Model) -> int:
     """
     buttons = held & _KNOWN_BUTTONS
     escape = model.escape is not None and bool(held >> model.escape & 1)
-    if escape or held & _PAIR == _PAIR:
+    if escape or held & _FIRST_TWO_BUTTONS == _FIRST_TWO_BUTTONS:
         buttons |= BUTTON_STOP
     return buttons
 
@@ -109,8 +109,8 @@ def velocity_mps(displacement: Displacement) -> Vector:
 
 def _speed(deflection: int) -> float:
     """Return the speed for a deflection [m/s]: 0 in the dead zone, then proportional up to the maximum."""
-    beyond = min(abs(deflection), FULL_DEFLECTION) - DEAD_DEFLECTION
-    share = max(beyond, 0) / (FULL_DEFLECTION - DEAD_DEFLECTION)
+    excess = min(abs(deflection), FULL_DEFLECTION) - DEAD_DEFLECTION
+    share = max(excess, 0) / (FULL_DEFLECTION - DEAD_DEFLECTION)
     return FULL_SPEED_MPS * (share if deflection > 0 else -share)
 
 
@@ -147,9 +147,9 @@ def load_hid() -> Any:
 
 def find_space_mice(hid: Any) -> list[tuple[Model, dict[str, Any]]]:
     """Return model and hidapi's description of every interface of every connected SpaceMouse."""
-    known = {(model.vendor, model.product): model for model in MODELS}
+    models = {(model.vendor, model.product): model for model in MODELS}
     listed = [
-        (known.get((interface["vendor_id"], interface["product_id"])), interface) for interface in hid.enumerate()
+        (models.get((interface["vendor_id"], interface["product_id"])), interface) for interface in hid.enumerate()
     ]
     return [(model, interface) for model, interface in listed if model is not None]
 
@@ -162,9 +162,9 @@ def choose_interface(interfaces: list[tuple[Model, dict[str, Any]]]) -> tuple[Mo
             + ", ".join(m.name for m in MODELS)
         )
     usages = [(interface.get("usage_page") or 0, interface.get("usage") or 0) for _, interface in interfaces]
-    for wanted in (_USAGE, (0, 0)):
-        if wanted in usages:
-            model, chosen = interfaces[usages.index(wanted)]
+    for usage in (_USAGE, (0, 0)):
+        if usage in usages:
+            model, chosen = interfaces[usages.index(usage)]
             return model, chosen["path"]
     raise DeviceError(f"the {interfaces[0][0].name} {_NO_MOTION_INTERFACE}")
 

@@ -520,9 +520,8 @@ def count_single(case: _Case, seed: int, batch: int, studies: int) -> tuple[Rate
     rate = partial(Rate, cell=case[0], participants=case[1])
     if what != COVERS:
         return (rate(what=what, limit=limit, hits=sum(map(bool, p_values)), studies=len(p_values)),)
-    half_limit: _Limit = (
-        "counted" if case[1] == _SIZES[0] else "60 to 80 %"
-    )  # with five participants t intervals are wide
+    # with five participants t intervals are wide
+    half_limit: _Limit = "counted" if case[1] == _SIZES[0] else "60 to 80 %"
     return (
         rate(what=PRINTED, limit="at least 93 %", hits=len(p_values), studies=studies),
         rate(what=what, limit=limit, hits=sum(result <= 1.0 for result in p_values), studies=len(p_values)),

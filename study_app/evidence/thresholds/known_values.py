@@ -332,10 +332,8 @@ class KnownThreshold(_KnownValue):
             [jnd_slope(standards, np.array([estimate.value for estimate in person]) * unit) for person in study.own]
             for study in studies
         ]
-        mean_slopes, expected = (
-            np.mean(slopes, axis=1),
-            0.0 if self._of_delay else 1.0,
-        )  # a constant JND, or Weber's law
+        # a constant JND, or Weber's law
+        mean_slopes, expected = (np.mean(slopes, axis=1), 0.0 if self._of_delay else 1.0)
         yield Measure(
             study=self.name,
             what="exponent of the JND against the standard",

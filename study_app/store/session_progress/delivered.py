@@ -287,9 +287,8 @@ def broken_interval_limits(
         is_fitted = _varies_damping(presented) and not adjusted
         measured = delivery.value_delivered if is_fitted else delivery.force_share
         requested = presented.value if is_fitted else 1.0
-        if (
-            abs((measured or 0.0) - requested) > abs(requested) * max_error_percent / 100
-        ):  # a hand at rest receives no force
+        # a hand at rest receives no force
+        if abs((measured or 0.0) - requested) > abs(requested) * max_error_percent / 100:
             yield "level_error_percent"
     if presented.vary not in {None, DELAY} and max_error_percent is not None and delivery.clipped:
         yield "force_limit_n"

@@ -104,9 +104,8 @@ class Progress:
     def missing_trials(self) -> MissingTrials:
         """The main trials of intervals that were not delivered, out of those that are over."""
         limits = {} if self.start is None else self.start.limits
-        current = (
-            self.trial if self.invalid < limits.get("attempts", 1) else None
-        )  # the current trial is presented again
+        # the current trial is presented again
+        current = self.trial if self.invalid < limits.get("attempts", 1) else None
         missing = tuple(
             MissingTrial(
                 trial=number,

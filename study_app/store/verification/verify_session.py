@@ -405,9 +405,8 @@ def _changed_responses(lines: Sequence[events.Event]) -> Iterator[str]:
             chosen = dict(progress.answers)
             where = f"form {line.form}" if isinstance(line, events.FormAnswered) else f"trial {line.trial}"
             line_name = f"line {line.n} ({line.event})"
-            may_hide = any(
-                row.kind is not None for row in line.items
-            )  # format 2: a question may have been hidden again
+            # format 2: a question may have been hidden again
+            may_hide = any(row.kind is not None for row in line.items)
             for row in line.items:
                 if not _same_answer(row, chosen.pop(row.item, events.Answer())):
                     problem = "that differs from the one chosen earlier: it has been changed"

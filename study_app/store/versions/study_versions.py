@@ -86,9 +86,8 @@ def save_study(file: Path, text: str, base: str) -> str:
             keep_version(file, content, "found")
         elif base:
             raise ChangedOutsideError(f"{file} was deleted or moved by another program: save it as another study")
-        keep_version(
-            file, source, "saved"
-        )  # before the file, so that an error always means that the file was not written
+        # before the file, so that an error always means that the file was not written
+        keep_version(file, source, "saved")
         write_whole(target, source)
         if mode is not None:
             target.chmod(mode)
