@@ -53,7 +53,7 @@ class _RandomHand(ScriptedDevice):
 
     def start_motion(self) -> float:
         """Start a random motion and return its duration [s]."""
-        self._tremble(TREMOR_M)
+        self._set_tremor(TREMOR_M)
         kind = self._draw()
         if kind < 0.3:
             return self._reach()
@@ -64,10 +64,10 @@ class _RandomHand(ScriptedDevice):
 
     def keep_still(self) -> None:
         """Stay at rest without tremor, so that the encoder counts are constant."""
-        self._tremble(0.0)
+        self._set_tremor(0.0)
         self.rest()
 
-    def _tremble(self, amplitude_m: float) -> None:
+    def _set_tremor(self, amplitude_m: float) -> None:
         self.state.hand.tremor_m = amplitude_m
 
     def _reach(self) -> float:
