@@ -149,15 +149,15 @@ def _draw_fault(faults: Any) -> int:
     while kind < len(KINDS) - 1 and point >= faults.share[kind]:
         point -= faults.share[kind]
         kind += 1
-    faults.wait = _between(faults, faults.gap[0], faults.gap[1])
-    faults.left = _between(faults, faults.least[kind], faults.most[kind])
-    faults.choice = _between(faults, 0, 8)
+    faults.wait = _draw_integer(faults, faults.gap[0], faults.gap[1])
+    faults.left = _draw_integer(faults, faults.least[kind], faults.most[kind])
+    faults.choice = _draw_integer(faults, 0, 8)
     faults.kind = kind
     return kind
 
 
 @kernel
-def _between(faults: Any, least: int, most: int) -> int:
+def _draw_integer(faults: Any, least: int, most: int) -> int:
     return least + int(random(faults) * (most - least + 1))
 
 
@@ -189,7 +189,7 @@ def _read(context: int, now_ns: int, reading: int) -> int:
     elif kind == LOST_AT_WRITE:
         faults.losing = 1
     elif kind == JUMP:
-        jump_ns = _between(faults, _MIN_JUMP_NS, _MAX_JUMP_NS)
+        jump_ns = _draw_integer(faults, _MIN_JUMP_NS, _MAX_JUMP_NS)
         _virtual_at(faults.clock).now_ns += jump_ns
         faults.jumped_ns += jump_ns
     return answer

@@ -75,7 +75,7 @@ class Guard:
         if child.stdout is None or child.stdout.readline() != READY:
             child.kill()
             child.wait()
-            _close(child)
+            _close_streams(child)
             raise DeviceError(
                 f"the guard process for the device '{self._name}' could not be started, so forces cannot be sent: "
                 "reinstall liquid-study"
@@ -96,11 +96,11 @@ class Guard:
 
     def stand_down(self) -> None:
         """Dismiss the guard, since the force is zero and the device is closed. A second call does nothing."""
-        self._end(_DISMISSAL)
+        self._end_process(_DISMISSAL)
 
     def release(self) -> None:
         """Make the guard end the force after the device is closed; wait for it to exit."""
-        self._end(b"")
+        self._end_process(b"")
 
     def leave(self) -> None:
         """Make the guard end the force once the device is reconnected, within a limited time; return at once.
@@ -125,7 +125,7 @@ class Guard:
         if left_child is not None:
             left_child.kill()
 
-    def _end(self, message: bytes) -> None:
+    def _end_process(self, message: bytes) -> None:
         child, self.child = self.child, None
         allow_suspension(self)
         if child is None or child.stdin is None:
@@ -141,7 +141,7 @@ class Guard:
             child.wait()
         if self.listener is not None:
             self.listener.join()
-        _close(child)
+        _close_streams(child)
 
     def __enter__(self) -> Self:
         self.start()
@@ -160,10 +160,10 @@ def _dismiss_child(child: subprocess.Popen[bytes], listener: threading.Thread | 
     child.wait()
     if listener is not None:
         listener.join()
-    _close(child)
+    _close_streams(child)
 
 
-def _close(child: subprocess.Popen[bytes]) -> None:
+def _close_streams(child: subprocess.Popen[bytes]) -> None:
     for stream in (child.stdin, child.stdout):
         if stream is not None:
             stream.close()

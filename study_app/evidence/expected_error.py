@@ -76,14 +76,14 @@ class Expected(NamedTuple):
 
 def expected(scene: Scene, delay_ticks: int = ASSUMED_TICKS) -> Expected:
     """Measure a scene's cost and predict its error; with several liquids, the greatest error."""
-    share, error_n, causes, against = _errors(resolve(scene), delay_ticks)
+    share, error_n, causes, against = _scene_errors(resolve(scene), delay_ticks)
     cost_ns = measure(scene).scene_ns
     return Expected(cost_ns=cost_ns, error_share=share, error_n=error_n, causes=causes, against=against)
 
 
 def error_report(scene: Scene, delay_ticks: int = ASSUMED_TICKS) -> str:
     """Return the expected error on a device with a delay as one line of text."""
-    error_share, error_n, causes, against = _errors(resolve(scene), delay_ticks)
+    error_share, error_n, causes, against = _scene_errors(resolve(scene), delay_ticks)
     shares = (
         f"{name} {f'{100 * share:.2g} %' if share > ROUNDING else 'none'}" for name, share in causes._asdict().items()
     )
@@ -142,7 +142,7 @@ def _single_liquid_scene(scene: Scene, liquid: Liquid) -> Scene:
     return with_effects(scene.model_copy(update={"liquids": (filling,)}), *kept_effects)
 
 
-def _errors(scene: Scene, delay_ticks: int) -> tuple[float, float, Causes, str]:
+def _scene_errors(scene: Scene, delay_ticks: int) -> tuple[float, float, Causes, str]:
     if not scene.liquids:
         return 0.0, 0.0, Causes(), "a scene without liquids"
     return max(

@@ -74,7 +74,7 @@ class Tracker:
     def __init__(self, limit_s: float, at_limit: Outcome) -> None:
         self.outcome: Outcome | None = None
         self.end_ns: int | None = None
-        self._limit_ns = _nanoseconds(limit_s)
+        self._limit_ns = _to_nanoseconds(limit_s)
         self._at_limit = at_limit
         self._start_ns: int | None = None
         self._newest_ns = 0
@@ -93,7 +93,7 @@ class Tracker:
         limit_ns = self._start_ns + self._limit_ns
         count = int(np.searchsorted(times, limit_ns)) + 1
         times = times[:count]
-        reached = self._follow(times, samples["position_m"][:count])
+        reached = self._process_samples(times, samples["position_m"][:count])
         if not self.done:
             self._newest_ns = int(times[-1])
             if self._newest_ns >= limit_ns:
@@ -106,7 +106,7 @@ class Tracker:
 
     def finish(self, least_s: float) -> bool:
         """End the task if it has lasted for ``least_s``; return whether it has."""
-        if self.done or self._start_ns is None or self._newest_ns - self._start_ns < _nanoseconds(least_s):
+        if self.done or self._start_ns is None or self._newest_ns - self._start_ns < _to_nanoseconds(least_s):
             return False
         self._finish("complete", self._newest_ns)
         return True
@@ -115,9 +115,9 @@ class Tracker:
         """Return the view of the task at ``time_ns``, limited to the time from its start to the newest sample."""
         start_ns = self._start_ns
         if start_ns is None:
-            return self._view(0, 0)
+            return self._task_view(0, 0)
         time_ns = min(max(time_ns, start_ns), self._newest_ns)
-        return self._view(time_ns, time_ns - start_ns)
+        return self._task_view(time_ns, time_ns - start_ns)
 
     def now(self) -> TaskView:
         """Return the view at the newest sample, for decisions; the participant sees an older one."""
@@ -128,10 +128,10 @@ class Tracker:
         duration_ns = 0 if self._start_ns is None else self._newest_ns - self._start_ns
         return {"duration_s": duration_ns / _NS, "targets_reached": None, "targets": None}
 
-    def _follow(self, _times: NDArray[np.int64], _positions: NDArray[np.float64]) -> list[TargetReached]:
+    def _process_samples(self, _times: NDArray[np.int64], _positions: NDArray[np.float64]) -> list[TargetReached]:
         return []
 
-    def _view(self, _time_ns: int, elapsed_ns: int) -> TaskView:
+    def _task_view(self, _time_ns: int, elapsed_ns: int) -> TaskView:
         return TaskView(lit=None, reached=0, of=None, dwell=0.0, elapsed_s=elapsed_ns / _NS)
 
     def _finish(self, outcome: Outcome, end_ns: int) -> None:
@@ -148,7 +148,7 @@ class TimedTracker(Tracker):
     def leave(self) -> bool:
         return self._task.least_s is not None and self.finish(self._task.least_s)
 
-    def _view(self, _time_ns: int, elapsed_ns: int) -> TaskView:
+    def _task_view(self, _time_ns: int, elapsed_ns: int) -> TaskView:
         elapsed_s = elapsed_ns / _NS
         target_m = self._task.target_m(elapsed_s)
         return TaskView(
@@ -175,7 +175,7 @@ class ReachTracker(Tracker):
             super().__init__(task.duration_s, "complete")
         self._targets_m = np.asarray(task.targets_m, np.float64)
         self._radius_m = task.radius_m
-        self._dwell_ns = _nanoseconds(task.dwell_s)
+        self._dwell_ns = _to_nanoseconds(task.dwell_s)
         self._count = task.count
         self._marks = [_Mark(reached=0, lit=0)]
         self._mark_times = [0]
@@ -183,14 +183,14 @@ class ReachTracker(Tracker):
     def summary(self) -> dict[str, Any]:
         return super().summary() | {"targets_reached": self._marks[-1].reached, "targets": self._count}
 
-    def _view(self, time_ns: int, elapsed_ns: int) -> TaskView:
+    def _task_view(self, time_ns: int, elapsed_ns: int) -> TaskView:
         mark = self._marks[max(bisect_right(self._mark_times, time_ns) - 1, 0)]
         dwell = 0.0
         if mark.entered_ns is not None and self._dwell_ns:
             dwell = min((time_ns - mark.entered_ns) / self._dwell_ns, 1.0)
         return TaskView(lit=mark.lit, reached=mark.reached, of=self._count, dwell=dwell, elapsed_s=elapsed_ns / _NS)
 
-    def _follow(self, times: NDArray[np.int64], positions: NDArray[np.float64]) -> list[TargetReached]:
+    def _process_samples(self, times: NDArray[np.int64], positions: NDArray[np.float64]) -> list[TargetReached]:
         reached: list[TargetReached] = []
         row = 0
         while row < len(times) and (lit := self._marks[-1].lit) is not None:
@@ -207,7 +207,7 @@ class ReachTracker(Tracker):
             left_row = len(times) if inside.all() else row + int(inside.argmin())
             reached_row = row + int(np.searchsorted(times[row:], entered_ns + self._dwell_ns))
             if reached_row < left_row:
-                reached.append(self._reach(int(times[reached_row]), lit))
+                reached.append(self._reach_target(int(times[reached_row]), lit))
             elif left_row < len(times):
                 self._add_mark(int(times[left_row]), None)
             row = min(reached_row, left_row) + 1
@@ -218,7 +218,7 @@ class ReachTracker(Tracker):
         self._mark_times.append(time_ns)
         self._marks.append(_Mark(reached=previous.reached, lit=previous.lit, entered_ns=entered_ns))
 
-    def _reach(self, time_ns: int, lit: int) -> TargetReached:
+    def _reach_target(self, time_ns: int, lit: int) -> TargetReached:
         reached = self._marks[-1].reached + 1
         is_complete = reached == self._count
         self._mark_times.append(time_ns)
@@ -234,5 +234,5 @@ def new_tracker(task: Task) -> Tracker:
     return tracker
 
 
-def _nanoseconds(seconds: float) -> int:
+def _to_nanoseconds(seconds: float) -> int:
     return round(seconds * _NS)

@@ -182,10 +182,10 @@ class Recorder:
 
         Once it returns True, `close` returns at once.
         """
-        self._end()
+        self._request_end()
         return not self._is_running() or time.perf_counter() >= self._patient_until_s
 
-    def _end(self, patience_s: float = PATIENCE_S) -> None:
+    def _request_end(self, patience_s: float = PATIENCE_S) -> None:
         self.stop()
         with self.changed:
             if not self._closing:
@@ -195,7 +195,7 @@ class Recorder:
 
     def close(self, patience_s: float = PATIENCE_S) -> None:
         """End the running recording and wait up to ``patience_s`` until it is written; see `collect_results`."""
-        self._end(patience_s)
+        self._request_end(patience_s)
         if self.thread is not None:
             self.thread.join(max(0.0, min(patience_s, self._patient_until_s - time.perf_counter())))
         with self.changed:

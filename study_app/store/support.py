@@ -58,8 +58,13 @@ def _zip_files(diagnosis: str) -> Iterator[tuple[str, str]]:
     settings, problem = workstation.load_or_default()
     log = read_log()
     yield "README.txt", _README
-    yield "versions.json", _json(receipt.versions() | {name: receipt.library_version(name) for name in _DRIVERS})
-    yield "settings.json", _json(_settings(settings) | ({"problem": "the file cannot be used"} if problem else {}))
+    yield "versions.json", _json_text(receipt.versions() | {name: receipt.library_version(name) for name in _DRIVERS})
+    yield (
+        "settings.json",
+        _json_text(
+            _settings_without_private_values(settings) | ({"problem": "the file cannot be used"} if problem else {})
+        ),
+    )
     yield "log.txt", log
     yield "last-error.txt", last_error(log)
     if diagnosis:
@@ -68,7 +73,7 @@ def _zip_files(diagnosis: str) -> Iterator[tuple[str, str]]:
         yield f"crash-{number}.txt", trace
 
 
-def _settings(settings: workstation.MachineSettings) -> dict[str, object]:
+def _settings_without_private_values(settings: workstation.MachineSettings) -> dict[str, object]:
     """Return the settings; for private ones only whether they are set."""
     values = settings.model_dump(mode="json", exclude={"benches": {"__all__": {"report"}}})
     return {name: bool(value) if name in _PRIVATE else value for name, value in values.items()}
@@ -87,5 +92,5 @@ def _crash_traces(results: Path) -> Iterator[str]:
         yield re.sub(r'(?<=File ")[^"]*', lambda path: source_place(path[0]), "\n".join(lines))
 
 
-def _json(value: object) -> str:
+def _json_text(value: object) -> str:
     return json.dumps(value, indent=2, ensure_ascii=False) + "\n"

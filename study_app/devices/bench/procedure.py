@@ -265,7 +265,7 @@ def as_json(results: Found, day: str) -> str:
         "kind": "devices bench",
         "measured": day,
         "program": __version__,
-        "system": _system(),
+        "system": _system_description(),
         **asdict(results),
     }
     return json.dumps(_plain_json(document), indent=2, ensure_ascii=False) + "\n"
@@ -294,7 +294,7 @@ def _report_lines(results: Found, day: str) -> Iterator[str]:
     loop, rest = results.regularity, results.noise
     yield from (f"# Bench of {results.device.get('name')}", "")
     serial = f", serial number {results.device['serial']}" if results.device.get("serial") else ""
-    yield from (f"{day}{serial}; liquid-study {__version__}; {_system()}.", "")
+    yield from (f"{day}{serial}; liquid-study {__version__}; {_system_description()}.", "")
     yield from ("## Loop", "", "| | median | 99 % | greatest |", "| --- | ---: | ---: | ---: |")
     yield f"| lateness of a tick [ms] | {_table_row(loop.lateness_ms, 3)} |"
     yield f"| duration of a tick, including reading and writing [ms] | {_table_row(loop.busy_ms, 3)} |"
@@ -353,7 +353,7 @@ def _table_row(values: tuple[float, ...], digits: int) -> str:
     return " | ".join(f"{value:.{digits}f}" for value in values)
 
 
-def _system() -> str:
+def _system_description() -> str:
     return f"{platform.system()} {platform.release()}, {platform.machine()}, Python {platform.python_version()}"
 
 

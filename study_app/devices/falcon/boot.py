@@ -288,15 +288,15 @@ def boot_falcon(
 
 
 def _attempt_boot(transport: Transport, firmware: bytes) -> None:
-    _ping(transport)
+    _ping_loader(transport)
     _send_autobaud(transport)
-    _upload(transport, firmware)
+    _upload_firmware(transport, firmware)
     configure(transport)
     if not is_running(transport):
         raise _StepFailed("start", "the firmware was sent, but the Falcon does not respond")
 
 
-def _ping(transport: Transport) -> None:
+def _ping_loader(transport: Transport) -> None:
     """Reset the processor with an edge of DTR, and ping its loader until it answers."""
     _purge(transport)
     set_event_character(transport, on=False)
@@ -327,7 +327,7 @@ def _send_autobaud(transport: Transport) -> None:
         raise _StepFailed("autobaud", f"after the byte that sets the speed, its boot loader {heard}")
 
 
-def _upload(transport: Transport, firmware: bytes) -> None:
+def _upload_firmware(transport: Transport, firmware: bytes) -> None:
     """Send the firmware in pieces, and check the echo of each."""
     line = _Line(transport)
     for offset in range(0, len(firmware), constants.CHUNK):

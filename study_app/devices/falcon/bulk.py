@@ -56,14 +56,14 @@ def bridge_record(library: Any, handle: Any) -> Any:
     memory = records(_BRIDGE, 1)
     bridge = memory[0]
     bridge.handle = handle.value
-    bridge.read = _address(library.FT_Read)
-    bridge.write = _address(library.FT_Write)
-    bridge.waiting = _address(library.FT_GetQueueStatus)
-    bridge.set_timeouts = _address(library.FT_SetTimeouts)
+    bridge.read = _function_address(library.FT_Read)
+    bridge.write = _function_address(library.FT_Write)
+    bridge.waiting = _function_address(library.FT_GetQueueStatus)
+    bridge.set_timeouts = _function_address(library.FT_SetTimeouts)
     return memory
 
 
-def _address(function: Any) -> int:
+def _function_address(function: Any) -> int:
     return ctypes.cast(function, ctypes.c_void_p).value or 0
 
 

@@ -105,7 +105,7 @@ class FalconDevice(FramedDevice):
         )
         self.memory[:] = exchange.new_exchange(connection.calls(), mechanism, geometry, self.force_limit_n)
         self._start_guard(connection.name)
-        self._home(connection)
+        self._guide_homing(connection)
         self._restart_fade()
         calibrated = "none" if stored is None else stored.describe()
         facts |= {"geometry": geometry.name, "calibration": calibrated, "units_per_nm": gain}
@@ -206,7 +206,7 @@ class FalconDevice(FramedDevice):
         self._progress(f"Loading the Falcon's firmware, {image.name or unknown}.")
         return boot.boot_falcon(transport, data, progress=self._progress).sha256
 
-    def _home(self, transport: Transport) -> None:
+    def _guide_homing(self, transport: Transport) -> None:
         """Run ticks without force until all arms are homed and the grip was pulled out once more."""
         falcon = self.exchange
         began_s = reminded_s = transport.now_s()

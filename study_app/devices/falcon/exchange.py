@@ -63,7 +63,7 @@ def set_motor_units(falcon: Any) -> None:
 
 
 @kernel
-def can_wait(falcon: Any) -> bool:
+def can_keep_force(falcon: Any) -> bool:
     """Return whether the motors may keep their force for a tick, since it is close to the requested non-zero force."""
     is_close: bool = square_distance(falcon.sent_n, falcon.held_n) <= _MAX_WAITING_N * _MAX_WAITING_N
     return is_close and (square(falcon.sent_n) > 0.0 or square(falcon.held_n) == 0.0)
@@ -239,14 +239,14 @@ _falcon_at = record_at(_FALCON)
 _transfer = call_at(BULK)
 
 
-def _offset(field: str) -> int:
+def _field_offset(field: str) -> int:
     fields = _FALCON.fields
     assert fields is not None  # noqa: S101 - it is a record
     return int(fields[field][1])
 
 
 _READING_BYTES = READING.itemsize
-_DATA_AT, _PACKET_AT, _TRANSFERRED_AT = _offset("data"), _offset("packet"), _offset("transferred")
+_DATA_AT, _PACKET_AT, _TRANSFERRED_AT = _field_offset("data"), _field_offset("packet"), _field_offset("transferred")
 
 
 def new_exchange(
@@ -323,7 +323,7 @@ def _take_reply(falcon: Any, context: int, now_ns: int, out: Any) -> int:
     if not punctual:
         falcon.late += 1
         return READ_NOTHING_NEW
-    if not (replies.take_status(falcon) and replies.is_plausible(falcon) and _locate(falcon)):
+    if not (replies.take_status(falcon) and replies.is_plausible(falcon) and _update_position(falcon)):
         falcon.refused += 1
         return READ_NOTHING_NEW
     _update_velocity(falcon)
@@ -355,17 +355,17 @@ def _send_packet(falcon: Any, context: int) -> None:
     """Send ``force_n`` or, to measure the delay, keep the motors' force; ``sent_n`` is the force actually sent."""
     before = falcon.units[0], falcon.units[1], falcon.units[2]
     set_motor_units(falcon)
-    keep_force = falcon.testing > 0 and can_wait(falcon)
+    keep_force = falcon.testing > 0 and can_keep_force(falcon)
     if falcon.testing > 0 and not keep_force:
         replies.give_up_measurement(falcon)
-    replies.pack(falcon.units, _lights(falcon), falcon.packet)
+    replies.pack(falcon.units, _light_flags(falcon), falcon.packet)
     if keep_force or not _send(falcon, context):
         falcon.units[0], falcon.units[1], falcon.units[2] = before
         copy(falcon.held_n, falcon.sent_n)
 
 
 @kernel
-def _lights(falcon: Any) -> int:
+def _light_flags(falcon: Any) -> int:
     """Return the homing flag, which must remain set, and red before homing, blue before the out-stroke, then green."""
     if falcon.homed == 0:
         return constants.FLAG_HOMING | constants.FLAG_RED
@@ -404,7 +404,7 @@ def _receive(falcon: Any, context: int) -> Any:
 
 
 @kernel
-def _locate(falcon: Any) -> bool:
+def _update_position(falcon: Any) -> bool:
     """Compute the grip's position; return whether it is possible for a Falcon."""
     mechanics.angles(falcon.mechanism, falcon.status.encoders, falcon.seen_rad)
     if mechanics.forward(falcon.mechanism, falcon.seen_rad, falcon.position_m) != mechanics.REACHED:

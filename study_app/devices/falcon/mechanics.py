@@ -179,7 +179,7 @@ def inverse(mechanism: Any, position_m: Any, theta: Any) -> int:
     a = mechanism.arm_m
     w = position_m[2]
     for i in range(3):
-        u, v = _along(mechanism, i, position_m), _across(mechanism, i, position_m)
+        u, v = _distance_along(mechanism, i, position_m), _distance_across(mechanism, i, position_m)
         projection_m2 = mechanism.rod_m * mechanism.rod_m - v * v
         distance = math.sqrt(u * u + w * w)
         if not (projection_m2 > 0.0 and distance > 0.0):
@@ -320,12 +320,12 @@ def motor_units(mechanism: Any, torque_nm: Any, units: Any) -> int:
 
 
 @kernel
-def _along(mechanism: Any, arm: int, p: Any) -> Any:
+def _distance_along(mechanism: Any, arm: int, p: Any) -> Any:
     return p[0] * mechanism.cos[arm] + p[1] * mechanism.sin[arm] - mechanism.base_m
 
 
 @kernel
-def _across(mechanism: Any, arm: int, p: Any) -> Any:
+def _distance_across(mechanism: Any, arm: int, p: Any) -> Any:
     return p[1] * mechanism.cos[arm] - p[0] * mechanism.sin[arm] + mechanism.aside_m
 
 
@@ -336,7 +336,7 @@ def _constraint(mechanism: Any, arm: int, cos: float, sin: float, p: Any) -> Any
     If the lateral offset exceeds the rod, the pose is impossible, and the slope along the angle is 0, as in no real
     pose.
     """
-    u, v, w = _along(mechanism, arm, p), _across(mechanism, arm, p), p[2]
+    u, v, w = _distance_along(mechanism, arm, p), _distance_across(mechanism, arm, p), p[2]
     a = mechanism.arm_m
     square = mechanism.rod_m * mechanism.rod_m - v * v
     rod = math.sqrt(max(square, _MIN_ROD_M * _MIN_ROD_M))

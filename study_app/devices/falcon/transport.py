@@ -296,12 +296,12 @@ _Setter = Callable[[Any, Any, int], int]
 """(library, handle, value of the control request) -> FT_STATUS."""
 
 
-def _reset(library: Any, handle: Any, value: int) -> int:
+def _reset_or_purge(library: Any, handle: Any, value: int) -> int:
     masks = {constants.PURGE_RX: _PURGE_RX, constants.PURGE_TX: _PURGE_TX}
     return int(library.FT_Purge(handle, masks[value]) if value in masks else library.FT_ResetDevice(handle))
 
 
-def _modem(library: Any, handle: Any, value: int) -> int:
+def _set_modem_line(library: Any, handle: Any, value: int) -> int:
     names = {
         constants.DTR_HIGH: "FT_SetDtr",
         constants.DTR_LOW: "FT_ClrDtr",
@@ -311,19 +311,19 @@ def _modem(library: Any, handle: Any, value: int) -> int:
     return int(getattr(library, names[value])(handle))
 
 
-def _event_character(library: Any, handle: Any, value: int) -> int:
+def _set_event_character(library: Any, handle: Any, value: int) -> int:
     return int(library.FT_SetChars(handle, value & 0xFF, 1 if value & constants.EVENT_ENABLED else 0, 0, 0))
 
 
 _SETTERS: Final[dict[int, _Setter]] = {
-    constants.REQUEST_RESET: _reset,
-    constants.REQUEST_MODEM: _modem,
+    constants.REQUEST_RESET: _reset_or_purge,
+    constants.REQUEST_MODEM: _set_modem_line,
     constants.REQUEST_FLOW: lambda library, handle, _: int(library.FT_SetFlowControl(handle, 0, 0, 0)),
     constants.REQUEST_BAUD: lambda library, handle, value: int(library.FT_SetDivisor(handle, value)),
     constants.REQUEST_LINE: lambda library, handle, _: int(
         library.FT_SetDataCharacteristics(handle, _EIGHT_BITS, 0, 0)
     ),
-    constants.REQUEST_EVENT_CHARACTER: _event_character,
+    constants.REQUEST_EVENT_CHARACTER: _set_event_character,
     constants.REQUEST_LATENCY: lambda library, handle, value: int(library.FT_SetLatencyTimer(handle, value)),
 }
 
@@ -351,18 +351,20 @@ class FtdiTransport(Transport):
         for index, (serial, description) in enumerate(self._list_bridges()):
             if constants.PRODUCT in description and self.serial in {None, serial}:
                 handle = ctypes.c_void_p()
-                self._check(self._library.FT_Open(index, ctypes.byref(handle)), "opening it")
+                self._raise_for_status(self._library.FT_Open(index, ctypes.byref(handle)), "opening it")
                 self._handle, self.serial = handle, serial or None
                 return
         raise FalconNotFound("not-found", "looking for it with FTDI's driver")
 
     def control(self, request: int, value: int) -> None:
-        self._check(_SETTERS[request](self._library, self._open_handle(), value), "configuring the USB bridge")
+        self._raise_for_status(
+            _SETTERS[request](self._library, self._open_handle(), value), "configuring the USB bridge"
+        )
 
     def write(self, data: bytes, timeout_s: float) -> None:
         handle, sent = self._open_handle(), ctypes.c_uint32()
         self._set_timeout(milliseconds(timeout_s))
-        self._check(self._library.FT_Write(handle, data, len(data), ctypes.byref(sent)), "sending")
+        self._raise_for_status(self._library.FT_Write(handle, data, len(data), ctypes.byref(sent)), "sending")
         if sent.value < len(data):
             raise usb_failure(constants.ERROR_TIMEOUT, "sending")
 
@@ -391,7 +393,7 @@ class FtdiTransport(Transport):
     def _list_bridges(self) -> list[tuple[str, str]]:
         """Return serial number and description of each bridge that the driver lists."""
         count = ctypes.c_uint32()
-        self._check(self._library.FT_CreateDeviceInfoList(ctypes.byref(count)), "looking for it")
+        self._raise_for_status(self._library.FT_CreateDeviceInfoList(ctypes.byref(count)), "looking for it")
         return [self._bridge_info(index) for index in range(count.value)]
 
     def _bridge_info(self, index: int) -> tuple[str, str]:
@@ -402,24 +404,26 @@ class FtdiTransport(Transport):
         status = self._library.FT_GetDeviceInfoDetail(
             index, *references, serial, description, ctypes.byref(ctypes.c_void_p())
         )
-        self._check(status, "looking for it")
+        self._raise_for_status(status, "looking for it")
         return serial.value.decode("latin-1"), description.value.decode("latin-1")
 
     def _waiting_bytes(self) -> int:
         count = ctypes.c_uint32()
-        self._check(self._library.FT_GetQueueStatus(self._open_handle(), ctypes.byref(count)), "receiving")
+        self._raise_for_status(self._library.FT_GetQueueStatus(self._open_handle(), ctypes.byref(count)), "receiving")
         return count.value
 
     def _receive(self, size: int) -> bytes:
         if size == 0:
             return b""
         buffer, received = ctypes.create_string_buffer(size), ctypes.c_uint32()
-        self._check(self._library.FT_Read(self._open_handle(), buffer, size, ctypes.byref(received)), "receiving")
+        self._raise_for_status(
+            self._library.FT_Read(self._open_handle(), buffer, size, ctypes.byref(received)), "receiving"
+        )
         return buffer.raw[: received.value]
 
     def _set_timeout(self, timeout_ms: int) -> None:
         if timeout_ms != self._timeout_ms:
-            self._check(
+            self._raise_for_status(
                 self._library.FT_SetTimeouts(self._open_handle(), timeout_ms, timeout_ms), "configuring the USB bridge"
             )
             self._timeout_ms = timeout_ms
@@ -430,7 +434,7 @@ class FtdiTransport(Transport):
         return self._handle
 
     @staticmethod
-    def _check(status: int, where: str) -> None:
+    def _raise_for_status(status: int, where: str) -> None:
         if status != 0:
             raise usb_failure(_D2XX_CODES.get(status, constants.ERROR_IO), where)
 
@@ -449,7 +453,7 @@ def load_d2xx() -> Any:
 def probe(usb: Any = None, platform: str = sys.platform) -> Backend:
     """Return the state of libusb, or another backend of pyusb, on a platform."""
     can = "force up to 8 N; load its firmware and home it each time it is turned on"
-    by = f"libusb {_version()}"
+    by = f"libusb {_package_version()}"
     usb = usb if usb is not None else libusb_package.get_libusb1_backend()
     if usb is None:
         return Backend("falcon", by, state=NOT_AVAILABLE, can=can, why=failures_on(platform).mode("no-libusb").cure)
@@ -480,7 +484,7 @@ def probe_ftdi(d2xx: Any = None, platform: str = sys.platform) -> Backend:
     return Backend("falcon", "ftd2xx", state=DRIVER_READY, can=can)
 
 
-def _version() -> str:
+def _package_version() -> str:
     try:
         return version("libusb-package")
     except PackageNotFoundError:

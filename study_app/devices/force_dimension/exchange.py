@@ -159,22 +159,22 @@ def _take_sample(device: Any, context: int, now_ns: int, out: Any) -> int:
     device.now_ns = now_ns
     device.ticks += 1
     if device.unguarded != 0:
-        return _end(device, context, UNGUARDED)
+        return _end_exchange(device, context, UNGUARDED)
     if device.ticks % _STATUS_TICKS == 0:
         if np.int32(_call_fill(device.get_status, context + _STATUS, device.id)) < 0:
-            return _end(device, context, ERROR)
+            return _end_exchange(device, context, ERROR)
         if device.status[FORCE] == 0:
             device.off_cause = device.status[FORCE_OFF_CAUSE]
-            return _end(device, context, FORCE_OFF)
+            return _end_exchange(device, context, FORCE_OFF)
     address = context + _POSITION
     status = np.int32(_call_vector(device.get_position, address, address + 8, address + 16, device.id))
     if status < 0:
-        return _end(device, context, ERROR)
+        return _end_exchange(device, context, ERROR)
     if status == TIMEGUARD:
         device.guarded += 1
         return READ_NOTHING_NEW
     if not is_finite(device.position_m):
-        return _end(device, context, BAD_NUMBER)
+        return _end_exchange(device, context, BAD_NUMBER)
     device.fresh += 1
     device.fresh_ns = now_ns
     _from_maker(device.position_m, out.position_m)
@@ -241,7 +241,7 @@ def _put_quaternion(rotation: Any, out: Any) -> bool:
 @kernel
 def _send_force(device: Any, context: int, force_n: Any) -> int:
     if device.unguarded != 0:
-        return _end(device, context, UNGUARDED)
+        return _end_exchange(device, context, UNGUARDED)
     x_n, y_n, z_n = force_n[0], force_n[1], force_n[2]
     square = x_n * x_n + y_n * y_n + z_n * z_n
     max_n = _NORM_SLACK * device.force_limit_n
@@ -249,7 +249,7 @@ def _send_force(device: Any, context: int, force_n: Any) -> int:
         x_n = y_n = z_n = 0.0
     status = _push(device, x_n, y_n, z_n)
     if status < 0:
-        return _end(device, context, ERROR)
+        return _end_exchange(device, context, ERROR)
     device.sent_n[0], device.sent_n[1], device.sent_n[2] = x_n, y_n, z_n
     if status == MOTOR_SATURATED:
         device.saturated += 1
@@ -266,7 +266,7 @@ def _push(device: Any, x_n: float, y_n: float, z_n: float) -> Any:
 
 
 @kernel
-def _end(device: Any, context: int, cause: int) -> int:
+def _end_exchange(device: Any, context: int, cause: int) -> int:
     finish(device, context)
     device.ended = cause
     return READ_LOST

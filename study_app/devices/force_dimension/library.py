@@ -105,7 +105,7 @@ class Library:
     id = -1  # of the open device
 
     def __init__(self, path: str | Path | None = None) -> None:
-        self._functions = _load(path)
+        self._functions = _load_library(path)
         missing = [name for name in _SIGNATURES if not hasattr(self._functions, name)]
         if missing:
             raise FAILURES.failure("old-library", ", ".join(missing))
@@ -149,7 +149,7 @@ class Library:
             The device is not calibrated, not safe, or its force cannot be enabled.
         """
         call, device = self._functions, self.id
-        if not call.drdIsInitialized(device) or self._status()[RESET]:
+        if not call.drdIsInitialized(device) or self._read_status()[RESET]:
             raise FAILURES.failure("uncalibrated")
         max_n = float(call.dhdGetMaxForce(device))
         if 0.0 <= max_n < force_limit_n:
@@ -173,7 +173,7 @@ class Library:
             "effector_mass_kg": mass.value if has_mass else None,
             "max_force_n": max_n if max_n >= 0.0 else None,
             **safety,
-            **self._dynamics(),
+            **self._measure_dynamics(),
         }
 
     def close(self) -> bool:
@@ -202,7 +202,7 @@ class Library:
             "watchdog_s": watchdog.value * _WATCHDOG_S if has_watchdog and watchdog.value else None,
         }
 
-    def _dynamics(self) -> dict[str, Any]:
+    def _measure_dynamics(self) -> dict[str, Any]:
         """Return delay [s], encoder count [m] and least mass [kg] at the handle; None for those that are unknown."""
         mode = int(self._functions.dhdGetComMode(self.id))
         round_trip_s = self._round_trip_s()
@@ -273,14 +273,14 @@ class Library:
         deadline_s = time.perf_counter() + _ENABLE_TIMEOUT_S
         while True:
             call.dhdSetForce(0.0, 0.0, 0.0, device)
-            status = self._status()
+            status = self._read_status()
             if status[FORCE]:
                 return
             if time.perf_counter() > deadline_s:
                 raise FAILURES.failure("force-off", CAUSES.get(status[FORCE_OFF_CAUSE], ""))
             time.sleep(0.01)
 
-    def _status(self) -> list[int]:
+    def _read_status(self) -> list[int]:
         status = (c_int * STATUS_WORDS)()
         if self._functions.dhdGetStatus(status, self.id) < 0:
             raise FAILURES.failure("error", f"dhdGetStatus: {self._last_error()}")
@@ -312,7 +312,7 @@ def _value_within(value: float, limits: tuple[float, float]) -> float | None:
     return value if limits[0] <= value <= limits[1] else None
 
 
-def _load(path: str | Path | None) -> ctypes.CDLL:
+def _load_library(path: str | Path | None) -> ctypes.CDLL:
     chosen = path or os.environ.get(VARIABLE)
     reason = ""
     for candidate in (str(chosen),) if chosen else _usual_names():

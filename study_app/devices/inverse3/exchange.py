@@ -151,13 +151,13 @@ def _take_replies(device: Any, context: int, now_ns: int, out: Any) -> int:
             _call(device.receive, device.handle, context + _INBOX_AT + device.filled, np.uintp(room), np.int32(0))
         )
         if received == 0:
-            return _end(device, context, CLOSED)
+            return _end_exchange(device, context, CLOSED)
         if received < 0:
             break
         device.filled += received
         ended = _take_frames(device, context)
         if ended != RUNS:
-            return _end(device, context, ended)
+            return _end_exchange(device, context, ended)
         if device.filled == 0 and device.answered >= device.sent:
             break  # no more replies are owed
     if device.answered == answered:
@@ -330,7 +330,7 @@ def _answer_ping(device: Any, context: int, at: int, length: int) -> None:
 
 
 @kernel
-def _end(device: Any, context: int, cause: int) -> int:
+def _end_exchange(device: Any, context: int, cause: int) -> int:
     """End the stream: send zero force and a close frame, and nothing after them."""
     if cause != CLOSED:
         finish(device, context)

@@ -56,20 +56,20 @@ def _first_message(device_id: str) -> dict[str, Any]:
         "force_gate": {"gain": _FORCE_GATE_GAIN},
     }
     session = {"configure": {"profile": {"name": _PROFILE}, "basis": {"permutation": _BASIS}}}
-    return {"session": session, **_command(device_id, configure=configure)}
+    return {"session": session, **_command_message(device_id, configure=configure)}
 
 
 def full_state_request(device_id: str) -> dict[str, Any]:
     """Return a message whose answer includes the configuration ("Simulation Channel", configuration vs state)."""
-    return {"session": {"force_render_full_state": {}}, **_command(device_id)}
+    return {"session": {"force_render_full_state": {}}, **_command_message(device_id)}
 
 
 def _zero_force(device_id: str) -> dict[str, Any]:
     """Return a command of zero force ("Control Commands", set_cursor_force)."""
-    return _command(device_id)
+    return _command_message(device_id)
 
 
-def _command(device_id: str, **more_fields: Any) -> dict[str, Any]:
+def _command_message(device_id: str, **more_fields: Any) -> dict[str, Any]:
     return {
         "inverse3": [{"device_id": device_id, **more_fields, "commands": {"set_cursor_force": {"vector": dict(_ZERO)}}}]
     }

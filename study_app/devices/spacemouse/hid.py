@@ -188,7 +188,7 @@ def probe(hid: Any = None) -> list[Backend]:
     hid : hidapi's module; None: it is loaded
     """
     can = "visual only, no force: pushing the cap further moves the ball faster"
-    by = f"hidapi {_version()}"
+    by = f"hidapi {_package_version()}"
     try:
         interfaces = find_space_mice(load_hid() if hid is None else hid)
     except (DeviceError, OSError) as error:
@@ -199,7 +199,7 @@ def probe(hid: Any = None) -> list[Backend]:
     return [Backend("spacemouse", by, state="connected: " + ", ".join(names), can=can)]
 
 
-def _version() -> str:
+def _package_version() -> str:
     try:
         return version("hidapi")
     except PackageNotFoundError:

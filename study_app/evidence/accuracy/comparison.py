@@ -266,7 +266,7 @@ class _CandidateTimer:
 
     def __init__(self, candidate: Candidate, motion: Motion) -> None:
         self._candidate, self._motion, self._clock_ns = candidate, motion, _clock()
-        self._begin()
+        self._begin_repeat()
         self.reset()
 
     def reset(self) -> None:
@@ -274,7 +274,7 @@ class _CandidateTimer:
         self.costs_ns: list[float] = []
         self.passed_s = 0.0
 
-    def _begin(self) -> None:
+    def _begin_repeat(self) -> None:
         self._candidate.begin(self._motion)
         liquid = self._candidate.scene.liquids[0]
         length = liquid.wake.length if liquid.wake is not None and "wake" in liquid.effects else 0
@@ -288,7 +288,7 @@ class _CandidateTimer:
 
     def run_batch(self) -> None:
         if self._row + self._size > self._candidate.ticks:
-            self._begin()
+            self._begin_repeat()
         began_s, began = time.perf_counter(), self._clock_ns()
         self._candidate.run_ticks(self._row, self._row + self._size)
         self.costs_ns.append((self._clock_ns() - began) / self._size)
@@ -342,10 +342,10 @@ def pareto_front(points: dict[Candidate, Row]) -> tuple[Candidate, ...]:
     def error(row: Row) -> float:
         return max(row.error.rms, ROUNDING)
 
-    def beats(other: Row, row: Row) -> bool:
+    def dominates(other: Row, row: Row) -> bool:
         if error(other) == error(row):
             return other.ns_per_ms < row.ns_per_ms
         return error(other) < error(row) and other.ns_per_ms <= row.ns_per_ms * _EQUAL_TIMES_RATIO
 
-    best = [row for row in points.values() if not any(beats(other, row) for other in points.values())]
+    best = [row for row in points.values() if not any(dominates(other, row) for other in points.values())]
     return tuple(row.candidate for row in sorted(best, key=lambda row: row.ns_per_ms))

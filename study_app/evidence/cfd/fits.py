@@ -334,7 +334,7 @@ def _steady_markdown(table: SolvedTable) -> str:
     names = ["coarser grid", "half the box", "Clift et al. 1978", "Mittal 1999", "experiments", *LAWS, "C_d 0.47"]
     rows = []
     for reynolds, solved, coarse, narrow in zip(*(it.tolist() for it in table.columns.values()), strict=True):
-        others = [coarse, narrow, clift(reynolds), MITTAL.get(reynolds), _measured(reynolds)]
+        others = [coarse, narrow, clift(reynolds), MITTAL.get(reynolds), _measured_drag_coefficient(reynolds)]
         others += [law(reynolds) * 24 / reynolds for law in LAWS.values()]
         shares = ["" if it is None else _format_signed(it / solved - 1) for it in (*others, _CONSTANT)]
         rows.append((f"{reynolds:g}", f"{solved:.4g}", *shares))
@@ -386,7 +386,7 @@ def _fit_row(it: Fitted) -> tuple[str, ...]:
     )
 
 
-def _measured(reynolds: float) -> float:
+def _measured_drag_coefficient(reynolds: float) -> float:
     """Return the measured C_d that `truths` interpolates, for a sphere and a liquid of unit size and density."""
     speed_mps = np.array([1.0])
     liquid = Liquid(id="any", density_kg_m3=1.0, viscosity_pa_s=1 / reynolds)

@@ -257,14 +257,14 @@ def _trends() -> Iterator[DrawnStudies]:
 
 def _trend_trial(n: int, shift: float, claim: str) -> Trial:
     def trial(rng: np.random.Generator) -> bool:
-        result = trend(_answers(rng, n, shift), None, seed=None)
+        result = trend(_draw_answers(rng, n, shift), None, seed=None)
         claimed = result.p is not None and result.p <= _ALPHA
         return claimed and (claim == "either" or (result.effect or 0.0) > 0)
 
     return trial
 
 
-def _answers(rng: np.random.Generator, n: int, shift: float) -> Array:
+def _draw_answers(rng: np.random.Generator, n: int, shift: float) -> Array:
     """Return answers (participants, delays) of participants with exponentially distributed slopes of mean ``shift``."""
     slopes = _SLOPE * (rng.exponential(size=(n, 1)) - 1 + shift)
     return np.clip(np.round(4 + slopes * DELAYS + _NOISE * rng.normal(size=(n, len(DELAYS)))), 1, 7)
@@ -275,6 +275,6 @@ def _shift_without_trend() -> float:
     """Return the mean of skewed slopes at which the mean rank correlation is 0, from a large sample."""
 
     def correlation(shift: float) -> float:
-        return trend(_answers(np.random.default_rng(0), _LARGE_SAMPLE, shift), None, seed=None).effect or 0.0
+        return trend(_draw_answers(np.random.default_rng(0), _LARGE_SAMPLE, shift), None, seed=None).effect or 0.0
 
     return float(brentq(correlation, 0.0, 1.0, xtol=1e-3))

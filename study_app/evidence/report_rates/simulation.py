@@ -368,7 +368,9 @@ def _claims(result: BlockResult) -> bool:
     pairs = [pair.tested for pair in Pairs.of(result)]
     tests = [*SettingsDiffer.of(result), *DelayTrend.of(result), *MeanTests.of(result), *pairs]
     low = any(lowest.over_all_ms is not None for lowest in LowestDelay.of(result))
-    return any(test.verdict in FOUND for test in tests) or low or _recognised(result) or _has_threshold(result)
+    return (
+        any(test.verdict in FOUND for test in tests) or low or _is_liquid_recognised(result) or _has_threshold(result)
+    )
 
 
 def _mean_test_events(result: BlockResult) -> Iterator[tuple[Event, bool]]:
@@ -385,7 +387,7 @@ def _liquid_events(asked: BlockAnswers, result: BlockResult, cell: Cell, _truth:
             ("conditions differ in a statement", "at most 5 %"),
             any(test.verdict in FOUND for test in SettingsDiffer.of(result)),
         )
-        yield ("liquids recognised", "at most 5 %"), _recognised(result)
+        yield ("liquids recognised", "at most 5 %"), _is_liquid_recognised(result)
         yield from _mean_test_events(result)
     equal = _equal_pairs(asked.block, cell.extent)
     if equal:
@@ -395,10 +397,10 @@ def _liquid_events(asked: BlockAnswers, result: BlockResult, cell: Cell, _truth:
         yield ("equal liquids distinguished", "at most 5 %"), found_equal
     if cell.extent == "full":
         yield ("some liquids distinguished", "counted"), any(pair.tested.verdict in FOUND for pair in Pairs.of(result))
-        yield ("liquids recognised", "counted"), _recognised(result)
+        yield ("liquids recognised", "counted"), _is_liquid_recognised(result)
 
 
-def _recognised(result: BlockResult) -> bool:
+def _is_liquid_recognised(result: BlockResult) -> bool:
     recognition = LiquidRecognition.of(result)
     return recognition is not None and recognition.verdict in FOUND
 
@@ -596,7 +598,7 @@ def measure_report_rates(
     for round_number in range(_ROUNDS):
         futures = [
             executor.submit(count, seed, batch, size)
-            for batch, size in _batches(studies, round_number)
+            for batch, size in _batch_sizes(studies, round_number)
             for count in counts.values()
         ]
         for future in futures:
@@ -631,7 +633,7 @@ def _cell_counts(simulation: Plan, sizes: Sequence[int]) -> Mapping[_Key, _Count
     }
 
 
-def _batches(studies: int, finished: int) -> list[tuple[int, int]]:
+def _batch_sizes(studies: int, finished: int) -> list[tuple[int, int]]:
     """Return numbers and sizes of the batches of a round, after ``finished`` rounds."""
     starts = range(0, studies, _BATCH)
     return [(number, min(_BATCH, studies - start)) for number, start in enumerate(starts, start=finished * len(starts))]

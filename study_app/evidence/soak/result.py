@@ -120,7 +120,7 @@ class SoakResult:
         yield f"the wake deviates from its definition by {drift:.2g} of Σ|e|/S", not drift <= _MAX_DRIFT
         yield f"a wake of {rests.wake_mps:.2g} m/s remains after a rest", rests.wake_mps != 0.0
         yield f"a force of {rests.force_n:.2g} N remains after a rest", not rests.force_n <= _MAX_RESIDUE_N
-        yield f"memory grew by {_mib(self.growth_bytes):.1f} MiB", self.growth_bytes > _MAX_GROWTH_BYTES
+        yield f"memory grew by {_mebibytes(self.growth_bytes):.1f} MiB", self.growth_bytes > _MAX_GROWTH_BYTES
 
     def _count_checks(self) -> Iterator[tuple[str, bool]]:
         """Yield consistency checks between two independent counts; some require that no sample is missing."""
@@ -154,7 +154,8 @@ class SoakResult:
                 *self._counter_text(),
                 "",
                 "memory [MiB]",
-                f"  {' '.join(f'{_mib(held):.1f}' for held in self.memory)}; growth {_mib(self.growth_bytes):+.1f}",
+                f"  {' '.join(f'{_mebibytes(held):.1f}' for held in self.memory)}; "
+                f"growth {_mebibytes(self.growth_bytes):+.1f}",
                 "",
                 self.verdict,
             )
@@ -246,5 +247,5 @@ class SoakResult:
         return Evidence(text, {"soak.txt": text, "soak.json": f"{table}\n"}, missed=bool(self.findings))
 
 
-def _mib(held_bytes: float) -> float:
+def _mebibytes(held_bytes: float) -> float:
     return held_bytes / 2**20

@@ -227,7 +227,7 @@ class Soak:
             (ending or threading.Event()).wait(min(ticks / self._rate_hz, _POLL_S))
         self._check_samples()
         if self.servo.fault is not None:
-            self._recover()
+            self._restart_servo()
         self._check_progress(tick)
 
     def _check_progress(self, before: int) -> None:
@@ -293,7 +293,7 @@ class Soak:
         elif stretch.part == "steady":
             self.device.allow(_STEADY_FAULTS, _STEADY_GAP)
             self.servo.fade_in()
-            self._load(self._lasting[stretch.round % len(self._lasting)])
+            self._present_liquid(self._lasting[stretch.round % len(self._lasting)])
         else:
             self.device.allow(_ROUGH_FAULTS, _ROUGH_GAP)
             self._due.scene = tick
@@ -318,7 +318,7 @@ class Soak:
         if 0 <= due.motion <= tick:
             due.motion = tick + max(1, round(self.hand.start_motion() * self._rate_hz))
         if 0 <= due.scene <= tick:
-            self._load(self._names[int(self._draw() * len(self._names))])
+            self._present_liquid(self._names[int(self._draw() * len(self._names))])
             due.scene = self._random_later_tick(tick, 0.2, 10.0)
         if 0 <= due.stop <= tick:
             self.servo.stop_force()
@@ -333,21 +333,21 @@ class Soak:
     def _random_later_tick(self, tick: int, least_s: float, most_s: float) -> int:
         return tick + max(1, round((least_s + (most_s - least_s) * self._draw()) * self._rate_hz))
 
-    def _load(self, name: str) -> None:
+    def _present_liquid(self, name: str) -> None:
         """Present a liquid; a servo that has stopped itself receives it after its recovery."""
         self._presented = name
         with suppress(DeviceLost, ServoFault):
             self.drift.expect_scene(self.servo.load(self._scenes[name]), self._scenes[name])
             self._loads += 1
 
-    def _recover(self) -> None:
+    def _restart_servo(self) -> None:
         """Restart a servo that has stopped itself, as a host does once the cable is reconnected."""
         self.servo.stop()
         self._check_samples()
         self._recoveries += 1
         if not self.virtual:
             self.servo.start()
-        self._load(self._presented)
+        self._present_liquid(self._presented)
 
     def _check_samples(self) -> None:
         """Check all new samples and, at every tenth of the test, the memory."""

@@ -118,28 +118,30 @@ class Group(NamedTuple):
 
 def sweep(seed: str = "stability") -> tuple[Case, ...]:
     """Return the cases of the sweep: each liquid at each scale, rate, delay and grip; the rest is drawn."""
-    return tuple(_draw_remaining_values(seed, _grid(GRIPS)))
+    return tuple(_draw_remaining_values(seed, _case_grid(GRIPS)))
 
 
 def groups(seed: str = "stability", count: int | None = None) -> tuple[Group, ...]:
     """Return all groups except the sweep, with at most ``count`` cases each."""
     light_values = {**_DRAWN_VALUES, "mass_kg": _HANDLES_KG}
-    held_cases, released_cases = [tuple(_grid(hands)) for hands in (("light", "middle", "firm"), (LETS_GO, THROWN))]
+    held_cases, released_cases = [
+        tuple(_case_grid(hands)) for hands in (("light", "middle", "firm"), (LETS_GO, THROWN))
+    ]
     all_cases = [dataclasses.replace(case, plant=plant) for plant in PLANTS for case in (*held_cases, *released_cases)]
-    releases = tuple(_releases(f"{seed} releases", PLANTS, _HANDLES_KG))
+    releases = tuple(_release_cases(f"{seed} releases", PLANTS, _HANDLES_KG))
 
     def changed_group(name: str, change: Callable[[Case], Case | None], cases: Iterable[Case]) -> Group:
-        listed = tuple(case for case in map(change, cases) if case is not None)
+        changed_cases = tuple(case for case in map(change, cases) if case is not None)
         return Group(
             name,
             tuple(
                 _draw_remaining_values(
-                    f"{seed} {name}", evenly_chosen(listed, min(_CASES, count or _CASES)), light_values
+                    f"{seed} {name}", evenly_chosen(changed_cases, min(_CASES, count or _CASES)), light_values
                 )
             ),
         )
 
-    listed = [
+    changed_cases = [
         Group(
             name,
             tuple(
@@ -153,8 +155,8 @@ def groups(seed: str = "stability", count: int | None = None) -> tuple[Group, ..
         for name, cases in (("second plant, held", held_cases), ("second plant, let go", released_cases))
     ]
     for name, change in _CHANGES.items():
-        listed.append(changed_group(name, change, all_cases))
-    listed += [
+        changed_cases.append(changed_group(name, change, all_cases))
+    changed_cases += [
         Group(
             name,
             tuple(
@@ -170,33 +172,37 @@ def groups(seed: str = "stability", count: int | None = None) -> tuple[Group, ..
     ]
     for name, disturbance in _DISTURBED.items():
         cases = evenly_chosen(all_cases, min(_CASES, count or _CASES))
-        listed.append(
+        changed_cases.append(
             Group(name, tuple(_draw_remaining_values(f"{seed} {name}", cases, {**light_values, **disturbance})))
         )
-    listed.append(Group("let go in mid-stroke", evenly_chosen(releases, count)))
+    changed_cases.append(Group("let go in mid-stroke", evenly_chosen(releases, count)))
     in_gap = tuple(_release_in_gap(f"{seed} let go in a gap", releases))
-    listed.append(Group("let go in a gap of samples", evenly_chosen(in_gap, min(_CASES, count or _CASES))))
+    changed_cases.append(Group("let go in a gap of samples", evenly_chosen(in_gap, min(_CASES, count or _CASES))))
     for name in (*_MISJUDGED, *_MASSES):
         cases = tuple(case for case in map({**_CHANGES, **_MASSES}[name], releases) if case is not None)
-        listed.append(Group(f"let go in mid-stroke, {name}", evenly_chosen(cases, min(_CASES, count or _CASES))))
+        changed_cases.append(Group(f"let go in mid-stroke, {name}", evenly_chosen(cases, min(_CASES, count or _CASES))))
     driven = "through the Falcon's driver"
-    driven_held = evenly_chosen(tuple(_grid(("light", "middle", "firm"), (FALCON,), _FALCON_RATES_HZ, (1,))), count)
-    driven_held = tuple(_draw_remaining_values(f"{seed} {driven}", driven_held, _FALCON_VALUES))
-    listed.append(Group(f"{driven}, held", driven_held))
-    driven_free = (
-        dataclasses.replace(case, delay=1) for case in _releases(f"{seed} {driven}", (FALCON,), _FALCON_HANDLES_KG)
+    driven_held = evenly_chosen(
+        tuple(_case_grid(("light", "middle", "firm"), (FALCON,), _FALCON_RATES_HZ, (1,))), count
     )
-    listed.append(Group(f"{driven}, let go in mid-stroke", evenly_chosen(tuple(driven_free), count)))
-    listed += _liquid_groups("non-Newtonian liquids", materials, seed, light_values, count)
-    listed += _liquid_groups("liquids of physical2", physical2_liquids, seed, light_values, count)
+    driven_held = tuple(_draw_remaining_values(f"{seed} {driven}", driven_held, _FALCON_VALUES))
+    changed_cases.append(Group(f"{driven}, held", driven_held))
+    driven_free = (
+        dataclasses.replace(case, delay=1) for case in _release_cases(f"{seed} {driven}", (FALCON,), _FALCON_HANDLES_KG)
+    )
+    changed_cases.append(Group(f"{driven}, let go in mid-stroke", evenly_chosen(tuple(driven_free), count)))
+    changed_cases += _liquid_groups("non-Newtonian liquids", materials, seed, light_values, count)
+    changed_cases += _liquid_groups("liquids of physical2", physical2_liquids, seed, light_values, count)
     late_count = min(_LATE_CASES, count or _LATE_CASES)
-    listed.append(_half_damper_group("late forces", late_count, seed, {**_DRAWN_VALUES, **_LINK_VALUES}, _DELAYED_HZ))
+    changed_cases.append(
+        _half_damper_group("late forces", late_count, seed, {**_DRAWN_VALUES, **_LINK_VALUES}, _DELAYED_HZ)
+    )
     device_count = min(_DEVICE_CASES, count or _DEVICE_CASES)
     by_device = _half_damper_group(
         "velocity measured by the device", device_count, seed, {**light_values, **_MEASURED_VELOCITY_VALUES}
     )
     kalman_count = min(_KALMAN_CASES, count or _KALMAN_CASES)
-    first_and_listed = (Group("first plant", sweep(seed)), *listed)
+    first_and_listed = (Group("first plant", sweep(seed)), *changed_cases)
     by_kalman = [
         Group(
             f"kalman: {name}",
@@ -204,20 +210,20 @@ def groups(seed: str = "stability", count: int | None = None) -> tuple[Group, ..
         )
         for name, cases in first_and_listed
     ]
-    return (*listed, by_device, *by_kalman)
+    return (*changed_cases, by_device, *by_kalman)
 
 
 def _liquid_groups(
     name: str, names: Callable[[], Iterable[str]], seed: str, choices: Mapping[str, tuple[Any, ...]], count: int | None
 ) -> Iterator[Group]:
     """Yield groups for liquids outside the sweep: plain cases, misjudged delays, and releases."""
-    grid = tuple(_grid(GRIPS, names=names))
+    grid = tuple(_case_grid(GRIPS, names=names))
     yield Group(name, tuple(_draw_remaining_values(f"{seed} {name}", evenly_chosen(grid, count), choices)))
     for change in _MISJUDGED:
         cases = [case for case in map(_CHANGES[change], grid) if case is not None]
         chosen = evenly_chosen(cases, min(_CASES, count or _CASES))
         yield Group(f"{name}, {change}", tuple(_draw_remaining_values(f"{seed} {name} {change}", chosen, choices)))
-    released = tuple(_releases(f"{seed} {name}", PLANTS, _HANDLES_KG, names))
+    released = tuple(_release_cases(f"{seed} {name}", PLANTS, _HANDLES_KG, names))
     yield Group(f"{name}, let go in mid-stroke", evenly_chosen(released, count))
 
 
@@ -225,7 +231,7 @@ def _half_damper_group(
     name: str, count: int, seed: str, choices: Mapping[str, tuple[Any, ...]], rates_hz: Iterable[float] = _RATES_HZ
 ) -> Group:
     """Return loops that are held, thrown and released; half of them present the strongest damper."""
-    grid = tuple(_grid(GRIPS, PLANTS, rates_hz, names=lambda: (*liquids(), *[DAMPER] * len(liquids()))))
+    grid = tuple(_case_grid(GRIPS, PLANTS, rates_hz, names=lambda: (*liquids(), *[DAMPER] * len(liquids()))))
     return Group(name, tuple(_draw_remaining_values(f"{seed} {name}", evenly_chosen(grid, count), choices)))
 
 
@@ -277,7 +283,7 @@ _MASSES: Final[Mapping[str, Callable[[Case], Case]]] = {
 """Changes of the handle's reported or real mass, made after the mass has been drawn."""
 
 
-def _grid(
+def _case_grid(
     hands: Iterable[str],
     plants: Iterable[str] = (FIRST,),
     rates_hz: Iterable[float] = _RATES_HZ,
@@ -297,10 +303,10 @@ def _draw_remaining_values(
     """Yield cases with the remaining values drawn from ``choices``."""
     draw = Random(seed)  # noqa: S311 - the same cases in every run
     for case in cases:
-        yield dataclasses.replace(case, **{name: _choose(draw, values) for name, values in choices.items()})
+        yield dataclasses.replace(case, **{name: _random_choice(draw, values) for name, values in choices.items()})
 
 
-def _releases(
+def _release_cases(
     seed: str, plants: Iterable[str], masses_kg: Iterable[float], names: Callable[[], Iterable[str]] = liquids
 ) -> Iterator[Case]:
     """Yield releases at every phase of strokes of 1 to 4 Hz and ±30 mm, in the loop of a study.
@@ -311,12 +317,12 @@ def _releases(
     for plant, liquid, mass_kg, phase in itertools.product(plants, names(), masses_kg, range(_PHASES)):
         draw = damper_stream.get(liquid, liquid_stream)
         case = Case(liquid=liquid, hand=LETS_GO, motion=SINE, mass_kg=mass_kg, plant=plant)
-        hz = _choose(draw, (1.0, 2.0, 4.0))
+        hz = _random_choice(draw, (1.0, 2.0, 4.0))
         yield dataclasses.replace(
             case,
             scale=scenes()[liquid].scale,
-            delay=_choose(draw, (0, 1, 1, 2)),
-            viscous_nspm=_choose(draw, (0.0, 0.5)),
+            delay=_random_choice(draw, (0, 1, 1, 2)),
+            viscous_nspm=_random_choice(draw, (0.0, 0.5)),
             speed_mps=round(peak_mps(hz, 0.5e-3 * case.way_mm), 5),
             release_s=round(_FIRST_RELEASE_S + phase / (_PHASES * hz), 5),
         )
@@ -326,7 +332,7 @@ def _release_in_gap(seed: str, cases: Iterable[Case]) -> Iterator[Case]:
     """Yield releases during missing samples, after which positions may be offset."""
     draw = Random(seed)  # noqa: S311 - the same cases in every run
     for case in cases:
-        burst_ms, jump_mm = _choose(draw, _JUMPS["burst_ms"]), _choose(draw, (0.0, *_JUMPS["jump_mm"]))
+        burst_ms, jump_mm = _random_choice(draw, _JUMPS["burst_ms"]), _random_choice(draw, (0.0, *_JUMPS["jump_mm"]))
         release_s = round(3 * BURST_PERIOD_S - 1e-3 * burst_ms * draw.random(), 5)
         yield dataclasses.replace(case, burst_ms=burst_ms, jump_mm=jump_mm, release_s=release_s)
 
@@ -336,5 +342,5 @@ def peak_mps(frequency_hz: float, amplitude_m: float) -> float:
     return 2.0 * math.pi * frequency_hz * amplitude_m
 
 
-def _choose(draw: Random, choices: tuple[Any, ...]) -> Any:
+def _random_choice(draw: Random, choices: tuple[Any, ...]) -> Any:
     return choices[int(draw.random() * len(choices))]

@@ -297,7 +297,7 @@ def run_sweep(
     began = time.perf_counter()
     planned = [(case, safe) for safe in (False, True) for case in cases]
     planned += [(case, True) for group in others for case in group.cases]
-    verdicts = iter(run(_judge, planned, executor, lambda done: progress(done, len(planned))))
+    verdicts = iter(run(_judge_case, planned, executor, lambda done: progress(done, len(planned))))
     off, on = [tuple(itertools.islice(verdicts, len(cases))) for _ in range(2)]
     judged = [_JudgedGroup(group.name, tuple(itertools.islice(verdicts, len(group.cases)))) for group in others]
     return Swept(off, on, time.perf_counter() - began, tuple(judged))
@@ -305,10 +305,10 @@ def run_sweep(
 
 def verdicts_on(case: Case) -> tuple[Verdict, ...]:
     """Judge a case with safety off and on; only with safety on if it uses the Falcon driver."""
-    return tuple(_judge(case, safe) for safe in ((True,) if case.plant == FALCON else (False, True)))
+    return tuple(_judge_case(case, safe) for safe in ((True,) if case.plant == FALCON else (False, True)))
 
 
-def _judge(case: Case, safe: bool) -> Verdict:
+def _judge_case(case: Case, safe: bool) -> Verdict:
     return judge_driven(case) if case.plant == FALCON else judge(case, safe=safe)
 
 

@@ -330,8 +330,9 @@ class Timed:
         ratio = self.ratio(servo, 99)
         busy_us = servo.busy_us(99)
         late = (
-            f"{servo.late:,} {'tick' if servo.late == 1 else 'ticks'} more than 1 ms late, {_fewer(thread, servo)} "
-            f"than with a Python thread (at least {_FEWER_LATE:g} times fewer; the bare loop: {_fewer(thread, bare)})"
+            f"{servo.late:,} {'tick' if servo.late == 1 else 'ticks'} more than 1 ms late, "
+            f"{_ratio_phrase(thread, servo)} than with a Python thread (at least {_FEWER_LATE:g} times fewer; the bare "
+            f"loop: {_ratio_phrase(thread, bare)})"
         )
         return tuple(
             Limit(level, text, held)
@@ -347,7 +348,7 @@ class Timed:
         )
 
 
-def _fewer(thread: LoopTiming, other: LoopTiming) -> str:
+def _ratio_phrase(thread: LoopTiming, other: LoopTiming) -> str:
     """Return a phrase for the ratio of a Python thread's ticks over 1 ms late to those of another loop."""
     if other.late == 0:
         return f"{thread.late:,} fewer"

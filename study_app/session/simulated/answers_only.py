@@ -235,7 +235,7 @@ class Answering(SimulatedParticipant):
     def _sensed_magnitudes(self, block: Block) -> Mapping[int, Sequence[float]]:
         return {number: sensed for number, sensed in self._sensed.items() if self._trials[number].block == block.id}
 
-    def _sense(self, trial: int, presented: Stimulated) -> None:
+    def _store_percept(self, trial: int, presented: Stimulated) -> None:
         """Store the percept of a trial: a varied number exactly as requested, or drawn features of its condition."""
         block = self.state.trial.block
         if presented.vary is not None:
@@ -264,10 +264,10 @@ class Answering(SimulatedParticipant):
             case Write(line):
                 self._store.append(line, t_s=at_s)
             case StartTrial(trial=trial, presented=presented):
-                self._sense(trial, presented)
+                self._store_percept(trial, presented)
             case Adjust(presented=presented, line=line):
                 self._sensed[line.trial].pop()
-                self._sense(line.trial, presented)
+                self._store_percept(line.trial, presented)
                 self._store.append(line, t_s=at_s)
             case ShowPage(page):
                 self.page = page

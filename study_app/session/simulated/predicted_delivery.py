@@ -39,8 +39,8 @@ def predicted_delivery(protocol: Protocol, delay_ticks: int) -> PredictedDeliver
     If sessions differ, for example between groups, the prediction is that of the session which loses most trials.
     """
     with _late_rig(protocol, delay_ticks) as rig:
-        failing = _FailingScenes(protocol, rig)
-        shares = {block.id: _lost_fraction(protocol, block, failing) for block in protocol.main_blocks}
+        failing_scenes = _FailingScenes(protocol, rig)
+        shares = {block.id: _lost_fraction(protocol, block, failing_scenes) for block in protocol.main_blocks}
     return max(
         (_predict_session(variant.protocol, shares) for variant in variants(protocol)),
         key=lambda prediction: (prediction.missing, prediction.out),
@@ -132,11 +132,11 @@ class _FailingScenes:
 def _lost_fraction(protocol: Protocol, block: Block, scenes: _FailingScenes) -> float:
     """Return the probability that a trial of a block is missing or, without intervals, violates limits."""
 
-    def failing(scene: Scene) -> float:
+    def failing_fraction(scene: Scene) -> float:
         return scenes.share(scene, block.task)
 
     if block.design is None:
-        return mean(failing(protocol.scene_for(name)) for name in block.conditions)
+        return mean(failing_fraction(protocol.scene_for(name)) for name in block.conditions)
     design, attempts = protocol.design_of(block), protocol.limits.attempts or 1
 
     def missing(standard: float, comparison: float) -> float:
@@ -147,10 +147,10 @@ def _lost_fraction(protocol: Protocol, block: Block, scenes: _FailingScenes) -> 
         return mean((1 - share) ** attempts for share in delivered)
 
     if block.standard is None:
-        return mean(missing(0.0, failing(scene)) for scene in _extreme_scenes(protocol, block))
-    standard = failing(protocol.scene_for(block.standard))
+        return mean(missing(0.0, failing_fraction(scene)) for scene in _extreme_scenes(protocol, block))
+    standard = failing_fraction(protocol.scene_for(block.standard))
     others = (protocol.scene_for(name) for name in block.conditions if name != block.standard)
-    return mean(missing(standard, failing(scene)) for scene in others)
+    return mean(missing(standard, failing_fraction(scene)) for scene in others)
 
 
 def _extreme_scenes(protocol: Protocol, block: Block) -> Iterator[Scene]:

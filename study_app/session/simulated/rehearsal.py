@@ -144,11 +144,11 @@ class _HeldSignals:
                 number: handler for number, handler in handlers.items() if handler not in {signal.SIG_IGN, None}
             }
             for number in self._before:
-                signal.signal(number, self._hold)
+                signal.signal(number, self._hold_signal)
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        self._restore()
+        self._restore_handlers()
         if kind is None:
             self.obey()
 
@@ -162,11 +162,11 @@ class _HeldSignals:
             handler(number, None)
         raise SystemExit(128 + number)
 
-    def _hold(self, number: int, _frame: object) -> None:
+    def _hold_signal(self, number: int, _frame: object) -> None:
         self._pending = number
-        self._restore()
+        self._restore_handlers()
 
-    def _restore(self) -> None:
+    def _restore_handlers(self) -> None:
         for number, handler in self._before.items():
             signal.signal(number, handler)
 
@@ -253,7 +253,7 @@ class RehearsedSession(SimulatedParticipant):
         self._next_frame_ns = 0
         self._period_s = 1 / study.device.rate_hz if study.has_imperfect_link else None
         self._paint: Draw = self._stream("screen")
-        ports = Ports(rig.servo, store, self._present, self._now_s, store.recorder)
+        ports = Ports(rig.servo, store, self._show_page, self._now_s, store.recorder)
         self._runner = Runner(study, schedule, store.key.codes, ports, study.study.languages[0], start, store.key.nonce)
 
     def _seconds(self) -> float:
@@ -302,7 +302,7 @@ class RehearsedSession(SimulatedParticipant):
                     reason = self.rig.servo.fault or self._runner.cause or self._runner.stalled or self.page
                     raise SessionError(f"the rehearsal failed: {reason}")
 
-    def _present(self, page: Page) -> None:
+    def _show_page(self, page: Page) -> None:
         self.page = page
 
     def _wait(self, seconds: float) -> None:
@@ -357,7 +357,7 @@ class RehearsedSession(SimulatedParticipant):
         judged_s = view.task.elapsed_s - page.task.judged_from_s
         if setting.done or since_s < LOOK_AT_SETTING_S or judged_s < LOOK_AT_SETTING_S:
             return
-        steps = self._steps(page, setting)
+        steps = self._next_steps(page, setting)
         setting.senses.clear()
         setting.judged_s = view.task.elapsed_s
         if steps:
@@ -366,7 +366,7 @@ class RehearsedSession(SimulatedParticipant):
             setting.done = True
             self._post(Submitted(self._now_s()))
 
-    def _steps(self, page: TaskPage, setting: _Setting) -> int:
+    def _next_steps(self, page: TaskPage, setting: _Setting) -> int:
         """Return the next steps of a setting, or 0 if it is done."""
         current = setting.senses.features()
         earlier = self._features_of.get(page.trial, ()) if page.interval and page.interval.number > 1 else ()

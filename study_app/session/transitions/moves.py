@@ -285,12 +285,12 @@ def stall_session(state: SessionState, event: WriteFailed) -> Result:
 
 def retry_writes(state: SessionState, _event: WriteRetried) -> Result:
     """Retry the pending commands in order, each once; success is a separate event."""
-    return state, _stall(state).pending
+    return state, _stall_of(state).pending
 
 
 def recover_from_stall(state: SessionState, event: WriteCompleted) -> Result:
     """Return to the interrupted phase, paused at zero force."""
-    stalled = _stall(state)
+    stalled = _stall_of(state)
     back = replace(state, phase=stalled.before, stall=None)
     if back.phase in _STOPPABLE:
         return stop_force(back, ForceStopped(event.at_s, stalled.by))
@@ -300,7 +300,7 @@ def recover_from_stall(state: SessionState, event: WriteCompleted) -> Result:
 def stop_force_of_stalled(state: SessionState, event: ForceStopped) -> Result:
     """Record a stop of the force during a stall; afterwards only the operator resumes."""
     if event.by != "program":
-        state = replace(state, stall=replace(_stall(state), by=event.by))
+        state = replace(state, stall=replace(_stall_of(state), by=event.by))
     return state, (StopForce(),)
 
 
@@ -308,10 +308,10 @@ def end_stalled_session(state: SessionState, _event: EndRequested) -> Result:
     """End the session without a line in the journal, so that it stays unfinished; pending writes are still retried."""
     if state.over:
         raise SessionError("the session has ended, but its last lines have not yet been written to disk")
-    ended = replace(state, stall=replace(_stall(state), before=Phase.ENDED))
+    ended = replace(state, stall=replace(_stall_of(state), before=Phase.ENDED))
     return ended, (show_page(ended),)
 
 
-def _stall(state: SessionState) -> Stall:
+def _stall_of(state: SessionState) -> Stall:
     assert state.stall is not None  # noqa: S101 - the phase says so
     return state.stall

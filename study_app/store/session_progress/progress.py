@@ -137,7 +137,7 @@ class Progress:
                 self._show_page(form, at_s)
                 self.answers = {}
             case events.PageLeft():
-                self._leave()
+                self._leave_step()
             case events.TrialStarted():
                 self._start_trial(line)
             case events.TrialEnded():
@@ -153,10 +153,10 @@ class Progress:
             case events.AnswerRemoved(item=item):
                 self.answers[item] = self.answers.get(item, events.Answer()).removed()
             case events.Responses() | events.FormAnswered():
-                self._confirm(line)
+                self._confirm_answers(line)
             case events.PassedOver():
                 self._go_to(line.page, line.trial)
-                self._leave()
+                self._leave_step()
             case events.Recorded() if line.samples_unrecorded:
                 self.lacking[line.trial] = line.samples_unrecorded
             case events.RecordingLost():
@@ -166,7 +166,7 @@ class Progress:
             case events.Note():
                 self.notes.append(replace(line, t_s=at_s - self.away_s))
             case events.Repeat():
-                self._forget(line.trial)
+                self._forget_attempt(line.trial)
                 self.repeats += 1
                 self._reason = line.reason
             case events.Paused() | events.Resumed():
@@ -178,13 +178,13 @@ class Progress:
             case events.LanguageChosen():
                 self.language = line.language
             case events.SessionResumed():
-                self._resume(max(0.0, at_s - self.t_s))
+                self._continue_after_gap(max(0.0, at_s - self.t_s))
             case events.SessionEnded():
-                self._close(at_s)
+                self._record_duration(at_s)
                 self.ended, self.fingerprint, self.paused = line.status, line.others.get("fingerprint", ""), False
         self.t_s = max(self.t_s, at_s)
 
-    def _confirm(self, line: events.Responses | events.FormAnswered) -> None:
+    def _confirm_answers(self, line: events.Responses | events.FormAnswered) -> None:
         """Record the answers of a trial or form as confirmed."""
         key = (line.form, line.after) if isinstance(line, events.FormAnswered) else line.trial
         if isinstance(line, events.FormAnswered) or self._phase == "main":
@@ -194,16 +194,16 @@ class Progress:
             seconds = None if answer.onset_s is None or answer.first_s is None else answer.first_s - answer.onset_s
             self.trial_answers[line.trial] = TrialAnswer(answer.value, seconds)
         self.answers = {}
-        self._leave()
+        self._leave_step()
 
     def _go_to(self, page: str | None, trial: int | None) -> None:
         """Make a step the current one, leaving the previous step unless it is the same."""
         if (self.page, self.trial) != (page, trial):
             if (self.page, self.trial) != (None, None):
-                self._leave()
+                self._leave_step()
             self.page, self.trial = page, trial
 
-    def _leave(self) -> None:
+    def _leave_step(self) -> None:
         self._drop_answers()
         self.step, self.page, self.trial, self.attempt, self.task_done = self.step + 1, None, None, 0, False
         self.invalid = 0
@@ -214,7 +214,7 @@ class Progress:
 
     def _show_page(self, page: str, at_s: float) -> None:
         self._go_to(page, None)
-        self._enter(at_s)
+        self._enter_step(at_s)
         self.trial_since_s = self.trial_lasted_s = None
 
     def _start_trial(self, line: events.TrialStarted) -> None:
@@ -222,11 +222,11 @@ class Progress:
         trial = line.trial
         self._go_to(None, trial)
         self._drop_answers()
-        self._forget(trial)
+        self._forget_attempt(trial)
         self.step = self.steps.setdefault(trial, self.step)
         self.attempt, self.task_done = line.attempt, False
         self.presented[trial] = max(line.attempt, self.presented.get(trial, 0))
-        self._enter(line.t_s)
+        self._enter_step(line.t_s)
         self.trial_since_s, self.trial_lasted_s, self.targets, self.paused = line.t_s, None, 0, False
         self.of_intervals, self._phase = trial if line.has_intervals else None, line.phase
         if line.has_intervals and line.phase == "main":
@@ -246,7 +246,7 @@ class Progress:
         else:
             self._reason = line.outcome
 
-    def _forget(self, trial: int) -> None:
+    def _forget_attempt(self, trial: int) -> None:
         """Clear the state of an earlier attempt of a trial."""
         self.answered.pop(trial, None)
         self.trial_answers.pop(trial, None)
@@ -254,7 +254,7 @@ class Progress:
         self.late.pop(trial, None)
         self._failed.discard(trial)
 
-    def _resume(self, gap_s: float) -> None:
+    def _continue_after_gap(self, gap_s: float) -> None:
         """Continue after a gap, which the session's clock counts as a pause."""
         self.resumed += 1
         self._reason = "program ended"
@@ -263,12 +263,12 @@ class Progress:
         self.here_since_s += gap_s
         self.away_s += gap_s
 
-    def _enter(self, at_s: float) -> None:
+    def _enter_step(self, at_s: float) -> None:
         if self.step != self.here:
-            self._close(at_s)
+            self._record_duration(at_s)
             self.here, self.here_since_s = self.step, at_s
 
-    def _close(self, at_s: float) -> None:
+    def _record_duration(self, at_s: float) -> None:
         if self.here >= 0:
             self.durations_s[self.here] = at_s - self.here_since_s
 

@@ -146,7 +146,7 @@ def begin_session(
     key = open_or_draw_key(study_folder.path, protocol, draw, StudySource.split(source).liquids)
     place = Place(study_folder, study_folder.session(start.participant, start.session), protocol.study.name)
     sealed = not reveals(study_folder.path)
-    lock = _claim(place)
+    lock = _create_locked_folder(place)
     try:
         _check_path_length(place)
         allocation = allocate(study_folder, key, start.participant, group=start.group, row_of=start.row_of)
@@ -379,7 +379,7 @@ def refuse_never_begun(session: SessionFolder) -> None:
         )
 
 
-def _claim(place: Place) -> FolderLock:
+def _create_locked_folder(place: Place) -> FolderLock:
     """Create the session's folder, locked by this program from the start; the session must not have been begun."""
     path = place.folder.path
     try:

@@ -88,7 +88,7 @@ class Keeper:
         """
         if self._pending is None:
             if self._obsolete:
-                self._delete()
+                self._delete_own_draft()
             return False
         other = draft_of(self._file)
         if other is not None and other.text not in {self._own, self._pending.text}:
@@ -105,9 +105,9 @@ class Keeper:
         """
         self.base, self._pending, self._obsolete = base, None, True
         with suppress(StoreError):
-            self._delete()
+            self._delete_own_draft()
 
-    def _delete(self) -> None:
+    def _delete_own_draft(self) -> None:
         other = draft_of(self._file)
         if other is None or other.text == self._own:
             delete_draft(self._file)

@@ -167,7 +167,7 @@ def test_a_setting_is_adjusted_by_an_own_observer_or_from_what_is_sensed_now_and
     setting: Any = SimpleNamespace(
         senses=SimpleNamespace(features=lambda: "now"), observer=SimpleNamespace(steps=lambda *magnitudes: magnitudes)
     )
-    steps: Any = RehearsedSession._steps
+    steps: Any = RehearsedSession._next_steps
     simulated = "7 now", "7 reference, 7 now"
     assert steps(session, page, setting) == (simulated if own is None else -3)
     assert [(question.page, question.felt) for question in asked] == [(page, felt)]
