@@ -207,7 +207,7 @@ def test_without_the_library_one_line_says_what_to_install(monkeypatch, tmp_path
 
 @pytest.fixture
 def without_solver(monkeypatch):
-    monkeypatch.setattr(solver, "library", lambda: None)
+    monkeypatch.setattr(solver, "import_ngsolve", lambda: None)
     monkeypatch.setattr(solver, "_solve_case", stand_ins.linear_table)
     monkeypatch.setattr(solver, "steady_table", stand_ins.steady)
 

@@ -55,7 +55,7 @@ def test_as_re_vanishes_it_is_stokes_added_mass_and_basset_within_a_percent(name
 def test_it_is_the_fluid_solver_within_4_percent_and_6_of_the_peak(table):
     (model,) = [it for it in fits.MODELS if it.effects == ("unsteady_drag",)]
     judged = fits.evaluate_fit(model, table, {})
-    _, solved_n = fits.even(table)
+    _, solved_n = fits.resampled(table)
     assert judged.share <= 0.04
     assert judged.worst_n <= 0.06 * abs(solved_n).max()
 
