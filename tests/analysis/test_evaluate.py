@@ -21,7 +21,7 @@ from study_app.analysis.findings.statement_tests import DelayTrend, Pairs, Setti
 from study_app.analysis.report.write_report import as_json_types
 from study_app.analysis.results import BlockResult, Delivered, Results
 from study_app.analysis.statistics.outcome import DRAWS, false_discovery, holm
-from study_app.analysis.statistics.rank_tests import friedman, paired
+from study_app.analysis.statistics.rank_tests import friedman, signed_rank_test
 from study_app.protocol.load import parse
 from study_app.protocol.source.files import source_bytes
 from tests.analysis.conftest import Answer, make_results, twelve
@@ -214,7 +214,7 @@ def test_where_one_liquid_differs_the_others_are_seldom_told_apart(n: int) -> No
     )
     decided = replace(DECIDED, primary=())
     wrong = right = 0
-    opened_ = paired([1.0, 2.0], [2.0, 1.0])
+    opened_ = signed_rank_test([1.0, 2.0], [2.0, 1.0])
     omnibus = tuple(
         results.Tested(
             item=item.id,

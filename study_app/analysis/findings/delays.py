@@ -40,7 +40,7 @@ from study_app.analysis.results import (
 )
 from study_app.analysis.statistics.equivalence import Equivalence, fewest_participants, tost
 from study_app.analysis.statistics.equivalence import Verdict as Nearness
-from study_app.analysis.statistics.thresholds import Threshold, noticed
+from study_app.analysis.statistics.thresholds import Threshold, detection_threshold
 from study_app.analysis.statistics.trend_tests import StepDown, Trend, step_down
 from study_app.analysis.wording import (
     all_of,
@@ -409,7 +409,7 @@ class DetectionThreshold(Finding[Threshold | None]):
         ]
         if item not in rising:
             return None, (NotTested(cls.what, "the tests do not show that agreement increases with the delay"),)
-        return noticed(answers.single[item], answers.block.delays_ms), ()
+        return detection_threshold(answers.single[item], answers.block.delays_ms), ()
 
     def rows(self) -> Iterator[Row]:
         threshold = self.value

@@ -43,7 +43,7 @@ from study_app.analysis.results import (
     test_name,
 )
 from study_app.analysis.statistics.outcome import Interval, Outcome, false_discovery, holm, student_interval
-from study_app.analysis.statistics.rank_tests import Paired, friedman, global_permutation, paired
+from study_app.analysis.statistics.rank_tests import SignedRanks, friedman, global_permutation, signed_rank_test
 from study_app.analysis.statistics.slope_tests import HOTELLING, T_TEST, SlopeTest, slope_test
 from study_app.analysis.statistics.trend_tests import trend
 from study_app.analysis.wording import (
@@ -76,7 +76,7 @@ def table_of_tests(
     reasons = dict.fromkeys(outcome.no_interval for outcome in outcomes if outcome.no_interval)
     methods = dict.fromkeys(outcome.method for outcome in outcomes if outcome.p is not None)
     family = dict.fromkeys(f"{_adjustment(test)} (family “{test.family}”)" for test in tests)
-    two = isinstance(first.outcome, Paired) and len(compared) == 2
+    two = isinstance(first.outcome, SignedRanks) and len(compared) == 2
     above = f", above 0 if {compared[0]} was rated higher than {compared[1]}" if two else ""
     exact = f" ({method_words(methods)})" if methods else ""
     l_words = " L is Page's statistic." if statistic_symbol(first.outcome) == "L" else ""
@@ -158,7 +158,7 @@ def test_differences(answers: BlockAnswers) -> tuple[tuple[Tested, ...], Absent]
 
 def _test_difference(answers: BlockAnswers, values: Any) -> Outcome:
     if values.shape[1] == 2:
-        return paired(values[:, 0], values[:, 1], alpha=answers.decided.alpha)
+        return signed_rank_test(values[:, 0], values[:, 1], alpha=answers.decided.alpha)
     return friedman(values, draws=answers.draws, seed=answers.seed)
 
 
@@ -506,7 +506,9 @@ def pairs_of(answers: BlockAnswers, omnibus: tuple[Tested, ...]) -> tuple[tuple[
         return (), (NotTested(Pairs.what, "no statement shows a difference between the conditions"),)
     each = [(item, *two) for item in opened for two in combinations(range(k), 2)]
     outcomes = {
-        f"{item} {first} {second}": paired(answers.values[item][:, first], answers.values[item][:, second], alpha=alpha)
+        f"{item} {first} {second}": signed_rank_test(
+            answers.values[item][:, first], answers.values[item][:, second], alpha=alpha
+        )
         for item, first, second in each
     }
     primary = [answers.decided.is_primary(item) for item, *_ in each]
@@ -581,7 +583,7 @@ class Pairs(Finding[tuple[Pair, ...]]):
 def _differing(pair: Pair) -> int:
     """Return the number of participants with different answers to the two, who alone enter the test."""
     outcome = pair.tested.outcome
-    return outcome.n - (outcome.zeros if isinstance(outcome, Paired) else 0)
+    return outcome.n - (outcome.zeros if isinstance(outcome, SignedRanks) else 0)
 
 
 class _Difference(NamedTuple):

@@ -20,8 +20,7 @@ from numpy.typing import NDArray
 from study_app.analysis.data.blocks import Block as StatementBlock
 from study_app.analysis.data.blocks import Decided, Item, Setting, read_decided
 from study_app.analysis.data.measures import Array
-from study_app.analysis.statistics.equivalence import STEPS, p_equivalent
-from study_app.analysis.statistics.equivalence import equivalent as shows_equivalence
+from study_app.analysis.statistics.equivalence import STEPS, p_equivalent, shows_equivalence
 from study_app.analysis.statistics.mean_tests import means_of, p_differs, resamples_for
 from study_app.analysis.statistics.outcome import FEW, SIDES, doubled_ranks, false_discovery, holm, p_of_draws
 from study_app.errors import AnalysisError

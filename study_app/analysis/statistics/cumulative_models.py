@@ -2,7 +2,7 @@
 
 The log odds of an answer of at most k are θ_k - x·β - u: thresholds θ, effects β of the conditions x, and a normal
 deviation u for each participant (McCullagh 1980, J. R. Stat. Soc. B 42, 109-142; Tutz & Hennevogl 1996, Comput. Stat.
-Data Anal. 22, 537-557). With one predictor x, such as a delay, participants also have effects of their own.
+Data Anal. 22, 537-557). With one predictor x, such as a delay, the effect also varies between participants.
 
 The likelihood is integrated on a grid. The likelihood ratio is compared with t(n - 1) or F(k, k (n - 1)), not with χ²,
 which with few participants rejects too often. R's ``ordinal::clmm`` fits the same model, with Laplace's approximation
@@ -24,12 +24,12 @@ from study_app.analysis.statistics.trend_tests import Direction
 from study_app.errors import AnalysisError
 
 _MODEL: Final = "cumulative mixed model"
-_REACH: Final = 5.0
+_GRID_SDS: Final = 5.0
 """The grid ends at this many standard deviations of the participants."""
 _NODES: Final = (31, 61, 121)
-_EXACT: Final = 5e-3
-"""A grid of twice as many nodes may change the log likelihood at the maximum by so much."""
-_SURE: Final = 0.95
+_MAX_CHANGE: Final = 5e-3
+"""The largest change of the maximum log likelihood that is accepted if the grid has twice as many nodes."""
+_LEVEL: Final = 0.95
 _FEWEST: Final = 8
 _SMALLEST: Final = 1e-12
 
@@ -38,9 +38,9 @@ _SMALLEST: Final = 1e-12
 class CumulativeModel(Outcome):
     """The likelihood-ratio test of all effects; ``effect`` is the log odds ratio if there is only one.
 
-    ``log_odds_ratios`` and ``intervals`` (95 %, Wald) have one entry per column: above 0 if answers rise. ``answers``
-    counts them; ``incomplete`` participants, who did not answer in all conditions, are included in ``n``. ``sds`` are
-    the standard deviations of the participants' deviations and, with one predictor, of their own effects.
+    ``log_odds_ratios`` and ``intervals`` (95 %, Wald) have one entry per column, above 0 if answers rise. ``answers``
+    is the number of answers; ``incomplete`` participants, who did not answer in all conditions, are included in ``n``.
+    ``sds`` are the standard deviations of the participants' deviations and, with one predictor, of their own effects.
     """
 
     log_odds_ratios: tuple[float, ...] = ()
@@ -82,60 +82,60 @@ def cumulative_model(
         raise AnalysisError(
             f"columns of shape {design.shape} do not match {conditions} conditions; specify one row for each condition"
         )
-    given = ~np.isnan(array)
-    takes_part = given.any(axis=(1, 2))
-    answered: Array = array[takes_part]
-    several, n = design.shape[1], len(answered)
+    is_given = ~np.isnan(array)
+    has_answers = is_given.any(axis=(1, 2))
+    answered: Array = array[has_answers]
+    effects, n = design.shape[1], len(answered)
     model = CumulativeModel(
         test=_MODEL,
         n=n,
         dropped=len(array) - n,
         statistic_name="LR",
-        effect_name="log odds ratio" if several == 1 else "log odds ratios",
-        answers=int(given.sum()),
-        incomplete=int((given[takes_part].any(axis=2).sum(axis=1) < conditions).sum()),
+        effect_name="log odds ratio" if effects == 1 else "log odds ratios",
+        answers=int(is_given.sum()),
+        incomplete=int((is_given[has_answers].any(axis=2).sum(axis=1) < conditions).sum()),
     )
     if n < _FEWEST or len(np.unique(answered[~np.isnan(answered)])) < 2:
-        few = (
+        too_few = (
             f"there are fewer than {_FEWEST} participants, and the error rate of the test has not been evaluated "
             "for such small samples"
         )
-        note = few if n < _FEWEST else "all participants gave the same answer in all conditions"
+        note = too_few if n < _FEWEST else "all participants gave the same answer in all conditions"
         return replace(model, no_interval=note, note=note)
-    return _add_fit(model, _Likelihood(answered, design, slopes=columns is not None and several == 1), direction)
+    return _add_fit(model, _Likelihood(answered, design, slopes=columns is not None and effects == 1), direction)
 
 
 def _add_fit(model: CumulativeModel, likelihood: "_Likelihood", direction: Direction | None) -> CumulativeModel:
-    several = likelihood.effects
+    effects = likelihood.effects
     null = likelihood.maximum(null=True)
-    whole = None if null is None else likelihood.maximum()
-    errors = None if whole is None else likelihood.standard_errors(whole.x)
-    if null is None or whole is None or errors is None:
+    fitted = None if null is None else likelihood.maximum()
+    errors = None if fitted is None else likelihood.standard_errors(fitted.x)
+    if null is None or fitted is None or errors is None:
         return replace(model, no_interval=_SEPARATED, note=_SEPARATED)
-    statistic = max(0.0, 2.0 * (null.fun - whole.fun))
-    betas = whole.x[likelihood.where]
-    if several == 1:
+    statistic = max(0.0, 2.0 * (null.fun - fitted.fun))
+    betas = fitted.x[likelihood.effect_columns]
+    if effects == 1:
         p, reference = student_test(math.copysign(math.sqrt(statistic), betas[0]), model.n - 1, direction)
     else:
-        freedom = several * (model.n - 1)
-        p = float(fdtrc(several, freedom, statistic / several))
-        reference = f"F({several}, {freedom})"
-    reach = float(stdtrit(model.n - 1, (1 + _SURE) / 2)) * errors
+        freedom = effects * (model.n - 1)
+        p = float(fdtrc(effects, freedom, statistic / effects))
+        reference = f"F({effects}, {freedom})"
+    reach = float(stdtrit(model.n - 1, (1 + _LEVEL) / 2)) * errors
     ends = zip((betas - reach).tolist(), (betas + reach).tolist(), strict=True)
-    intervals = tuple(Interval(low=low, high=high, level=_SURE, method="Wald, with Student's t") for low, high in ends)
+    intervals = tuple(Interval(low=low, high=high, level=_LEVEL, method="Wald, with Student's t") for low, high in ends)
     return replace(
         model,
         statistic=statistic,
         p=p,
         method=reference,
-        effect=float(betas[0]) if several == 1 else None,
-        interval=intervals[0] if several == 1 else None,
-        no_interval="" if several == 1 else _SEVERAL,
+        effect=float(betas[0]) if effects == 1 else None,
+        interval=intervals[0] if effects == 1 else None,
+        no_interval="" if effects == 1 else _SEVERAL,
         log_odds_ratios=tuple(betas.tolist()),
         intervals=intervals,
-        sds=tuple(sd if sd > _LEAST_SD else 0.0 for sd in whole.x[likelihood.where.stop :].tolist()),
-        thresholds=tuple(likelihood.thresholds(whole.x).tolist()),
-        log_likelihood=float(-whole.fun),
+        sds=tuple(sd if sd > _LEAST_SD else 0.0 for sd in fitted.x[likelihood.effect_columns.stop :].tolist()),
+        thresholds=tuple(likelihood.thresholds(fitted.x).tolist()),
+        log_likelihood=float(-fitted.fun),
     )
 
 
@@ -156,23 +156,23 @@ class _Likelihood:
         people, conditions, _ = values.shape
         categories, codes = np.unique(values[~np.isnan(values)], return_inverse=True)
         self.design, self.categories, self.effects = design, len(categories), design.shape[1]
-        self.where = slice(self.categories - 1, self.categories - 1 + self.effects)
+        self.effect_columns = slice(self.categories - 1, self.categories - 1 + self.effects)
         counts = np.zeros((people, conditions, self.categories))
         person, condition, _ = np.nonzero(~np.isnan(values))
         np.add.at(counts, (person, condition, codes), 1.0)
         self._totals = counts.sum(axis=(0, 1))
         self._counts = counts.reshape(people, -1)
-        self._x = design if slopes else None
+        self._slope_predictor = design if slopes else None
 
-    def _integrate(self, nodes: int) -> None:
-        """Use a grid with so many ``nodes`` for each standard normal deviation of a participant."""
-        grid = np.linspace(-_REACH, _REACH, nodes)
-        first, second = np.meshgrid(grid, np.zeros(1) if self._x is None else grid, indexing="ij")
+    def _set_grid(self, nodes: int) -> None:
+        """Set the integration grid: ``nodes`` values of each standard normal deviation of a participant."""
+        grid = np.linspace(-_GRID_SDS, _GRID_SDS, nodes)
+        first, second = np.meshgrid(grid, np.zeros(1) if self._slope_predictor is None else grid, indexing="ij")
         self._log_weights = -0.5 * (first**2 + second**2).ravel()
         self._log_weights -= logsumexp(self._log_weights)
         self._deviations = [np.broadcast_to(first.ravel(), (len(self.design), first.size))]
-        if self._x is not None:
-            self._deviations.append(self._x * second.ravel())
+        if self._slope_predictor is not None:
+            self._deviations.append(self._slope_predictor * second.ravel())
 
     def thresholds(self, parameters: Array) -> Array:
         """Return the thresholds between categories."""
@@ -186,26 +186,26 @@ class _Likelihood:
         """
         shares = np.cumsum(self._totals)[:-1] / self._totals.sum()
         cuts = np.log(shares / (1 - shares))
-        sds = 1 if self._x is None else 2
+        sds = 1 if self._slope_predictor is None else 2
         start = np.array(
             [cuts[0], *np.log(np.maximum(np.diff(cuts), 0.05)), *np.zeros(self.effects), *[1.0, 0.5][:sds]]
         )
         bounds = [(-_MOST_LOG_ODDS, _MOST_LOG_ODDS)] * len(start)
         if null:
-            bounds[self.where] = [(0.0, 0.0)] * self.effects
-        bounds[self.where.stop :] = [(_LEAST_SD, _MOST_LOG_ODDS)] * sds
+            bounds[self.effect_columns] = [(0.0, 0.0)] * self.effects
+        bounds[self.effect_columns.stop :] = [(_LEAST_SD, _MOST_LOG_ODDS)] * sds
         options = {"maxiter": 500, "ftol": 1e-12, "gtol": 1e-6}
         for nodes in _NODES:
-            self._integrate(nodes)
+            self._set_grid(nodes)
             result = minimize(
                 self.value_and_gradient, start, jac=True, method="L-BFGS-B", bounds=bounds, options=options
             )
             start = result.x
-            if np.abs(start[[0, *range(self.where.start, len(start))]]).max() > 0.99 * _MOST_LOG_ODDS:
+            if np.abs(start[[0, *range(self.effect_columns.start, len(start))]]).max() > 0.99 * _MOST_LOG_ODDS:
                 return None
-            self._integrate(2 * nodes - 1)
-            is_exact = abs(self.value_and_gradient(start)[0] - result.fun) < _EXACT
-            self._integrate(nodes)
+            self._set_grid(2 * nodes - 1)
+            is_exact = abs(self.value_and_gradient(start)[0] - result.fun) < _MAX_CHANGE
+            self._set_grid(nodes)
             if is_exact:
                 return result
         return result
@@ -213,8 +213,8 @@ class _Likelihood:
     def value_and_gradient(self, parameters: Array) -> tuple[float, Array]:
         """Return the negative log likelihood and its gradient."""
         cuts = self.thresholds(parameters)
-        sds = parameters[self.where.stop :]
-        shift = (self.design @ parameters[self.where])[:, None] + sum(
+        sds = parameters[self.effect_columns.stop :]
+        shift = (self.design @ parameters[self.effect_columns])[:, None] + sum(
             sd * deviation for sd, deviation in zip(sds, self._deviations, strict=True)
         )
         below = np.zeros((len(shift), self.categories + 1, shift.shape[1]))
@@ -226,26 +226,30 @@ class _Likelihood:
         logs = self._counts @ np.log(share).reshape(self._counts.shape[1], -1) + self._log_weights
         largest = logs.max(axis=1, keepdims=True)
         likelihoods = np.exp(logs - largest)
-        of_people = likelihoods.sum(axis=1, keepdims=True)
-        weights = (self._counts.T @ (likelihoods / of_people)).reshape(share.shape)
-        of_upper, of_lower = (weights * at_upper).sum(axis=2), (weights * at_lower).sum(axis=2)
-        of_cuts = of_upper[:, :-1].sum(axis=0) - of_lower[:, 1:].sum(axis=0)
+        person_likelihoods = likelihoods.sum(axis=1, keepdims=True)
+        weights = (self._counts.T @ (likelihoods / person_likelihoods)).reshape(share.shape)
+        upper_gradient, lower_gradient = (weights * at_upper).sum(axis=2), (weights * at_lower).sum(axis=2)
+        cut_gradient = upper_gradient[:, :-1].sum(axis=0) - lower_gradient[:, 1:].sum(axis=0)
         steps = np.exp(parameters[1 : self.categories - 1])
-        later = np.cumsum(of_cuts[::-1])[::-1]
-        of_shift = (weights * (at_lower - at_upper)).sum(axis=1)
+        cumulative_gradient = np.cumsum(cut_gradient[::-1])[::-1]
+        shift_gradient = (weights * (at_lower - at_upper)).sum(axis=1)
         gradient = np.concatenate(
             [
-                [later[0]],
-                steps * later[1:],
-                self.design.T @ of_shift.sum(axis=1),
-                [float((of_shift * deviation).sum()) for deviation in self._deviations],
+                [cumulative_gradient[0]],
+                steps * cumulative_gradient[1:],
+                self.design.T @ shift_gradient.sum(axis=1),
+                [float((shift_gradient * deviation).sum()) for deviation in self._deviations],
             ]
         )
-        return float(-(largest + np.log(of_people)).sum()), -gradient
+        return float(-(largest + np.log(person_likelihoods)).sum()), -gradient
 
     def standard_errors(self, parameters: Array) -> Array | None:
         """Return the standard errors of the effects, from the observed information; None if it is singular."""
-        free = [place for place in range(len(parameters)) if place < self.where.stop or parameters[place] > _LEAST_SD]
+        free = [
+            place
+            for place in range(len(parameters))
+            if place < self.effect_columns.stop or parameters[place] > _LEAST_SD
+        ]
         step = 1e-4
         columns = []
         for change in step * np.eye(len(parameters)):
@@ -255,5 +259,5 @@ class _Likelihood:
         information = (information + information.T) / 2
         if np.linalg.eigvalsh(information)[0] <= _SMALLEST:
             return None
-        errors: Array = np.sqrt(np.diag(np.linalg.inv(information))[self.where])
+        errors: Array = np.sqrt(np.diag(np.linalg.inv(information))[self.effect_columns])
         return errors

@@ -20,7 +20,7 @@ PRIOR_SCALE: Final = math.sqrt(2) / 2
 """Scale of the Cauchy prior of the standardised difference ("medium")."""
 _LEVEL: Final = 0.95
 LARGEST_LOG: Final = 700.0
-"""Logarithm of the largest Bayes factor, which a float can hold."""
+"""Logarithm of the largest Bayes factor; larger ones could exceed the range of a float."""
 _SAME: Final = 1e-9
 
 
@@ -28,7 +28,7 @@ _SAME: Final = 1e-9
 class EffectSize:
     """A standardised effect ("d_z", "g" or "Cliff's delta") and the ends of its 95 % interval.
 
-    ``t`` is Student's t of the same numbers, None of Cliff's delta.
+    ``t`` is Student's t of the same numbers; None for Cliff's delta.
     """
 
     name: str
@@ -45,7 +45,7 @@ def d_z(differences: Array) -> EffectSize | None:
         return None
     value = float(differences.mean()) / sd
     t = value * math.sqrt(n)
-    low, high = _noncentrality(t, n - 1)
+    low, high = _noncentrality_interval(t, n - 1)
     return EffectSize(name="d_z", value=value, low=low / math.sqrt(n), high=high / math.sqrt(n), t=t)
 
 
@@ -59,27 +59,27 @@ def hedges_g(first: Array, second: Array) -> EffectSize | None:
         return None
     d, freedom, root = float(first.mean() - second.mean()) / sd, n + m - 2, math.sqrt(n * m / (n + m))
     bias = math.exp(gammaln(freedom / 2) - gammaln((freedom - 1) / 2)) / math.sqrt(freedom / 2)
-    low, high = _noncentrality(d * root, freedom)
+    low, high = _noncentrality_interval(d * root, freedom)
     return EffectSize(name="g", value=bias * d, low=bias * low / root, high=bias * high / root, t=d * root)
 
 
 def _pooled_sd(first: Array, second: Array) -> float:
-    squares = sum(float(((one - one.mean()) ** 2).sum()) for one in (first, second))
+    squares = sum(float(((group - group.mean()) ** 2).sum()) for group in (first, second))
     return math.sqrt(squares / (len(first) + len(second) - 2))
 
 
-def _noncentrality(t: float, freedom: int) -> tuple[float, float]:
-    """Return the noncentralities for which t is at the ends of the central 95 %."""
+def _noncentrality_interval(t: float, freedom: int) -> tuple[float, float]:
+    """Return the 95 % interval of the noncentrality of the t distribution, given an observed t."""
     tail, reach = (1 - _LEVEL) / 2, 10.0 + 3 * abs(t)
 
-    def away(shift: float, p: float) -> float:
+    def excess(shift: float, p: float) -> float:
         below = float(nctdtr(freedom, shift, t))
         return (float(shift < t) if math.isnan(below) else below) - p
 
-    def end(p: float) -> float:
-        return float(brentq(away, t - reach, t + reach, (p,)))
+    def noncentrality(p: float) -> float:
+        return float(brentq(excess, t - reach, t + reach, (p,)))
 
-    return end(1 - tail), end(tail)
+    return noncentrality(1 - tail), noncentrality(tail)
 
 
 def cliffs_delta(first: Array, second: Array) -> EffectSize | None:
@@ -113,7 +113,7 @@ def paired_delta(differences: Array) -> EffectSize | None:
 
 
 def _sign_effect_size(delta: float, variance: float, freedom: int, cases: int) -> EffectSize:
-    """Return delta with an interval that is limited to −1 to 1.
+    """Return delta with its interval, limited to −1 to 1.
 
     At ±1, where the variance is zero, it ends at the bound of Clopper and Pearson (1934) for ``cases`` of ``cases``.
     """
@@ -129,7 +129,7 @@ def _sign_effect_size(delta: float, variance: float, freedom: int, cases: int) -
 
 
 def jzs_bayes_factor(t: float, n: int, m: int | None = None, scale: float = PRIOR_SCALE) -> float:
-    """Return the JZS Bayes factor, two-sided: the likelihood of t with a difference relative to that without.
+    """Return the two-sided JZS Bayes factor: the likelihood of t with a difference, divided by that without.
 
     Parameters
     ----------

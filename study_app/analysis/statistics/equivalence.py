@@ -1,10 +1,10 @@
 """Equivalence: two one-sided tests that a mean lies within a bound, and whether many simulated studies show it.
 
 Schuirmann (1987), J. Pharmacokinet. Biopharm. 15, 657–680; Lakens (2017), Soc. Psychol. Personal. Sci. 8, 355–362. Each
-is by Student's t and by the bootstrap of `mean_tests`. No test sees people who are not in the sample: a minority that
-differs as much as the scale permits, and shifts the mean by the bound, must not be missed by chance.
+test uses Student's t and the bootstrap of `mean_tests`. No test accounts for people outside the sample, so the sample
+must be large enough to include, with high probability, a member of any minority that could shift the mean by the bound.
 
-A difference that is not significant is no evidence of equivalence; here it is called inconclusive. A mean whose whole
+A difference that is not significant is not evidence of equivalence; the result is then inconclusive. A mean whose whole
 interval lies beyond the bound is not equivalent.
 """
 
@@ -26,11 +26,11 @@ from study_app.number_text import counted
 
 Verdict: TypeAlias = Literal["equivalent", "not equivalent", "inconclusive", "out of reach"]
 
-_UNSEEN: Final = 1 / 5
-"""A group of this share of all people, who differ strongly, must not be missed by chance, however wide the bound."""
+_LARGEST_MINORITY: Final = 1 / 5
+"""The largest minority that the sample has to represent, however wide the bound, as a share of the population."""
 
 STEPS: Final = 6.0
-"""The largest difference of two answers on seven points."""
+"""The largest difference between two answers on a seven-point scale."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,10 +53,10 @@ class Equivalence(Outcome):
 
     ``verdict`` is "equivalent" if every p is at most alpha; "not equivalent" if the whole interval lies beyond the
     bound (or, if all differences are equal, if they lie beyond it for so many participants that a sign test is
-    significant); "out of reach" if no answers of so many participants could have been equivalent; and otherwise
-    "inconclusive", which is no evidence of a difference. ``checks_agree`` tells whether the bootstrap supports the
-    decision of the t tests. ``beyond`` is the number of single participants who differ by more than the bound, about
-    which equivalent means say nothing.
+    significant); "out of reach" if so few participants cannot show equivalence, whatever they answer; and otherwise
+    "inconclusive", which is not evidence of a difference. ``checks_agree`` tells whether the bootstrap supports the
+    decision of the t tests. ``beyond`` is the number of participants who differ by more than the bound; it may be
+    large even if the means are equivalent.
     """
 
     bound: float
@@ -103,7 +103,7 @@ def tost(
 
 
 def p_equivalent(means: Means, bound: float, n: int, largest: float | None) -> Array:
-    """Return the p (studies,) of the tests that means lie within ± ``bound``.
+    """Return the largest p (studies,) of the tests that the means lie within ± ``bound``.
 
     ``n`` is the number of participants, for two groups that of the smaller one.
     """
@@ -113,15 +113,15 @@ def p_equivalent(means: Means, bound: float, n: int, largest: float | None) -> A
 
 
 def smallest_minority(bound: float, largest: float | None) -> float:
-    """Return the share of people that shifts the mean by the bound if they differ by ``largest``; at most `_UNSEEN`.
+    """Return the share of people who can shift the mean by the bound, at most `_LARGEST_MINORITY`.
 
-    With None, differences are unlimited, so that no number of participants excludes the smallest minorities.
+    Each of them differs by ``largest``; None means that differences are unlimited, so that any minority could do so.
     """
-    return _UNSEEN if largest is None else min(_UNSEEN, bound / largest)
+    return _LARGEST_MINORITY if largest is None else min(_LARGEST_MINORITY, bound / largest)
 
 
 def p_unseen(n: int, bound: float, largest: float | None = STEPS) -> float:
-    """Return the probability that a sample of ``n`` participants contains no member of such a `smallest_minority`."""
+    """Return the probability that a sample of ``n`` participants contains no member of the `smallest_minority`."""
     return float((1 - smallest_minority(bound, largest)) ** n)
 
 
@@ -134,12 +134,12 @@ def fewest_participants(alpha: float, bound: float, largest: float | None = STEP
 def _compare_sorted(
     differences: tuple[float, ...], bound: float, alpha: float, seed: int, largest: float
 ) -> Equivalence:
-    """Return the comparison of sorted ``differences``, which often repeat since answers are whole points."""
-    kept = np.array(differences)
-    equivalence = _describe_result(kept, bound, alpha, largest)
+    """Return the comparison of sorted ``differences``; cached, because whole points often give the same differences."""
+    values = np.array(differences)
+    equivalence = _describe_result(values, bound, alpha, largest)
     if equivalence.n < 2:
         return equivalence
-    means = means_of(kept[None], seed=seed, resamples=resamples_for(alpha))
+    means = means_of(values[None], seed=seed, resamples=resamples_for(alpha))
     both = (means, means.opposite())
     p_lower, p_upper = (float(means.p_t(-bound)[0]) for means in both)
     by_bootstrap = max(float(means.p_bootstrap(-bound)[0]) for means in both)
@@ -168,12 +168,14 @@ def _compare_sorted(
     by_tests = max(p_lower, p_upper, by_bootstrap) <= alpha
     beyond = is_beyond(equivalence, bound, alpha)
     if equivalence.interval is not None:
-        further = means if equivalence.interval.low > 0 else means.opposite()
-        agrees = by_bootstrap <= alpha, float(further.p_bootstrap(bound)[0]) <= alpha
-        equivalence = replace(equivalence, checks_agree=agrees == (max(p_lower, p_upper) <= alpha, beyond))
+        far_side = means if equivalence.interval.low > 0 else means.opposite()
+        bootstrap_agrees = by_bootstrap <= alpha, float(far_side.p_bootstrap(bound)[0]) <= alpha
+        equivalence = replace(equivalence, checks_agree=bootstrap_agrees == (max(p_lower, p_upper) <= alpha, beyond))
     verdict: Verdict = "out of reach" if unseen > alpha else "equivalent" if by_tests else "inconclusive"
-    few = f"too few participants to show equivalence: at least {fewest_participants(alpha, bound, largest)} are needed"
-    note = "" if verdict == "equivalent" else few if by_tests else "equivalence was not shown"
+    too_few = (
+        f"too few participants to show equivalence: at least {fewest_participants(alpha, bound, largest)} are needed"
+    )
+    note = "" if verdict == "equivalent" else too_few if by_tests else "equivalence was not shown"
     return replace(
         equivalence,
         verdict="not equivalent" if beyond else verdict,
@@ -188,18 +190,18 @@ def is_beyond(outcome: Outcome, bound: float, alpha: float) -> bool:
     """
     if outcome.effect is None:
         return False
-    few = outcome.interval is None and 0.5**outcome.n > alpha
+    too_few = outcome.interval is None and 0.5**outcome.n > alpha
     low, high = (
         (outcome.effect, outcome.effect) if outcome.interval is None else (outcome.interval.low, outcome.interval.high)
     )
-    return not few and (low > bound + SAME or high < -bound - SAME)
+    return not too_few and (low > bound + SAME or high < -bound - SAME)
 
 
 def _describe_result(kept: Array, bound: float, alpha: float, largest: float) -> Equivalence:
     """Return the descriptive part of a result, before any test."""
     n = len(kept)
-    people = f"{counted(n, 'participant')}: no variation"
-    reason = f"all {n} observed differences are equal, so an interval cannot be computed" if n > 1 else people
+    too_few = f"{counted(n, 'participant')}: no variation"
+    reason = f"all {n} observed differences are equal, so an interval cannot be computed" if n > 1 else too_few
     return Equivalence(
         test="equivalence, two one-sided t tests",
         n=n,
@@ -224,23 +226,23 @@ def people_beyond(differences: Array, bound: float) -> Beyond:
     return Beyond(count=count, n=n, share=count / n, interval=clopper_pearson(count, n))
 
 
-_AT_ONCE: Final = 500
-"""Studies that are resampled together: more take more memory."""
+_STUDIES_AT_ONCE: Final = 500
+"""The number of studies that are resampled together, which limits memory."""
 
 
-def equivalent(
+def shows_equivalence(
     differences: Array, bound: float, alpha: float, seed: int = 1, largest: float = STEPS
 ) -> NDArray[np.bool_]:
-    """Return whether each study shows equivalence within ± ``bound`` as `tost` does.
+    """Return for each study (studies,) whether `tost` would show equivalence within ± ``bound``.
 
-    ``differences`` are (studies, participants).
+    ``differences`` has shape (studies, participants).
     """
     n, resamples = differences.shape[1], resamples_for(alpha)
     shown = np.zeros(len(differences), dtype=bool)
     if n < 2 or p_unseen(n, bound, largest) > alpha:
         return shown
-    near = np.flatnonzero(np.abs(differences.mean(axis=1)) < bound)
-    for part in np.array_split(near, max(1, math.ceil(len(near) / _AT_ONCE))):
-        means = means_of(differences[part], seed=seed, resamples=resamples)
-        shown[part] = p_equivalent(means, bound, n, largest) <= alpha
+    candidates = np.flatnonzero(np.abs(differences.mean(axis=1)) < bound)
+    for indices in np.array_split(candidates, max(1, math.ceil(len(candidates) / _STUDIES_AT_ONCE))):
+        means = means_of(differences[indices], seed=seed, resamples=resamples)
+        shown[indices] = p_equivalent(means, bound, n, largest) <= alpha
     return shown

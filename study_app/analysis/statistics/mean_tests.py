@@ -1,11 +1,11 @@
-"""Tests of means: Student's t, a bootstrap that allows for people who were not drawn, and t corrected for skewness.
+"""Tests of means: Student's t, a bootstrap that allows for people outside the sample, and t corrected for skewness.
 
-The bootstrap gives each participant a random weight (Rubin 1981, Ann. Stat. 9, 130–134), and so a further one who
-differs like the most extreme participant in the direction that speaks against what is tested. With the end of the scale
-in place of the most extreme participant this is the test of Gaffke (2005, Math. Methods Stat. 14, 451–467), which holds
-for every distribution on a bounded scale. t alone is significant too often where a few people differ strongly from the
-others, or where differences are skewed; Hall's transformation of t (1992, J. R. Stat. Soc. B 54, 221–228) allows for
-skewness. A difference is shown only if all three tests show it, an equivalence if t and the bootstrap do.
+The bootstrap gives each participant a random weight (Rubin 1981, Ann. Stat. 9, 130–134), and also one additional
+participant who equals the most extreme one in the direction that contradicts the tested hypothesis. With the end of the
+scale in place of the most extreme participant this is the test of Gaffke (2005, Math. Methods Stat. 14, 451–467), which
+holds for every distribution on a bounded scale. t alone is significant too often where a few people differ strongly
+from the others, or where differences are skewed; Hall's transformation of t (1992, J. R. Stat. Soc. B 54, 221–228)
+allows for skewness. A difference is shown only if all three tests show it, an equivalence if t and the bootstrap do.
 
 Between groups t has the degrees of freedom of the smaller group (Hsu 1938): its error rate holds whatever the standard
 deviations are, while Welch's holds approximately, and not in groups of a few participants.
@@ -26,13 +26,13 @@ from study_app.analysis.statistics.outcome import Array
 
 _RESAMPLES: Final = 1999
 _MOST_RESAMPLES: Final = 100_000
-_STUDIES: Final = 2000
-"""So many simulated studies tell which difference 80 % of them show, to about 1 %."""
-_CELLS: Final = 4_000_000
-"""So many resampled means are kept at once."""
+_SIMULATED_STUDIES: Final = 2000
+"""Simulated studies, enough to estimate the difference that 80 % of them show to about 1 %."""
+_MAX_MEANS: Final = 4_000_000
+"""The most resampled means that are kept in memory at once."""
 _HALVINGS: Final = 20
 SAME: Final = 1e-9
-"""Differences that spread less than this are equal."""
+"""Differences whose standard error is smaller than this are treated as equal."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -63,13 +63,13 @@ class Means:
         )
 
     def widened(self, variance: float) -> Means:
-        """Return the means with an additional normal error of this variance that is common to all participants."""
-        further = math.sqrt(variance) * np.random.default_rng(len(self.lowest)).normal(size=(len(self.lowest), 1))
+        """Return the means with an additional normal error of this variance, common to all participants."""
+        errors = math.sqrt(variance) * np.random.default_rng(len(self.lowest)).normal(size=(len(self.lowest), 1))
         return replace(
             self,
             error=np.hypot(self.error, math.sqrt(variance)),
-            lowest=self.lowest + further,
-            highest=self.highest + further,
+            lowest=self.lowest + errors,
+            highest=self.highest + errors,
         )
 
     def t(self, value: float = 0.0) -> Array:
@@ -78,19 +78,19 @@ class Means:
             return np.asarray(np.nan_to_num((self.mean - value) / self.error, posinf=math.inf, neginf=-math.inf))
 
     def p_t(self, value: float = 0.0) -> Array:
-        """Return Student's one-sided p that the mean is above a value."""
+        """Return Student's one-sided p (studies,) for the hypothesis that the mean is above a value."""
         flat = np.where(self.mean > value + SAME, 0.0, 1.0)
         return np.asarray(np.where(self.error > SAME, stdtr(self.freedom, -self.t(value)), flat))
 
     def p_skewed(self) -> Array:
-        """Return the one-sided p that the mean is above 0, by Hall's transformation of t."""
+        """Return the one-sided p (studies,) for a mean above 0, by Hall's transformation of t."""
         with np.errstate(divide="ignore", invalid="ignore"):
             t, skewness = self.t(), np.nan_to_num(self.third / self.error**3)
             transformed = t + skewness / 6 + skewness * t**2 / 3 + skewness**2 * t**3 / 27
         return np.asarray(np.where(self.error > SAME, stdtr(self.freedom, -transformed), self.p_t()))
 
     def p_bootstrap(self, value: float = 0.0) -> Array:
-        """Return the one-sided bootstrap p that the mean is above a value."""
+        """Return the one-sided bootstrap p (studies,) for the hypothesis that the mean is above a value."""
         return np.asarray((1 + (self.lowest <= value + SAME).sum(axis=0)) / (1 + len(self.lowest)))
 
     def opposite(self) -> Means:
@@ -104,7 +104,7 @@ class Means:
 
 
 def resamples_for(alpha: float) -> int:
-    """Return the number of resamples, large enough that it does not decide whether p reaches ``alpha``."""
+    """Return a number of resamples that is large enough for tests at ``alpha``."""
     return min(_MOST_RESAMPLES, max(_RESAMPLES, math.ceil(20 / alpha)))
 
 
@@ -129,23 +129,23 @@ def means_of(
     weights = np.ones(n) if weights is None else weights / weights.mean()
     mean = values @ weights / n
     error = np.sqrt((values - mean[:, None]) ** 2 @ weights / (n * (n - 1)))
-    of_cubes = 0.0 if n < 3 else 1 / (n * (n - 1) * (n - 2))
+    cube_factor = 0.0 if n < 3 else 1 / (n * (n - 1) * (n - 2))
     draws = _random_weights(n, seed, group, resamples)
     return Means(
         mean=mean,
         error=error,
-        third=(values - mean[:, None]) ** 3 @ weights * of_cubes,
+        third=(values - mean[:, None]) ** 3 @ weights * cube_factor,
         freedom=n - 1,
         lowest=_resample_means(values, weights, draws, 0),
         highest=_resample_means(values, weights, draws, -1),
     )
 
 
-def _resample_means(values: Array, weights: Array, draws: Array, further: int) -> Array:
-    """Return resampled means (resamples, studies), with an additional participant like the one at this index."""
-    of_further = draws[:, -1:] * weights[further]
-    sums = draws[:, :-1] @ (values * weights).T + of_further * values[:, further]
-    return np.asarray(sums / ((draws[:, :-1] @ weights)[:, None] + of_further))
+def _resample_means(values: Array, weights: Array, draws: Array, extreme: int) -> Array:
+    """Return resampled means (resamples, studies), with one more participant equal to that at index ``extreme``."""
+    extreme_weights = draws[:, -1:] * weights[extreme]
+    sums = draws[:, :-1] @ (values * weights).T + extreme_weights * values[:, extreme]
+    return np.asarray(sums / ((draws[:, :-1] @ weights)[:, None] + extreme_weights))
 
 
 def _random_weights(n: int, seed: int, group: int, resamples: int) -> Array:
@@ -154,7 +154,7 @@ def _random_weights(n: int, seed: int, group: int, resamples: int) -> Array:
 
 
 class DifferencePs(NamedTuple):
-    """The p (studies,) of three tests, all of which a difference must pass."""
+    """The p (studies,) of three tests; a difference is shown only if all are significant."""
 
     t: Array
     bootstrap: Array
@@ -162,9 +162,9 @@ class DifferencePs(NamedTuple):
 
 
 def p_differs(means: Means, alternative: str) -> DifferencePs:
-    """Return the p that means are not 0: "greater", "less" or "two-sided".
+    """Return the p of three tests that the means differ from 0: "greater", "less" or "two-sided".
 
-    A two-sided bootstrap only has to show the sign of the mean: the p of t is already doubled.
+    The bootstrap p is not doubled in two-sided tests: it only has to show the sign of the mean.
     """
     above, below = (np.array([side.p_t(), side.p_bootstrap(), side.p_skewed()]) for side in (means, means.opposite()))
     if alternative == "two-sided":
@@ -176,12 +176,12 @@ def p_differs(means: Means, alternative: str) -> DifferencePs:
 
 @cache
 def smallest_shift(*sizes: int, alpha: float, alternative: str, power: float) -> float:
-    """Return the mean difference that all tests show in the share ``power`` of simulated studies [SD].
+    """Return the mean difference [SD] that all tests show in the share ``power`` of simulated studies.
 
     A study has pairs, or two groups of these ``sizes``, with normal numbers; ``alternative`` is "greater" or
     "two-sided". The difference is infinite if a thousand standard errors are too few.
     """
-    shifts = [_shifts_shown(means, alpha, alternative) for means in _simulated_means(sizes, alpha)]
+    shifts = [_smallest_shifts(means, alpha, alternative) for means in _simulated_means(sizes, alpha)]
     return float(np.quantile(np.concatenate(shifts), power))
 
 
@@ -201,19 +201,19 @@ def equivalence_power(*sizes: int, alpha: float, bound: float) -> float:
 def _simulated_means(sizes: tuple[int, ...], alpha: float) -> Iterator[Means]:
     """Yield the means, or the differences of two groups' means, of simulated studies without a difference."""
     draw, resamples = np.random.default_rng(1), resamples_for(alpha)
-    values = [draw.normal(size=(_STUDIES, size)) for size in sizes]
-    at_once = math.ceil(_CELLS / resamples)
-    for start in range(0, _STUDIES, at_once):
+    values = [draw.normal(size=(_SIMULATED_STUDIES, size)) for size in sizes]
+    batch = math.ceil(_MAX_MEANS / resamples)
+    for start in range(0, _SIMULATED_STUDIES, batch):
         groups = [
-            means_of(of_group[start : start + at_once], group=group, resamples=resamples)
+            means_of(of_group[start : start + batch], group=group, resamples=resamples)
             for group, of_group in enumerate(values)
         ]
         yield groups[0] if len(groups) == 1 else groups[0] - groups[1]
 
 
-def _shifts_shown(means: Means, alpha: float, alternative: str) -> Array:
-    """Return by how much the numbers of each study (studies,) must rise until all tests show a mean above 0."""
-    rank = math.floor(alpha * (1 + len(means.lowest)))  # so many resampled means may be at most 0
+def _smallest_shifts(means: Means, alpha: float, alternative: str) -> Array:
+    """Return the smallest shift of each study's values (studies,) with which all tests show a mean above 0."""
+    rank = math.floor(alpha * (1 + len(means.lowest)))  # the most resampled means that may be at most 0
     by_bootstrap = SAME - np.partition(means.lowest, rank - 1, axis=0)[rank - 1]
     below, most = -means.mean, -means.mean + 1000 * means.error
     above, tail = most, alpha / 2 if alternative == "two-sided" else alpha

@@ -1,6 +1,6 @@
-"""What every test returns, exact distributions, intervals and corrections that tests share.
+"""The common result of all tests, and the distributions, intervals and corrections that tests share.
 
-A result never holds NaN: what cannot be computed is None, and ``note`` or ``no_interval`` says why.
+A result never contains NaN: a value that cannot be computed is None, and ``note`` or ``no_interval`` gives the reason.
 """
 
 from __future__ import annotations
@@ -23,17 +23,17 @@ Array: TypeAlias = NDArray[np.float64]
 Whole: TypeAlias = NDArray[np.int64]
 
 DRAWS: Final = 9999
-"""Random rearrangements where not all can be gone through; (1 + those as extreme) / (1 + DRAWS) is then p."""
+"""Number of random permutations if a full enumeration takes too long; p is then (1 + extreme ones) / (1 + DRAWS)."""
 
 _MOST_DRAWS: Final = 199_999
-_FLOOR: Final = 0.05
-"""The smallest p that draws can give, corrected for its family, is this share of alpha at most."""
+_LARGEST_SHARE: Final = 0.05
+"""The smallest p that permutations can give, corrected for its family, is at most this share of alpha."""
 
 SAMPLES: Final = 1999
 """Bootstrap samples of an interval."""
 
 FEW: Final = 10
-"""Below so many participants there is no percentile bootstrap interval and no test of slopes."""
+"""The fewest participants for a percentile bootstrap interval and for a test of slopes."""
 
 _TOO_FEW: Final = f"no interval for fewer than {FEW} participants, because its coverage would be far too low"
 NO_VARIATION: Final = "no variation: every participant gave the same answer in all conditions"
@@ -75,35 +75,35 @@ class Outcome:
 
 
 def checked_values(values: ArrayLike, axes: str) -> Array:
-    """Return ``values`` as floats, with NaN for missing answers; ``axes`` names them ("participants, settings")."""
+    """Return ``values`` as floats, with NaN for missing answers; ``axes`` names the axes: "participants, settings"."""
     array = np.asarray(values, dtype=np.float64)
-    wanted = axes.count(",") + 1
-    if array.ndim != wanted:
-        raise AnalysisError(f"answers of shape {array.shape} cannot be tested; specify {wanted} axes: {axes}")
+    dimensions = axes.count(",") + 1
+    if array.ndim != dimensions:
+        raise AnalysisError(f"answers of shape {array.shape} cannot be tested; specify {dimensions} axes: {axes}")
     if np.isinf(array).any():
         raise AnalysisError("an answer is infinite; specify finite numbers, with NaN for missing answers")
     return array
 
 
 def complete_rows(values: ArrayLike, *, at_least: int, why: str) -> tuple[Array, int]:
-    """Return the participants (rows) with answers in all settings (columns), and the number of others."""
+    """Return the rows of participants with answers in all settings (columns), and the number of dropped rows."""
     array = checked_values(values, "participants, settings")
     if array.shape[1] < at_least:
         raise AnalysisError(f"too few conditions ({array.shape[1]}): at least {at_least} are needed{why}")
-    whole = ~np.isnan(array).any(axis=1)
-    return array[whole], int((~whole).sum())
+    is_complete = ~np.isnan(array).any(axis=1)
+    return array[is_complete], int((~is_complete).sum())
 
 
 def draws_for(alpha: float, usual: int, members: int = 1) -> int:
-    """Return the number of permutations for each of ``members`` tests, large enough not to decide a verdict."""
-    return min(_MOST_DRAWS, max(usual, math.ceil(members / (_FLOOR * alpha))))
+    """Return the number of permutations of each of ``members`` tests, at least ``usual`` and enough for ``alpha``."""
+    return min(_MOST_DRAWS, max(usual, math.ceil(members / (_LARGEST_SHARE * alpha))))
 
 
 SIDES: Final = {"higher": "greater", "lower": "less", None: "two-sided"}
-"""The alternative of a test, by what is expected of the first of two."""
+"""The alternative of a test by the expected direction of the first value."""
 
 _NODES: Final = 200
-"""Of the quadrature over the statistic of a look."""
+"""Nodes of the quadrature over the statistic at a look."""
 
 
 @lru_cache(maxsize=64)
@@ -128,19 +128,19 @@ def alpha_of_looks(looks: tuple[int, ...], alpha: float, spending: str) -> tuple
     spent = alpha * np.log1p((math.e - 1) * shares)
     if spending == "obrien-fleming":
         spent = 4 * ndtr(ndtri(alpha / 4) / np.sqrt(shares))
-    nodes, of_nodes = np.polynomial.legendre.leggauss(_NODES)
-    alphas, places, weights, before = [], np.zeros(1), np.ones(1), 0.0
-    for share, due in zip(shares, np.diff(spent, prepend=0.0), strict=True):
-        end = float(brentq(_excess, 0.0, 40.0, (places, weights, math.sqrt(share - before), due)))
-        inside = end * nodes
-        density = _normal_density(inside[:, None], places, math.sqrt(share - before)) @ weights
-        places, weights, before = inside, density * end * of_nodes, share
-        alphas.append(float(2 * ndtr(-end / math.sqrt(share))))
+    nodes, node_weights = np.polynomial.legendre.leggauss(_NODES)
+    alphas, places, weights, last_share = [], np.zeros(1), np.ones(1), 0.0
+    for share, alpha_due in zip(shares, np.diff(spent, prepend=0.0), strict=True):
+        bound = float(brentq(_crossing_excess, 0.0, 40.0, (places, weights, math.sqrt(share - last_share), alpha_due)))
+        inner_places = bound * nodes
+        density = _normal_density(inner_places[:, None], places, math.sqrt(share - last_share)) @ weights
+        places, weights, last_share = inner_places, density * bound * node_weights, share
+        alphas.append(float(2 * ndtr(-bound / math.sqrt(share))))
     return tuple(alphas)
 
 
 _MOST_REPORTS: Final = 200
-"""So many reports between the first look and the last are integrated over."""
+"""The most reports, from the first look to the last, over which the error rate is integrated."""
 
 
 @lru_cache(maxsize=64)
@@ -150,16 +150,16 @@ def error_of_every_report(looks: tuple[int, ...], alpha: float, spending: str) -
     Each test uses the alpha of the last look that is reached; for the parameters see `alpha_of_looks`.
     """
     levels = np.array(alpha_of_looks(looks, alpha, spending))
-    every = np.unique([*np.linspace(looks[0], looks[-1], _MOST_REPORTS).round().astype(int), *looks])
-    reached = np.searchsorted(looks, every, side="right") - 1
-    nodes, of_nodes = np.polynomial.legendre.leggauss(_NODES)
-    error, places, weights, before = 0.0, np.zeros(1), np.ones(1), 0.0
-    for share, level in zip(every / looks[-1], levels[reached], strict=True):
-        end, step = float(-ndtri(level / 2)) * math.sqrt(share), math.sqrt(share - before)
-        error += _excess(end, places, weights, step, 0.0)
-        inside = end * nodes
-        density = _normal_density(inside[:, None], places, step) @ weights
-        places, weights, before = inside, density * end * of_nodes, share
+    reports = np.unique([*np.linspace(looks[0], looks[-1], _MOST_REPORTS).round().astype(int), *looks])
+    reached = np.searchsorted(looks, reports, side="right") - 1
+    nodes, node_weights = np.polynomial.legendre.leggauss(_NODES)
+    error, places, weights, last_share = 0.0, np.zeros(1), np.ones(1), 0.0
+    for share, level in zip(reports / looks[-1], levels[reached], strict=True):
+        bound, step = float(-ndtri(level / 2)) * math.sqrt(share), math.sqrt(share - last_share)
+        error += _crossing_excess(bound, places, weights, step, 0.0)
+        inner_places = bound * nodes
+        density = _normal_density(inner_places[:, None], places, step) @ weights
+        places, weights, last_share = inner_places, density * bound * node_weights, share
     return error
 
 
@@ -168,12 +168,12 @@ def _normal_density(values: Array, means: Array, sd: float) -> Array:
     return density
 
 
-def _excess(end: float, places: Array, weights: Array, step: float, due: float) -> float:
-    """Return the probability that a walk leaves ± ``end`` in its next step, minus ``due``.
+def _crossing_excess(bound: float, places: Array, weights: Array, step: float, target: float) -> float:
+    """Return the probability that a walk leaves ± ``bound`` in its next step, minus ``target``.
 
     ``places`` and ``weights`` are the distribution before the step, ``step`` is the SD of the step.
     """
-    return float(weights @ (ndtr((places - end) / step) + ndtr((-end - places) / step))) - due
+    return float(weights @ (ndtr((places - bound) / step) + ndtr((-bound - places) / step))) - target
 
 
 @lru_cache(maxsize=4096)
@@ -184,11 +184,13 @@ def clopper_pearson(count: int, n: int) -> Interval:
     return Interval(low=low, high=high, level=0.95, method="Clopper-Pearson")
 
 
-def bootstrap(n: int, seed: int | None, sampled: Callable[[Whole], Array], alike: str) -> tuple[Interval | None, str]:
-    """Return the 95 % percentile bootstrap interval of a statistic over ``n`` participants, or why there is none.
+def bootstrap(
+    n: int, seed: int | None, statistic: Callable[[Whole], Array], constant_reason: str
+) -> tuple[Interval | None, str]:
+    """Return the 95 % percentile bootstrap interval of a statistic, or None and the reason why there is none.
 
-    Without ``seed`` there is no interval. ``sampled`` returns the statistic (draws,) of participants given by index
-    (draws, n), NaN where it is undefined; ``alike`` is the reason if all draws give the same value.
+    Without ``seed`` there is no interval. ``statistic`` returns the values (draws,) for indices of participants
+    (draws, n), NaN if they are undefined; ``constant_reason`` is the reason if all values are equal.
     """
     if seed is None:
         return None, "no interval was requested"
@@ -197,44 +199,45 @@ def bootstrap(n: int, seed: int | None, sampled: Callable[[Whole], Array], alike
     rng = np.random.default_rng(seed)
     rows = max(1, 1_000_000 // n)
     tables = (rng.integers(0, n, (min(rows, SAMPLES - done), n)) for done in range(0, SAMPLES, rows))
-    samples = np.concatenate([sampled(table) for table in tables])
+    samples = np.concatenate([statistic(table) for table in tables])
     samples = samples[~np.isnan(samples)]
     if np.ptp(samples) == 0.0:
-        return None, alike
+        return None, constant_reason
     low, high = np.quantile(samples, [0.025, 0.975])
     method = f"percentile bootstrap over participants, {SAMPLES} resamples"
     return Interval(low=float(low), high=float(high), level=0.95, method=method), ""
 
 
-def drawn_p(reached: NDArray[np.bool_], seed: int, least: float) -> tuple[float, float, str]:
-    """Return p, the smallest possible p (``least`` for a full enumeration), and a description of the method.
+def monte_carlo_p(is_extreme: NDArray[np.bool_], seed: int, least: float) -> tuple[float, float, str]:
+    """Return p, the smallest possible p, and a description of the method for random permutations.
 
-    ``reached`` tells for each random permutation whether it is as extreme.
+    ``is_extreme`` (draws,) tells whether each permutation is at least as extreme as the data. ``least`` is the smallest
+    p of a full enumeration.
     """
-    draws = len(reached)
+    draws = len(is_extreme)
     method = f"Monte Carlo permutation, {draws} draws, seed {seed}"
-    return (1 + int(reached.sum())) / (1 + draws), max(least, 1 / (1 + draws)), method
+    return (1 + int(is_extreme.sum())) / (1 + draws), max(least, 1 / (1 + draws)), method
 
 
-def p_of_draws(drawn: NDArray[np.floating], seen: NDArray[np.floating]) -> Array:
-    """Return the share of random statistics (draws, …) that are as extreme as the observed ones (…).
+def p_of_draws(drawn: NDArray[np.floating], observed: NDArray[np.floating]) -> Array:
+    """Return p (…): the share of random statistics (draws, …) that are at least as large as the observed ones (…).
 
-    If there are none, p is at most that of one, and follows from a Pearson type III distribution with the first three
-    moments of the draws, so that the verdict at a small alpha does not depend on the number of draws.
+    If no draw is as large, p follows from a Pearson type III distribution with the first three moments of the draws, so
+    that verdicts at a small alpha do not depend on the number of draws.
     """
-    from scipy.stats import pearson3, skew  # noqa: PLC0415 - half a second, and a report needs neither
+    from scipy.stats import pearson3, skew  # noqa: PLC0415 - takes half a second, and reports do not need it
 
-    p = np.asarray((1 + (drawn >= seen).sum(axis=0)) / (1 + len(drawn)))
-    if (alone := p * (1 + len(drawn)) < 1.5).any():
-        few = drawn[:, alone].astype(np.float64)
-        tail = pearson3.sf(seen[alone], skew(few), few.mean(axis=0), few.std(axis=0))
-        p[alone] = np.fmin(p[alone], tail)
+    p = np.asarray((1 + (drawn >= observed).sum(axis=0)) / (1 + len(drawn)))
+    if (has_no_other := p * (1 + len(drawn)) < 1.5).any():
+        draws = drawn[:, has_no_other].astype(np.float64)
+        tail = pearson3.sf(observed[has_no_other], skew(draws), draws.mean(axis=0), draws.std(axis=0))
+        p[has_no_other] = np.fmin(p[has_no_other], tail)
     return p
 
 
 @dataclass(frozen=True, slots=True)
 class Lattice:
-    """Probabilities of ``start``, ``start`` + 1, …; the first and the last are not 0."""
+    """A distribution of integers: the probabilities of ``start``, ``start`` + 1, …; the first and last are not 0."""
 
     start: int
     probabilities: Array
@@ -263,8 +266,8 @@ def sum_distribution(parts: Iterable[Lattice]) -> Lattice:
     return reduce(Lattice.plus, parts, Lattice(0, np.ones(1)))
 
 
-def of_values(values: Iterable[int]) -> Lattice:
-    """Return the distribution of one of ``values``, each equally likely."""
+def uniform_lattice(values: Iterable[int]) -> Lattice:
+    """Return the distribution of a random element of ``values``, all equally likely."""
     numbers = np.fromiter(values, dtype=np.int64)
     counts = np.bincount(numbers - numbers.min())
     return Lattice(int(numbers.min()), counts / len(numbers))
@@ -276,7 +279,7 @@ def doubled_ranks(values: Array) -> Whole:
 
 
 _ROUNDING: Final = 1e-12
-"""Values that differ by less than this share of them are equal."""
+"""Relative spread below which values are treated as equal."""
 
 
 def student_interval(values: Array, level: float = 0.95) -> tuple[float | None, float | None]:

@@ -1,8 +1,8 @@
-"""Tests of mean answers by the participants' own slopes: Student's t of one slope, Hotelling's T² of several.
+"""Tests of mean answers by participants' slopes: Student's t for one slope, Hotelling's T² for several.
 
-Each participant who answered under all settings has least-squares slopes of the answers; the test is whether their mean
-in the population is 0 (Hotelling 1931, Ann. Math. Stat. 2, 360–378). People may have trends of their own around zero.
-Points of the scale are taken as numbers with equal steps. Participants who miss an answer are left out.
+The answers of each participant in all settings give least-squares slopes; the test is whether their mean in the
+population is 0 (Hotelling 1931, Ann. Math. Stat. 2, 360–378), even if slopes of individual people are not. Scale points
+are treated as numbers with equal steps. Participants with a missing answer are left out.
 
 Without missing answers the estimate is that of a linear mixed model with random intercepts and slopes by restricted
 likelihood (Laird & Ware 1982, Biometrics 38, 963–974), unless that puts a variance of slopes at 0.
@@ -19,7 +19,7 @@ from study_app.analysis.statistics.outcome import FEW, NO_VARIATION, Array, Inte
 from study_app.analysis.statistics.trend_tests import Direction
 from study_app.errors import AnalysisError
 
-_SURE: Final = 0.95
+_LEVEL: Final = 0.95
 T_TEST: Final = "t test of slopes"
 HOTELLING: Final = "Hotelling's T²"
 
@@ -29,8 +29,8 @@ class SlopeTest(Outcome):
     """The test of all slopes; ``effect`` is the slope if there is only one, otherwise they are in ``slopes``.
 
     ``intervals`` are Student's 95 % intervals of the slopes [points per unit of the column], ``sds`` the standard
-    deviations between the participants' own slopes, ``intercept_sd`` that between their own answers if all columns are
-    0: without a delay, or in the first setting.
+    deviations between the participants' own slopes, ``intercept_sd`` that between their answers where all columns
+    are 0: without a delay, or in the first setting.
     """
 
     slopes: tuple[float, ...] = ()
@@ -52,43 +52,45 @@ def slope_test(values: ArrayLike, columns: ArrayLike | None = None, direction: D
         Direction of a single slope that was stated in advance; the test is then one-sided.
     """
     rows, dropped = complete_rows(values, at_least=2, why=" for a test of means")
-    design = _design(rows.shape[1], columns)
-    n, several = len(rows), design.shape[1]
+    design = _design_matrix(rows.shape[1], columns)
+    n, effects = len(rows), design.shape[1]
     test = SlopeTest(
-        test=T_TEST if several == 1 else HOTELLING,
+        test=T_TEST if effects == 1 else HOTELLING,
         n=n,
         dropped=dropped,
-        statistic_name="t" if several == 1 else "F",
-        effect_name="slope" if several == 1 else "differences",
+        statistic_name="t" if effects == 1 else "F",
+        effect_name="slope" if effects == 1 else "differences",
     )
     intercepts, *slopes = np.linalg.pinv(np.column_stack([np.ones(len(design)), design])) @ rows.T
-    own = np.array(slopes).T
-    covariance = np.atleast_2d(np.cov(own, rowvar=False)) if n > 1 else np.zeros((several, several))
-    fewest = max(FEW, several + 1)
-    if n < fewest or np.linalg.matrix_rank(covariance, tol=1e-12) < several:
-        few = f"no test of means for fewer than {fewest} participants, because it relies on normally distributed slopes"
-        note = few if n < fewest else _NO_SPREAD
+    person_slopes = np.array(slopes).T
+    covariance = np.atleast_2d(np.cov(person_slopes, rowvar=False)) if n > 1 else np.zeros((effects, effects))
+    fewest = max(FEW, effects + 1)
+    if n < fewest or np.linalg.matrix_rank(covariance, tol=1e-12) < effects:
+        too_few = (
+            f"no test of means for fewer than {fewest} participants, because it relies on normally distributed slopes"
+        )
+        note = too_few if n < fewest else _NO_SPREAD
         note = NO_VARIATION if n and not np.ptp(rows, axis=1).any() else note
         return replace(test, no_interval=note, note=note)
-    means, errors = own.mean(axis=0), np.sqrt(np.diag(covariance) / n)
-    if several == 1:
+    means, errors = person_slopes.mean(axis=0), np.sqrt(np.diag(covariance) / n)
+    if effects == 1:
         statistic = float(means[0] / errors[0])
         p, method = student_test(statistic, n - 1, direction)
     else:
-        statistic = float(means @ np.linalg.solve(covariance, means)) * n * (n - several) / (several * (n - 1))
-        p, method = float(fdtrc(several, n - several, statistic)), f"F({several}, {n - several})"
-    reach = float(stdtrit(n - 1, (1 + _SURE) / 2)) * errors
+        statistic = float(means @ np.linalg.solve(covariance, means)) * n * (n - effects) / (effects * (n - 1))
+        p, method = float(fdtrc(effects, n - effects, statistic)), f"F({effects}, {n - effects})"
+    reach = float(stdtrit(n - 1, (1 + _LEVEL) / 2)) * errors
     ends = zip((means - reach).tolist(), (means + reach).tolist(), strict=True)
-    intervals = tuple(Interval(low=low, high=high, level=_SURE, method="Student's t") for low, high in ends)
+    intervals = tuple(Interval(low=low, high=high, level=_LEVEL, method="Student's t") for low, high in ends)
     return replace(
         test,
         statistic=statistic,
         p=p,
         method=method,
-        effect=float(means[0]) if several == 1 else None,
-        interval=intervals[0] if several == 1 else None,
+        effect=float(means[0]) if effects == 1 else None,
+        interval=intervals[0] if effects == 1 else None,
         no_interval=""
-        if several == 1
+        if effects == 1
         else "there is no single effect size, because there is one difference per condition",
         slopes=tuple(means.tolist()),
         intervals=intervals,
@@ -107,7 +109,7 @@ def student_test(t: float, freedom: int, direction: Direction | None) -> tuple[f
 _NO_SPREAD: Final = "no spread: some differences between conditions are the same for all participants"
 
 
-def _design(settings: int, columns: ArrayLike | None) -> Array:
+def _design_matrix(settings: int, columns: ArrayLike | None) -> Array:
     if columns is None:
         return np.eye(settings)[:, 1:]
     design = np.asarray(columns, dtype=np.float64)

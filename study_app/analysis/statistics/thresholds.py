@@ -4,9 +4,10 @@ Wichmann & Hill 2001, Percept. Psychophys. 63, 1293–1313: deviance (eq. 4), it
 correlation with the order of the trials. Between-person variance by Paule & Mandel 1982, interval by Hartung & Knapp
 2001 with Student's t.
 
-The detection threshold is that of the answers of all participants together: the posterior median, with the rates of
-guesses and lapses free. Its interval ends where its density has fallen as a normal one does, scaled by how far
-participants differ. A number is given only where the levels presented hold it.
+The detection threshold is the posterior median of a function fitted to the pooled answers of all participants, with
+free rates of guesses and lapses. The ends of its interval are points of equal posterior density, at the height of a
+normal density at its 95 % limits, widened for the differences between participants. A threshold outside the presented
+levels is not reported.
 """
 
 import math
@@ -23,20 +24,20 @@ from study_app.analysis.statistics.outcome import Array, Interval, Outcome, chec
 from study_app.psychophysics.grid import Z_95, Grid, Posterior, Values, evenly, fit, geometric, tables
 
 _NOTICED_FROM: Final = 5.0
-"""Agreement from "somewhat agree" on counts as having noticed."""
+"""The lowest scale point ("somewhat agree") that counts as having noticed the delay."""
 
-_SURE: Final = 0.95
+_LEVEL: Final = 0.95
 _RATES: Final[Values] = (0.0, 0.02, 0.06, 0.12, 0.2, 0.3, 0.4, 0.5)
-"""Rates of guesses and of lapses. People who never agree are lapses of the pooled answers, and may be many of them."""
+"""Rates of guesses and of lapses, which may be high: people who never agree count as lapses of the pooled answers."""
 
-_PLACES: Final = 121
-"""Thresholds of the grid, from one span below the lowest level to one span above the highest."""
+_THRESHOLDS: Final = 121
+"""Number of thresholds in the grid, from one span below the lowest level to one span above the highest."""
 
 _WIDTHS: Final = (1 / 40, 3.0, 12)
 """The smallest and the largest width of the grid [spans], and their number."""
 
 _WIDTH_PRIOR: Final = (0.3, 2.5)
-"""Median [spans] and factor."""
+"""Median of the width [spans], and factor."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -68,8 +69,8 @@ class Threshold(Outcome):
         return None if self.guess is None or self.lapse is None else (1 + self.guess - self.lapse) / 2
 
 
-def noticed(values: ArrayLike, levels: Sequence[float]) -> Threshold:
-    """Return the threshold of raw answers: `_NOTICED_FROM` or more means noticed, NaN is missing.
+def detection_threshold(values: ArrayLike, levels: Sequence[float]) -> Threshold:
+    """Estimate the detection threshold of raw answers: `_NOTICED_FROM` or more means noticed, NaN is missing.
 
     Parameters
     ----------
@@ -84,34 +85,37 @@ def noticed(values: ArrayLike, levels: Sequence[float]) -> Threshold:
     """
     array = np.asarray(values, float)
     array = checked_values(array[..., None] if array.ndim == 2 else array, "participants, levels, presentations")
-    there, presented = ~np.isnan(array), np.asarray(levels, float)
-    used = there.any(axis=(1, 2))
-    order = np.unique(presented[there.any(axis=(0, 2))])
-    same = np.asarray(presented[:, None] == order, float)
-    yes, asked = (one[used].sum(axis=2, dtype=float) @ same for one in (there & (array >= _NOTICED_FROM), there))
-    of_yes, of_asked = yes.sum(axis=0), asked.sum(axis=0)
-    found: dict[str, Any] = {}
-    note = _impossible(order, of_yes, of_asked)
+    is_given, presented = ~np.isnan(array), np.asarray(levels, float)
+    has_answers = is_given.any(axis=(1, 2))
+    unique_levels = np.unique(presented[is_given.any(axis=(0, 2))])
+    level_matches = np.asarray(presented[:, None] == unique_levels, float)
+    yes, asked = (
+        flags[has_answers].sum(axis=2, dtype=float) @ level_matches
+        for flags in (is_given & (array >= _NOTICED_FROM), is_given)
+    )
+    all_yes, all_asked = yes.sum(axis=0), asked.sum(axis=0)
+    estimate: dict[str, Any] = {}
+    note = _unfittable_reason(unique_levels, all_yes, all_asked)
     if not note:
-        curve, dispersion, (lower, upper) = _pool_answers(order, yes, asked)
-        note = _outside(order, curve.threshold, lower, upper)
+        curve, dispersion, (lower, upper) = _fit_pooled_answers(unique_levels, yes, asked)
+        note = _out_of_range_reason(unique_levels, curve.threshold, lower, upper)
     if not note:
         others = curve.others
-        expected = curve.success(order)
+        expected = curve.success(unique_levels)
         interval = None
         if lower is not None and upper is not None:
             interval = Interval(
                 low=lower,
                 high=upper,
-                level=_SURE,
+                level=_LEVEL,
                 method="posterior density, widened for differences between participants",
             )
-        note = "; ".join(_remarks(order, lower, upper, len(yes), dispersion))
-        found = {
-            "statistic": float(deviances(of_yes, of_asked, expected).sum()),
+        note = "; ".join(_remarks(unique_levels, lower, upper, len(yes), dispersion))
+        estimate = {
+            "statistic": float(deviances(all_yes, all_asked, expected).sum()),
             "effect": curve.threshold,
             "interval": interval,
-            "no_interval": "" if interval else _open(lower, upper),
+            "no_interval": "" if interval else _open_end_reason(lower, upper),
             "expected": tuple(expected.tolist()),
             "width": others.width,
             "guess": others.guess,
@@ -122,21 +126,21 @@ def noticed(values: ArrayLike, levels: Sequence[float]) -> Threshold:
         }
     return Threshold(
         test="detection threshold",
-        n=int(used.sum()),
-        dropped=int((~used).sum()),
+        n=int(has_answers.sum()),
+        dropped=int((~has_answers).sum()),
         statistic_name="deviance",
         method="posterior median of a logistic function of the delay",
         effect_name="detection threshold",
         note=note,
-        levels=tuple(order.tolist()),
-        yes=tuple(int(count) for count in of_yes),
-        asked=tuple(int(count) for count in of_asked),
-        **{"no_interval": note, **found},
+        levels=tuple(unique_levels.tolist()),
+        yes=tuple(int(count) for count in all_yes),
+        asked=tuple(int(count) for count in all_asked),
+        **{"no_interval": note, **estimate},
     )
 
 
-def _impossible(levels: Array, yes: Array, asked: Array) -> str:
-    """Return the reason why no curve can give a threshold, or ""."""
+def _unfittable_reason(levels: Array, yes: Array, asked: Array) -> str:
+    """Return the reason why the answers cannot determine a threshold, or ""."""
     if len(levels) < 3:
         return "there were answers at fewer than three levels"
     if not yes.any():
@@ -147,7 +151,7 @@ def _impossible(levels: Array, yes: Array, asked: Array) -> str:
     return "all participants noticed a difference at every level" if (yes == asked).all() else ""
 
 
-def _pool_answers(
+def _fit_pooled_answers(
     levels: Array, yes: Array, asked: Array
 ) -> tuple[Posterior, float, tuple[float | None, float | None]]:
     """Return the posterior of all answers, the dispersion, and the existing ends of the interval.
@@ -157,34 +161,34 @@ def _pool_answers(
     """
     low, span, people = float(levels[0]), float(np.ptp(levels)), len(yes)
     least, most, count = _WIDTHS
-    equal = (1 / len(_RATES),) * len(_RATES)
+    uniform = (1 / len(_RATES),) * len(_RATES)
     median, factor = _WIDTH_PRIOR
     widths = geometric(least * span, most * span, count)
     grid = Grid(
         family="logistic",
-        thresholds=evenly(low - span, low + 2 * span, _PLACES),
+        thresholds=evenly(low - span, low + 2 * span, _THRESHOLDS),
         widths=widths,
         width_prior=(median * span, factor),
         lapses=_RATES,
-        lapse_prior=equal,
+        lapse_prior=uniform,
         guesses=_RATES,
     )
     posterior = fit(levels, yes.sum(axis=0), (asked - yes).sum(axis=0), grid)
     if people < 2:
-        return posterior, 1.0, _ends(posterior, 1.0)
+        return posterior, 1.0, _interval_ends(posterior, 1.0)
     dispersion = _dispersion(posterior, levels, yes, asked)
     return (
         posterior,
         dispersion,
-        _ends(posterior, dispersion * float(stdtrit(people - 1, (1 + _SURE) / 2) / Z_95) ** 2),
+        _interval_ends(posterior, dispersion * float(stdtrit(people - 1, (1 + _LEVEL) / 2) / Z_95) ** 2),
     )
 
 
 def _dispersion(posterior: Posterior, levels: Array, yes: Array, asked: Array) -> float:
     """Return the variance of the participants' scores relative to the information of independent answers.
 
-    A score is the difference of a participant's log-likelihood between the best curves at the ends of the interval of
-    independent answers, divided by their distance; it also exists for a curve that is as steep as the grid permits.
+    A score is the difference of a participant's log likelihoods of the best curves at both ends of the interval for
+    independent answers, divided by the distance of the ends. It exists even for the steepest curve of the grid.
     """
     _, log_yes, log_no = tables(posterior.grid, tuple(levels.tolist()))
     thresholds = posterior.grid.thresholds
@@ -200,7 +204,7 @@ def _dispersion(posterior: Posterior, levels: Array, yes: Array, asked: Array) -
     return max(1.0, float(scores.var(ddof=1)) * len(scores) * ((high - low) / (2 * Z_95)) ** 2)
 
 
-def _ends(posterior: Posterior, scale: float) -> tuple[float | None, float | None]:
+def _interval_ends(posterior: Posterior, scale: float) -> tuple[float | None, float | None]:
     """Return the ends of the interval; None if the threshold may lie beyond that end of the grid.
 
     At the ends the density is exp(−scale z²/2) of its maximum, like that of a normal distribution whose variance is
@@ -220,8 +224,8 @@ def _ends(posterior: Posterior, scale: float) -> tuple[float | None, float | Non
     return ends[0], ends[1]
 
 
-def _outside(levels: Array, threshold: float, lower: float | None, upper: float | None) -> str:
-    """Return the reason if the threshold is outside the presented levels, or ""."""
+def _out_of_range_reason(levels: Array, threshold: float, lower: float | None, upper: float | None) -> str:
+    """Return the reason why the threshold is not reported if it is outside the presented levels, or ""."""
     low, high = float(levels[0]), float(levels[-1])
     if not low <= threshold <= high:
         return f"the fitted threshold lies outside the range of presented levels ({low:g} to {high:g})"
@@ -246,7 +250,7 @@ def _remarks(levels: Array, lower: float | None, upper: float | None, people: in
         )
 
 
-def _open(lower: float | None, upper: float | None) -> str:
+def _open_end_reason(lower: float | None, upper: float | None) -> str:
     end = "either end" if lower is None and upper is None else "the lower end" if lower is None else "the upper end"
     return f"no interval: the answers do not determine {end}"
 
@@ -254,7 +258,7 @@ def _open(lower: float | None, upper: float | None) -> str:
 SETS: Final = 999
 SEED: Final = 1
 WORST: Final = 0.05
-"""Below this p the report says that the function does not fit."""
+"""The p of the goodness of fit below which the report states that the function does not fit."""
 
 
 def deviances(successes: ArrayLike, n: ArrayLike, expected: ArrayLike) -> Array:
@@ -279,7 +283,7 @@ def p_of_fit(successes: ArrayLike, n: ArrayLike, expected: ArrayLike) -> float:
 def drift(successes: ArrayLike, expected: ArrayLike) -> float | None:
     """Return the correlation of trial number and deviance residual; None if either does not vary.
 
-    ``successes`` (n,) are in trial order, ``expected`` are the function's shares at their levels.
+    ``successes`` (n,) are in trial order; ``expected`` (n,) are the shares that the function predicts.
     """
     y, psi = np.asarray(successes, float), np.asarray(expected, float)
     residuals = np.sign(y - psi) * np.sqrt(deviances(y, np.ones_like(y), psi))
@@ -289,7 +293,7 @@ def drift(successes: ArrayLike, expected: ArrayLike) -> float | None:
 
 
 FEWEST: Final = 3
-"""Estimates below which no interval is given."""
+"""The fewest estimates with an interval of their mean."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

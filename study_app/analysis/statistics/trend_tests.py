@@ -1,9 +1,9 @@
-"""The trend of answers over ordered settings, in the population, and the lowest delay at which one can be shown.
+"""Tests of a trend of answers over ordered settings, and of the lowest delay at which it can be shown.
 
-Each participant has one number, the rank correlation of his or her answers with the order of the settings. The p that
-decides changes the signs of these numbers: participants may have trends of their own around zero. Page (1963), J. Am.
-Stat. Assoc. 58, 216–230, permutes the answers of each participant instead: his null hypothesis is that no participant
-has any trend, so that his p is small, too, where people differ but have no trend in common.
+The value of each participant is the rank correlation of the answers with the order of the settings. The main p is from
+random signs of these values, so individual participants may have trends if their mean is zero. Page's test (1963, J.
+Am. Stat. Assoc. 58, 216–230) permutes the answers of each participant instead: its null hypothesis is that no
+participant has a trend, so its p may be small although participants have no common trend.
 """
 
 from __future__ import annotations
@@ -38,10 +38,10 @@ from study_app.number_text import counted
 Direction: TypeAlias = Literal["increasing", "decreasing"]
 
 EXACT_UP_TO: Final = 200
-"""Up to so many participants Page's p is exact; beyond that normal, corrected for ties."""
+"""The most participants with an exact p of Page's test; for more, it is a normal approximation, corrected for ties."""
 
-_MOST: Final = 12
-"""Exact distributions over more settings take too long."""
+_MAX_SETTINGS: Final = 12
+"""The most settings with an exact distribution."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -58,7 +58,7 @@ class Trend(Outcome):
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """One step: the test of all delays up to ``longest_ms``."""
+    """One step of the step-down test: the trend over all delays up to ``longest_ms``."""
 
     longest_ms: float
     trend: Trend
@@ -69,7 +69,7 @@ class StepDown:
     """The steps, the longest delay first; the last may be the first non-significant one.
 
     ``lowest_ms`` is the lowest delay up to which a trend was shown at ``alpha``: an upper bound of the noticeable
-    delay, biased upward. None means that no trend was shown, which is not evidence against one. ``note`` says so.
+    delay, biased upward. None means that no trend was shown, which is not evidence against one, as ``note`` explains.
     """
 
     steps: tuple[Step, ...]
@@ -90,7 +90,7 @@ def trend(values: ArrayLike, direction: Direction | None = "increasing", *, seed
     scores = ranks @ np.arange(1, k + 1)
     middle = k * (k + 1) ** 2 // 2
     correlations = (scores - middle) / (k * (k * k - 1) / 6)
-    found = Trend(
+    test = Trend(
         test="trend over participants",
         n=n,
         dropped=dropped,
@@ -100,15 +100,17 @@ def trend(values: ArrayLike, direction: Direction | None = "increasing", *, seed
     )
     if not n or (ranks == k + 1).all():
         note = "no participant answered in all conditions" if n == 0 else NO_VARIATION
-        return replace(found, no_interval=note, note=note)
+        return replace(test, no_interval=note, note=note)
     side: Alternative = "two-sided" if direction is None else "greater"
-    away = scores - middle
-    p, smallest, method = signed_p(np.sort(np.abs(away[away != 0])), int(away[away > 0].sum()), side)
-    p_page = None if direction is None else _page(ranks, int(scores.sum()))
-    alike = "no interval: all participants have the same correlation"
-    interval, reason = bootstrap(n, seed, lambda people: correlations[people].mean(axis=1), alike)
+    deviations = scores - middle
+    p, smallest, method = signed_p(
+        np.sort(np.abs(deviations[deviations != 0])), int(deviations[deviations > 0].sum()), side
+    )
+    p_page = None if direction is None else _page_p(ranks, int(scores.sum()))
+    constant_reason = "no interval: all participants have the same correlation"
+    interval, reason = bootstrap(n, seed, lambda people: correlations[people].mean(axis=1), constant_reason)
     return replace(
-        found,
+        test,
         statistic=float(scores.sum()) / 2,
         p=1.0 if p is None else p,
         smallest_p=smallest,
@@ -148,10 +150,10 @@ def step_down(
         if result.p is None or result.p > alpha:
             break
         lowest = float(delays_ms[last - 1])
-    return StepDown(steps=tuple(steps), lowest_ms=lowest, alpha=alpha, note=_note(steps[0], lowest))
+    return StepDown(steps=tuple(steps), lowest_ms=lowest, alpha=alpha, note=_step_down_note(steps[0], lowest))
 
 
-def _note(first: Step, lowest: float | None) -> str:
+def _step_down_note(first: Step, lowest: float | None) -> str:
     if lowest is None:
         return (
             f"no trend was shown up to {first.longest_ms:g} ms with {counted(first.trend.n, 'participant')}; "
@@ -163,27 +165,27 @@ def _note(first: Step, lowest: float | None) -> str:
     )
 
 
-def _page(ranks: Whole, found: int) -> float:
-    """Return P(L ≥ found) for (doubled) ranks (n, k), every order of every participant being equally likely."""
+def _page_p(ranks: Whole, observed: int) -> float:
+    """Return P(L ≥ ``observed``) for (doubled) ranks (n, k), with all orders of all participants equally likely."""
     n, k = ranks.shape
-    if n > EXACT_UP_TO or k > _MOST:
+    if n > EXACT_UP_TO or k > _MAX_SETTINGS:
         mean = n * k * (k + 1) ** 2 / 2
         spread = ((ranks - (k + 1.0)) ** 2).sum() / (k - 1) * k * (k * k - 1) / 12
-        return float(ndtr((mean - found) / math.sqrt(spread)))
-    return _sums(tuple(sorted(tuple(sorted(row)) for row in ranks.tolist()))).at_least(found)
+        return float(ndtr((mean - observed) / math.sqrt(spread)))
+    return _score_sum_distribution(tuple(sorted(tuple(sorted(row)) for row in ranks.tolist()))).at_least(observed)
 
 
 @lru_cache(maxsize=256)
-def _sums(patterns: tuple[tuple[int, ...], ...]) -> Lattice:
-    """Return the distribution of the sum of all participants' scores."""
-    return sum_distribution(_scores(pattern) for pattern in patterns)
+def _score_sum_distribution(patterns: tuple[tuple[int, ...], ...]) -> Lattice:
+    """Return the distribution of the sum of all participants' scores from their (doubled) ranks (n × k)."""
+    return sum_distribution(_score_distribution(pattern) for pattern in patterns)
 
 
 @lru_cache(maxsize=1024)
-def _scores(ranks: tuple[int, ...]) -> Lattice:
+def _score_distribution(ranks: tuple[int, ...]) -> Lattice:
     """Return the distribution of Σ j·rank_j over all orders of one participant's (doubled) ranks (k,).
 
-    It is built setting by setting, over sets of used ranks rather than orders.
+    It is computed setting by setting, over sets of used ranks instead of orders.
     """
     k = len(ranks)
     most = sum(place * rank for place, rank in enumerate(ranks, start=1))

@@ -41,7 +41,7 @@ from study_app.analysis.planning.power_curves import interval
 from study_app.analysis.planning.simulated_studies import Opinions, Plan, draw_opinions
 from study_app.analysis.report import answers as answered
 from study_app.analysis.results import BlockResult, Failures, Results
-from study_app.analysis.statistics import noticed, tost
+from study_app.analysis.statistics import detection_threshold, tost
 from study_app.evidence.report_rates.hypotheses import false_claims, true_claims
 from study_app.evidence.table import Evidence, Table
 from study_app.protocol.participants import REHEARSED
@@ -540,7 +540,7 @@ def _outlier_trial(n: int, most: tuple[float, ...]) -> Trial:
 
 def _new_coverage_trial(n: int, spread_ms: float, never: float) -> Trial:
     def trial(rng: np.random.Generator) -> float | None:
-        threshold = noticed(_draw_answers(rng, n, spread_ms, never), _LEVELS_MS.tolist())
+        threshold = detection_threshold(_draw_answers(rng, n, spread_ms, never), _LEVELS_MS.tolist())
         if threshold.interval is None or threshold.effect is None:
             return None
         error = _TRUE_MS - threshold.effect

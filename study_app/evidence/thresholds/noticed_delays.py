@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
 from study_app import figure_style as style
-from study_app.analysis.statistics import Threshold, noticed
+from study_app.analysis.statistics import Threshold, detection_threshold
 from study_app.evidence.table import Evidence, Table
 from study_app.evidence.thresholds.known_values import KnownThreshold, known_value
 from study_app.protocol.load import load
@@ -127,7 +127,7 @@ def rate_delays(people: Sequence[Person], criterion_s: float, adapted_s: float, 
         draw = stream(seed, f"noticed/ratings/{number}").random
         person_rater = replace(person.rater, threshold_s=person.rater.threshold_s - MEAN_CRITERION_S + criterion_s)
         answers.append([_rating(replace(person, rater=person_rater), ms / 1000 - adapted_s, draw) for ms in delays_ms])
-    return Rated(criterion_s, adapted_s, noticed(np.array(answers, float), delays_ms))
+    return Rated(criterion_s, adapted_s, detection_threshold(np.array(answers, float), delays_ms))
 
 
 def _rating(person: Person, delay_s: float, draw: Draw) -> int:

@@ -18,7 +18,7 @@ from study_app.analysis.statistics.equivalence import tost
 from study_app.analysis.statistics.mean_tests import means_of, p_differs
 from study_app.analysis.statistics.rank_tests import global_permutation
 from study_app.analysis.statistics.recognition_tests import recognition
-from study_app.analysis.statistics.thresholds import noticed
+from study_app.analysis.statistics.thresholds import detection_threshold
 from study_app.analysis.statistics.trend_tests import trend
 from study_app.protocol.trials.designs import default_design
 from study_app.protocol.trials.stimuli import Stimulus
@@ -111,14 +111,14 @@ def noticing(people: int) -> Floats:
 
 def test_the_detection_threshold_is_that_of_the_people() -> None:
     answers = noticing(2000)
-    found = noticed(answers, LEVELS_MS)
+    found = detection_threshold(answers, LEVELS_MS)
     assert found.effect == pytest.approx(110, rel=0.05)
     assert (found.width, found.guess, found.lapse) == pytest.approx((80, 0.05, 0.1), abs=0.1, rel=0.25)
     order = np.random.default_rng(1).permutation(len(answers))
     places = np.random.default_rng(2).permutation(len(LEVELS_MS))
-    shuffled = noticed(answers[order][:, places], [LEVELS_MS[place] for place in places])
+    shuffled = detection_threshold(answers[order][:, places], [LEVELS_MS[place] for place in places])
     assert numbers_of(shuffled) == pytest.approx(numbers_of(found), rel=1e-9)
-    in_seconds = noticed(answers, [level / 1000 for level in LEVELS_MS])
+    in_seconds = detection_threshold(answers, [level / 1000 for level in LEVELS_MS])
     assert [in_seconds.effect, in_seconds.lower, in_seconds.upper, in_seconds.width] == pytest.approx(
         [(number or 0.0) / 1000 for number in (found.effect, found.lower, found.upper, found.width)]
     )

@@ -7,7 +7,7 @@ import pytest
 
 from study_app.analysis.planning import simulated_studies
 from study_app.analysis.statistics.equivalence import tost
-from study_app.analysis.statistics.rank_tests import friedman, global_permutation, paired
+from study_app.analysis.statistics.rank_tests import friedman, global_permutation, signed_rank_test
 from study_app.analysis.statistics.trend_tests import trend
 
 pytestmark = pytest.mark.slow
@@ -60,7 +60,9 @@ def test_the_trend_is_the_reports(n: int) -> None:
 def test_signed_ranks_are_the_reports() -> None:
     answers = answered(4, (20, 9, 2, 3), rise=0.6)
     ps = simulated_studies.signed(answers, rng())
-    expected = [[paired(study[:, 0, item], study[:, 1, item]).p or 1.0 for item in range(3)] for study in answers]
+    expected = [
+        [signed_rank_test(study[:, 0, item], study[:, 1, item]).p or 1.0 for item in range(3)] for study in answers
+    ]
     assert np.abs(ps - np.array(expected)).max() < CLOSE
 
 

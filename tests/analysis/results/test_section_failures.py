@@ -24,7 +24,7 @@ TESTS = {
     "findings.statement_tests.trend": ("delays", "trend test"),
     "findings.delays.step_down": ("delays", "shortest delay with a trend"),
     "findings.delays.tost": ("delays", "equivalence test"),
-    "findings.delays.noticed": ("delays", "detection threshold"),
+    "findings.delays.detection_threshold": ("delays", "detection threshold"),
 }
 WRITING = {
     "figures.answer_figures.answers_picture": "figure liquids",
@@ -70,7 +70,7 @@ def test_a_test_that_fails_takes_no_other_with_it(opened: Results, monkeypatch: 
 def test_a_report_with_failures_is_written_and_ends_with_three(
     opened: Results, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    for broken in (*WRITING, "findings.delays.noticed"):
+    for broken in (*WRITING, "findings.delays.detection_threshold"):
         monkeypatch.setattr(f"study_app.analysis.{broken}", fail)
     to = tmp_path / "report"
     done = CliRunner().invoke(commands, ["report", str(opened.folder), "--to", str(to)])

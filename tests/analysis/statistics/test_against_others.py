@@ -12,7 +12,7 @@ from scipy.stats import t as student
 
 from study_app.analysis.statistics.equivalence import tost
 from study_app.analysis.statistics.outcome import false_discovery, holm
-from study_app.analysis.statistics.rank_tests import friedman, paired
+from study_app.analysis.statistics.rank_tests import friedman, signed_rank_test
 from study_app.analysis.statistics.recognition_tests import kappa
 from study_app.analysis.statistics.slope_tests import slope_test
 from study_app.analysis.statistics.thresholds import group_mean
@@ -40,7 +40,7 @@ def test_pingouin() -> None:
     for method, p in (("chisq", ours.p_chi2), ("f", ours.p_f)):
         theirs = pingouin.friedman(pd.DataFrame(values), method=method).iloc[0]
         assert (theirs["W"], theirs["p_unc"]) == pytest.approx((ours.effect, p))
-    pair = paired(values[:, 2], values[:, 0])
+    pair = signed_rank_test(values[:, 2], values[:, 0])
     assert pingouin.wilcoxon(values[:, 2], values[:, 0])["RBC"].iloc[0] == pytest.approx(pair.effect)
     equal = tost(values[:, 1] - values[:, 0], 1.0)
     assert pingouin.tost(values[:, 1], values[:, 0], bound=1.0, paired=True)["pval"].iloc[0] == pytest.approx(equal.p)

@@ -37,15 +37,15 @@ def test_the_exact_p_is_that_of_all_rearrangements(rows: list[list[int]]) -> Non
 
 def test_a_drawn_p_is_repeatable_and_near_the_exact_one(monkeypatch: pytest.MonkeyPatch) -> None:
     exact = friedman(SCORES)
-    module.distribution.cache_clear()
+    module.friedman_distribution.cache_clear()
     monkeypatch.setattr(module, "WORK", 0)
     drawn = friedman(SCORES[:, ::-1], seed=3)
     assert drawn == friedman(SCORES[:, ::-1], seed=3)
-    module.distribution.cache_clear()
+    module.friedman_distribution.cache_clear()
     assert drawn.method == "Monte Carlo permutation, 9999 draws, seed 3"
     # As extreme counts: three who agree are one of 36, the most extreme there is.
     assert friedman([[1, 4, 7]] * 3).p == pytest.approx(1 / 36, abs=0.008)
-    module.distribution.cache_clear()
+    module.friedman_distribution.cache_clear()
     assert exact.p is not None
     assert drawn.p is not None
     assert abs(drawn.p - exact.p) < 5 * np.sqrt(exact.p / 9999) + 1e-4

@@ -13,7 +13,7 @@ from scipy.stats import binom
 
 from study_app.analysis.statistics.equivalence import tost
 from study_app.analysis.statistics.outcome import Outcome
-from study_app.analysis.statistics.rank_tests import friedman, global_permutation, paired
+from study_app.analysis.statistics.rank_tests import friedman, global_permutation, signed_rank_test
 from study_app.analysis.statistics.recognition_tests import (
     UNANSWERED,
     UNDECIDED,
@@ -22,7 +22,7 @@ from study_app.analysis.statistics.recognition_tests import (
     recognition,
 )
 from study_app.analysis.statistics.slope_tests import slope_test
-from study_app.analysis.statistics.thresholds import noticed
+from study_app.analysis.statistics.thresholds import detection_threshold
 from study_app.analysis.statistics.trend_tests import step_down, trend
 from study_app.errors import AnalysisError
 
@@ -46,11 +46,11 @@ TABLES = {
 TESTS: dict[str, Callable[[np.ndarray], Outcome]] = {
     "friedman": friedman,
     "global": lambda values: global_permutation(values[None]),
-    "paired": lambda values: paired(values[:, 0], values[:, 2]),
+    "paired": lambda values: signed_rank_test(values[:, 0], values[:, 2]),
     "trend": trend,
     "step down": lambda values: step_down(values, (0, 100, 200)).steps[0].trend,
     "tost": lambda values: tost(values[:, 2] - values[:, 0], 1.0),
-    "threshold": lambda values: noticed(values, (0, 100, 200)),
+    "threshold": lambda values: detection_threshold(values, (0, 100, 200)),
     "recognition": lambda values: recognition(named_labels(np.stack([values, values[:, ::-1]], axis=1)), [0, 2], 3),
     "means": slope_test,
     "slope": lambda values: slope_test(values, [[0.0], [1.0], [2.0]], "increasing"),

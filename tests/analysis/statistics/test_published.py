@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from study_app.analysis.statistics.equivalence import tost
-from study_app.analysis.statistics.rank_tests import friedman, paired
+from study_app.analysis.statistics.rank_tests import friedman, signed_rank_test
 
 PUBLISHED = tomllib.loads(Path(__file__).with_name("published.toml").read_text(encoding="utf-8"))
 
@@ -33,7 +33,7 @@ SMALLEST = {
 
 @pytest.mark.parametrize(("test", "n"), [(test, n) for test, smallest in SMALLEST.items() for n in smallest])
 def test_the_smallest_p_of_so_many_people_who_agree(test: str, n: int) -> None:
-    result = friedman([[1, 4, 7]] * n) if test == "friedman" else paired(np.arange(n) + 2.0, np.ones(n))
+    result = friedman([[1, 4, 7]] * n) if test == "friedman" else signed_rank_test(np.arange(n) + 2.0, np.ones(n))
     assert result.smallest_p == pytest.approx(SMALLEST[test][n], rel=0.03)
     assert result.p == result.smallest_p
     assert result.effect == pytest.approx(1.0)

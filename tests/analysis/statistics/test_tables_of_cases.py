@@ -106,9 +106,9 @@ def of_settings() -> Iterator[str]:
 
 def of_pairs() -> Iterator[str]:
     pairs = {name: (one[:, 0], one[:, -1]) for name, one in SAMPLES.items()}
-    yield from results(rank_tests.paired, pairs)
-    yield from results(rank_tests.paired, {"few": pairs["few"]}, alpha=0.2)
-    yield from results(rank_tests.paired, {"lengths": ([1.0], [1.0, 2.0])})
+    yield from results(rank_tests.signed_rank_test, pairs)
+    yield from results(rank_tests.signed_rank_test, {"few": pairs["few"]}, alpha=0.2)
+    yield from results(rank_tests.signed_rank_test, {"lengths": ([1.0], [1.0, 2.0])})
     yield from results(outcome.holm, {str(ps): (ps,) for ps in PS})
     yield from results(outcome.false_discovery, {str(ps): (ps,) for ps in (*PS, (1.2,))})
     tables = {"2": [[5, 1], [2, 7]], "0": [[0, 0], [0, 0]], "3": [[3, 0, 1], [0, 4, 0], [2, 0, 5]]}
@@ -136,7 +136,7 @@ def of_equivalence() -> Iterator[str]:
     yield from results(mean_tests.resamples_for, {str(alpha): alpha for alpha in (0.2, 0.05, 0.01, 0.001, 1e-5)})
     rows = {name: one[None] for name, one in cases.items() if len(one) > 2 and not np.isnan(one).any()}
     yield from results(simulated_studies.difference_ranks, rows)
-    yield from results(equivalence.equivalent, rows, 1.0, 0.05)
+    yield from results(equivalence.shows_equivalence, rows, 1.0, 0.05)
 
 
 def of_thresholds() -> Iterator[str]:
@@ -144,7 +144,7 @@ def of_thresholds() -> Iterator[str]:
         name: (one, LEVELS[: one.shape[1]]) for name, one in SAMPLES.items()
         if name in ("none", "one", "ties", "few", "rise", "fall", "missing", "all missing", "ends", "one setting")
     }  # fmt: skip
-    yield from results(thresholds.noticed, rising)
+    yield from results(thresholds.detection_threshold, rising)
     expected = np.array([0.55, 0.7, 0.9])
     for right in ([1, 4, 9], [5, 7, 10], [0, 0, 10]):
         yield from results(thresholds.deviances, {str(right): (right, [10] * 3, expected)})

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.stats import binom, page_trend_test, spearmanr, wilcoxon
 
 from study_app.analysis.statistics import trend_tests
-from study_app.analysis.statistics.rank_tests import paired
+from study_app.analysis.statistics.rank_tests import signed_rank_test
 from study_app.analysis.statistics.trend_tests import step_down, trend
 from study_app.errors import AnalysisError
 
@@ -122,6 +122,6 @@ def test_bad_delays_and_a_single_setting_are_refused() -> None:
 def test_many_pairs_are_approximated_closely() -> None:
     rng = np.random.default_rng(1)
     x, y = rng.integers(1, 8, (2, 400)).astype(float)
-    result = paired(x, y)
+    result = signed_rank_test(x, y)
     assert result.smallest_p is None
     assert result.p == pytest.approx(wilcoxon(x - y, method="asymptotic", correction=False).pvalue)

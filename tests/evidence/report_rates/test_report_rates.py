@@ -12,7 +12,7 @@ from study_app.analysis.findings.recognition import LiquidRecognition
 from study_app.analysis.findings.statement_tests import DelayTrend, MeanTests, Pairs, SettingsDiffer
 from study_app.analysis.planning.simulated_studies import Plan, plan
 from study_app.analysis.statistics.outcome import Interval
-from study_app.analysis.statistics.thresholds import Threshold, noticed
+from study_app.analysis.statistics.thresholds import Threshold, detection_threshold
 from study_app.evidence.report_rates import simulation as studies
 from study_app.evidence.report_rates.simulation import (
     CLAIMED,
@@ -115,7 +115,7 @@ def test_another_estimator_of_noticed_delays_and_other_intervals_are_noticed(
     factor: float, reach: float, what: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def other(*given: Any) -> Threshold:
-        found = noticed(*given)
+        found = detection_threshold(*given)
         if found.interval is None or found.effect is None:
             return found
         ends = [factor * (found.effect + reach * (end - found.effect)) for end in (found.lower, found.upper) if end]

@@ -5,7 +5,7 @@ import pytest
 from scipy.special import expit
 from scipy.stats import binom
 
-from study_app.analysis.statistics.thresholds import deviances, drift, noticed, p_of_fit
+from study_app.analysis.statistics.thresholds import detection_threshold, deviances, drift, p_of_fit
 from study_app.psychophysics.families import success
 
 pytestmark = pytest.mark.slow
@@ -23,7 +23,7 @@ def pooled(yes: list[int], people: int) -> np.ndarray:
 def test_guesses_without_any_delay_raise_the_lower_end_and_not_the_threshold() -> None:
     rng = np.random.default_rng(5)
     chance = success("logistic", DELAYS, 130.0, 80.0, 0.3, 0.0)
-    result = noticed(np.where(rng.random((400, 7)) < chance, 6.0, 2.0), DELAYS)
+    result = detection_threshold(np.where(rng.random((400, 7)) < chance, 6.0, 2.0), DELAYS)
     assert (result.effect, result.width) == pytest.approx((130, 80), rel=0.2)
     assert result.guess == pytest.approx(0.3, abs=0.05)
     assert result.statistic == pytest.approx(deviances(result.yes, result.asked, result.expected).sum())
@@ -50,7 +50,7 @@ def people_who_notice(rng: np.random.Generator, n: int, spread_ms: float, never:
 )
 def test_the_interval_covers_the_threshold_of_people_who_differ(n: int, spread_ms: float, never: float) -> None:
     rng = np.random.default_rng(3)
-    found = [noticed(people_who_notice(rng, n, spread_ms, never), STUDY).interval for _ in range(40)]
+    found = [detection_threshold(people_who_notice(rng, n, spread_ms, never), STUDY).interval for _ in range(40)]
     printed = [one for one in found if one is not None]
     assert len(printed) >= 36
     covered = sum(one.low <= 120 <= one.high for one in printed)
@@ -59,20 +59,20 @@ def test_the_interval_covers_the_threshold_of_people_who_differ(n: int, spread_m
 
 def test_equal_levels_are_replicates_of_one() -> None:
     values = people_who_notice(np.random.default_rng(1), 8, 10, 0)
-    doubled = noticed(np.hstack([values, values[:, 3:4]]), (*STUDY, 100))
+    doubled = detection_threshold(np.hstack([values, values[:, 3:4]]), (*STUDY, 100))
     stacked = np.full((8, 7, 2), np.nan)
     stacked[..., 0], stacked[:, 3, 1] = values, values[:, 3]
     assert doubled.levels == tuple(float(level) for level in STUDY)
     assert doubled.asked[3] == 16
-    assert doubled == noticed(stacked, STUDY)
+    assert doubled == detection_threshold(stacked, STUDY)
 
 
 def test_agreement_from_five_on_is_noticing_and_missing_answers_do_not_count() -> None:
     values = np.array([[1, 2, 3, 5, 6, 7, 7], [1, 1, 4, 4, 5, 6, np.nan], [np.nan] * 7])
-    result = noticed(values, DELAYS)
+    result = detection_threshold(values, DELAYS)
     assert (result.yes, result.asked) == ((0, 0, 0, 1, 2, 2, 1), (2, 2, 2, 2, 2, 2, 1))
     assert (result.n, result.dropped) == (2, 1)
-    five = noticed(np.vstack([values, values, values]), DELAYS)
+    five = detection_threshold(np.vstack([values, values, values]), DELAYS)
     assert (
         "answers from all participants are pooled, and the interval allows for differences between participants"
         in five.note
@@ -89,26 +89,26 @@ def test_agreement_from_five_on_is_noticing_and_missing_answers_do_not_count() -
     ],
 )
 def test_answers_without_a_threshold_are_told(yes: list[int], note: str) -> None:
-    result = noticed(pooled(yes, 5), DELAYS)
+    result = detection_threshold(pooled(yes, 5), DELAYS)
     assert (result.effect, result.interval, result.statistic) == (None, None, None)
     assert note in result.note
     assert note in result.no_interval
 
 
 def test_people_who_never_agree_are_lapses() -> None:
-    lapsing = noticed(pooled([0, 0, 1, 4, 14, 17, 17], 20), DELAYS)  # three of twenty
+    lapsing = detection_threshold(pooled([0, 0, 1, 4, 14, 17, 17], 20), DELAYS)  # three of twenty
     assert lapsing.lapse == pytest.approx(0.15, abs=0.03)
     assert lapsing.effect == pytest.approx(138, abs=8)
 
 
 def test_an_open_interval_says_which_end_is_open() -> None:
-    result = noticed(pooled([0, 0, 0, 0, 0, 3, 4], 12), DELAYS)
+    result = detection_threshold(pooled([0, 0, 0, 0, 0, 3, 4], 12), DELAYS)
     assert result.effect is not None
     assert result.interval is None
     assert result.lower is not None
     assert result.upper is None
     assert result.no_interval == "no interval: the answers do not determine the upper end"
-    far = noticed(pooled([0, 0, 0, 0, 1, 2, 8], 20), DELAYS)
+    far = detection_threshold(pooled([0, 0, 0, 0, 1, 2, 8], 20), DELAYS)
     assert far.upper is not None
     assert far.upper > 300
     assert "the interval extends beyond the range of presented levels" in far.note
