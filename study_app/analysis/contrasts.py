@@ -1,10 +1,10 @@
 """Contrasts: the hypotheses that a study states, tested on one number of each participant.
 
-Within participants the differences between the two settings are tested (of thresholds, the differences of logarithms,
-whose mean is a ratio), between groups the participants' numbers, in an interaction their differences: by three tests
-that must agree, see `statistics.mean_tests`. Thresholds have the weights of the random-effects mean; those of
-two blocks with the same levels and design have a width in common. Equivalence is tested as everywhere, and corrected
-over the hypotheses with a bound.
+A comparison within participants tests their differences between two conditions; for thresholds these are differences
+of logarithms, whose mean gives a ratio. A comparison of groups tests the participants' values, and an interaction tests
+the differences within participants between groups. Three tests must agree (see `statistics.mean_tests`). Thresholds are
+weighted as in the random-effects mean; two blocks with the same levels and design are fitted with a common width.
+Equivalence is tested as in all other analyses, with a correction over the hypotheses that state a bound.
 """
 
 import math
@@ -50,10 +50,10 @@ _STATISTICS: Final[Mapping[str, tuple[type[LevelStatistic[Any]], str]]] = {
     "d_prime": (Sensitivities, "d_prime"),
     "pse": (Settings, "pse"),
 }
-"""Of each measure the statistic that has it, and its attribute."""
+"""The statistic that provides each measure, and the attribute of its rows."""
 
 RATIOS: Final = ("threshold", "pse")
-"""Measures that are compared as ratios where the levels of all blocks are spaced by ratios."""
+"""Measures that are compared as ratios if all blocks space their levels by ratios."""
 
 _WEIGHTED: Final = (
     "Thresholds are weighted as in the group mean. If two blocks have the same levels and design, their thresholds "
@@ -84,10 +84,10 @@ _ALIKE: Final = "the values do not vary between participants, so a t test is not
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Measured:
-    """A participant's number on the scale of the test (log for a ratio), and its estimation variance.
+class ParticipantValue:
+    """A participant's value on the scale of the test (the logarithm for a ratio), and its estimation variance.
 
-    A variance of 0 means unknown; participants then have equal weights.
+    A variance of 0 means that it is unknown; all participants then have equal weights.
     """
 
     value: float
@@ -95,18 +95,19 @@ class Measured:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Compared:
-    """The sorted numbers of each group, or the differences within participants, and the reasons for exclusions.
+class ContrastSamples:
+    """The values that a contrast tests, and the reasons for exclusions.
 
-    ``shared`` is the variance of an error that all participants share, ``sides`` are the numbers of those compared;
-    ``cells`` are, of an interaction, those of each group under each condition.
+    ``samples`` has the sorted values of each group, or one sample with the differences within participants. ``shared``
+    is the variance of an error that all participants share. ``sides`` has the values on each side by participant;
+    ``cells``, only for an interaction, has those of each group in each condition.
     """
 
-    samples: tuple[tuple[Measured, ...], ...]
+    samples: tuple[tuple[ParticipantValue, ...], ...]
     left_out: Mapping[str, str]
     shared: float = 0.0
-    sides: tuple[Mapping[str, Measured], ...] = ()
-    cells: tuple[Mapping[str, Measured], ...] = ()
+    sides: tuple[Mapping[str, ParticipantValue], ...] = ()
+    cells: tuple[Mapping[str, ParticipantValue], ...] = ()
 
     @property
     def values(self) -> tuple[Array, ...]:
@@ -119,7 +120,7 @@ class Compared:
         return min(map(len, self.samples))
 
     def means(self, alpha: float) -> Means | None:
-        """Return the mean, or the difference of the groups' means; None if a sample has fewer than two numbers."""
+        """Return the mean, or the difference of the groups' means; None if a sample has fewer than two values."""
         if self.smallest < 2:
             return None
         compared = []
@@ -134,42 +135,45 @@ class Compared:
 def contrast_results(
     study: Study, answers: Sequence[BlockAnswers], levels: Sequence[LevelsResult]
 ) -> tuple[ContrastResult, ...]:
-    """Test the contrasts of a study, with Holm's correction for differences and for equivalence; none while sealed."""
+    """Test the contrasts of a study, with Holm's correction for differences and for equivalence.
+
+    Empty while the key is sealed.
+    """
     alpha = study.decided.alpha
     tests = [
         _test_contrast(study, contrast, answers, levels, alpha / len(study.contrasts)) for contrast in study.contrasts
     ]
     adjusted = holm([test.largest_p for test in tests])
-    with_bound = [place for place, test in enumerate(tests) if test.contrast.bound is not None]
-    of_equal = dict(zip(with_bound, holm([tests[place].p_equivalent for place in with_bound]), strict=True))
+    with_bound = [index for index, test in enumerate(tests) if test.contrast.bound is not None]
+    adjusted_equivalence = dict(zip(with_bound, holm([tests[index].p_equivalent for index in with_bound]), strict=True))
     return tuple(
-        _with_verdict(study, result, p, of_equal.get(place))
-        for place, (result, p) in enumerate(zip(tests, adjusted, strict=True))
+        _add_verdict(study, result, p, adjusted_equivalence.get(index))
+        for index, (result, p) in enumerate(zip(tests, adjusted, strict=True))
     )
 
 
-def _with_verdict(study: Study, tested: ContrastResult, p: float | None, p_equal: float | None) -> ContrastResult:
+def _add_verdict(study: Study, tested: ContrastResult, p: float | None, p_equal: float | None) -> ContrastResult:
     alpha = study.decided.alpha
-    said: Any = verdict(p, None, alpha, primary=study.decided.binding)
+    outcome: Any = verdict(p, None, alpha, primary=study.decided.binding)
     equivalent = None if tested.contrast.bound is None else p_equal is not None and p_equal <= alpha
-    if equivalent and said in ("not shown", "not tested"):
-        said = "equivalent"
+    if equivalent and outcome in ("not shown", "not tested"):
+        outcome = "equivalent"
     return replace(
         tested,
         p_adjusted=p,
         p_equivalent=p_equal,
         members=len(study.contrasts),
         equivalent=equivalent,
-        verdict=said,
+        verdict=outcome,
         not_excluded=tested.not_excluded if equivalent else None,
     )
 
 
-def _compare(
+def _collect_samples(
     study: Study, contrast: Contrast, answers: Sequence[BlockAnswers], levels: Sequence[LevelsResult]
-) -> Compared:
-    sides: list[Mapping[str, Measured]] = [
-        _values(study, contrast, block, condition, answers, levels)
+) -> ContrastSamples:
+    sides: list[Mapping[str, ParticipantValue]] = [
+        _participant_values(study, contrast, block, condition, answers, levels)
         for block, condition in zip(
             contrast.blocks if len(contrast.blocks) == 2 else contrast.blocks * 2,
             contrast.conditions or (None, None),
@@ -179,72 +183,74 @@ def _compare(
     shared = 0.0
     spacings = {level.spacing for level in levels if level.block in contrast.blocks}
     if contrast.measure == "threshold" and len(contrast.blocks) == 2 and len(spacings) == 1:
-        sides, shared = _thresholds_of_two(study, contrast, math.log(10) if spacings == {"log"} else 1.0)
+        sides, shared = _thresholds_in_two_blocks(study, contrast, math.log(10) if spacings == {"log"} else 1.0)
     members = group_members(study)
     people = [person for person in study.people if contrast.groups is None or members.get(person) in contrast.groups]
-    what = (
+    missing = (
         f"no {contrast.measure_words}"
         if contrast.measure in _STATISTICS
         else f"an answer to {contrast.measure} is missing"
     )
     names = contrast.conditions or _block_titles(study, contrast)
     left_out = {
-        person: f"{what} in {quoted_title(name)}"
+        person: f"{missing} in {quoted_title(name)}"
         for side, name in zip(sides[::-1], names[::-1], strict=True)
         for person in people
         if person not in side
     }  # fmt: skip
-    kept = [person for person in people if person not in left_out]
-    numbers = {person: sides[0][person] for person in kept}
+    included = [person for person in people if person not in left_out]
+    values = {person: sides[0][person] for person in included}
     if contrast.within is not None:
-        numbers = {
-            person: Measured(
+        values = {
+            person: ParticipantValue(
                 value=sides[0][person].value - sides[1][person].value,
                 variance=sides[0][person].variance + sides[1][person].variance,
             )
-            for person in kept
+            for person in included
         }
     cells = tuple(
-        {who: side[who] for who in kept if members[who] == group}
+        {person: side[person] for person in included if members[person] == group}
         for group in contrast.groups or ()
         for side in sides
         if contrast.is_interaction
     )
-    if contrast.groups is not None:  # the error that all have in common is the same in both groups
-        sides = [{who: numbers[who] for who in kept if members[who] == group} for group in contrast.groups]
+    if contrast.groups is not None:  # the shared error cancels between groups
+        sides = [
+            {person: values[person] for person in included if members[person] == group} for group in contrast.groups
+        ]
         samples, shared = tuple(tuple(side.values()) for side in sides), 0.0
     else:
-        sides, samples = [{person: side[person] for person in kept} for side in sides], (tuple(numbers.values()),)
-    return Compared(
+        sides, samples = [{person: side[person] for person in included} for side in sides], (tuple(values.values()),)
+    return ContrastSamples(
         samples=tuple(map(_sorted_by_value, samples)), left_out=left_out, shared=shared, sides=tuple(sides), cells=cells
     )
 
 
-def _sorted_by_value(sample: Iterable[Measured]) -> tuple[Measured, ...]:
+def _sorted_by_value(sample: Iterable[ParticipantValue]) -> tuple[ParticipantValue, ...]:
     return tuple(sorted(sample, key=lambda measured: measured.value))
 
 
-def _side(name: str, held: Mapping[str, Measured], *, ratio: bool) -> ContrastSide:
-    """Return the numbers of one side in display units, with their mean."""
+def _summarize_side(name: str, values: Mapping[str, ParticipantValue], *, ratio: bool) -> ContrastSide:
+    """Return the values of one side in display units, with their mean."""
     scale = math.exp if ratio else float
-    means = Compared(samples=(_sorted_by_value(held.values()),), left_out={}).means(0.05)
+    means = ContrastSamples(samples=(_sorted_by_value(values.values()),), left_out={}).means(0.05)
     low, high = (None, None) if means is None else (scale(float(end[0])) for end in means.interval(0.95))
     return ContrastSide(
         name=name,
-        values={person: scale(measured.value) for person, measured in held.items()},
+        values={person: scale(measured.value) for person, measured in values.items()},
         mean=None if means is None else scale(float(means.mean[0])),
         low=low,
         high=high,
-        sd=_sd([measured.value for measured in held.values()]),
+        sd=_sample_sd([measured.value for measured in values.values()]),
         standard_error=None if means is None else float(means.error[0]),
     )
 
 
-def _sd(values: Sequence[float]) -> float | None:
+def _sample_sd(values: Sequence[float]) -> float | None:
     return float(np.std(values, ddof=1)) if len(values) > 1 else None
 
 
-class _Standardised(NamedTuple):
+class _StandardisedEffects(NamedTuple):
     """The standardised effect, Cliff's delta and the Bayes factor of a hypothesis; None if not applicable."""
 
     effect: EffectSize | None
@@ -252,7 +258,7 @@ class _Standardised(NamedTuple):
     bayes_factor: float | None
 
 
-def _standardised(compared: Compared, *, is_ordinal: bool) -> _Standardised:
+def _standardised_effects(compared: ContrastSamples, *, is_ordinal: bool) -> _StandardisedEffects:
     """Return the standardised effects of a hypothesis with equal weights for all participants."""
     first, *others = compared.values
     if others:
@@ -261,25 +267,27 @@ def _standardised(compared: Compared, *, is_ordinal: bool) -> _Standardised:
         effect, ordinal = d_z(first), paired_delta(first)
     t, sizes = None if effect is None else effect.t, [len(sample) for sample in compared.values]
     factor = None if t is None else jzs_bayes_factor(t, *sizes)
-    return _Standardised(effect, ordinal if is_ordinal else None, factor)
+    return _StandardisedEffects(effect, ordinal if is_ordinal else None, factor)
 
 
-def _thresholds_of_two(study: Study, contrast: Contrast, per_u: float) -> tuple[list[Mapping[str, Measured]], float]:
-    """Return the thresholds in two blocks, in units of u / ``per_u``, and the variance that common widths add."""
+def _thresholds_in_two_blocks(
+    study: Study, contrast: Contrast, per_u: float
+) -> tuple[list[Mapping[str, ParticipantValue]], float]:
+    """Return the thresholds in two blocks, multiplied by ``per_u``, and the variance that common widths add."""
     first, second = (next(level for level in study.levels if level.id == block) for block in contrast.blocks)
     sides, shared = thresholds_compared(first, second, tracks(study)[list(READ)])
     return [
-        {person: Measured(value=per_u * u.value, variance=per_u**2 * u.variance) for person, u in side.items()}
+        {person: ParticipantValue(value=per_u * u.value, variance=per_u**2 * u.variance) for person, u in side.items()}
         for side in sides
     ], per_u**2 * shared
 
 
-def _form_values(study: Study, contrast: Contrast, form: str, block: str) -> Mapping[str, Measured]:
-    """Return each participant's answer to a form after a block, or the score of the form; the mean over sessions."""
+def _participant_form_values(study: Study, contrast: Contrast, form: str, block: str) -> Mapping[str, ParticipantValue]:
+    """Return each participant's answer or score in a form after a block, averaged over sessions."""
     rows = [
-        study.answers_to(asked).rename(columns={"value": "score"})
-        for asked in study.others.questions
-        if (asked.where.id, asked.id) == (form, contrast.measure)
+        study.answers_to(question).rename(columns={"value": "score"})
+        for question in study.others.questions
+        if (question.where.id, question.id) == (form, contrast.measure)
     ] + [
         scored(study, score)
         for score in study.others.scores
@@ -287,47 +295,51 @@ def _form_values(study: Study, contrast: Contrast, form: str, block: str) -> Map
     ]
     after = [table[(table["code"] == block) & table["score"].notna()] for table in rows]
     means = {person: own["score"].mean() for table in after for person, own in table.groupby("participant")}
-    return {str(person): Measured(value=float(mean)) for person, mean in means.items()}
+    return {str(person): ParticipantValue(value=float(mean)) for person, mean in means.items()}
 
 
-def _values(
+def _participant_values(
     study: Study,
     contrast: Contrast,
     block: str,
     condition: str | None,
     answers: Sequence[BlockAnswers],
     levels: Sequence[LevelsResult],
-) -> Mapping[str, Measured]:
-    """Return each participant's number in a block: the mean over standards or, for statements, over conditions."""
+) -> Mapping[str, ParticipantValue]:
+    """Return each participant's value in a block: the mean over standards or, for statements, over conditions."""
     if contrast.form is not None:
-        return _form_values(study, contrast, contrast.form, block)
+        return _participant_form_values(study, contrast, contrast.form, block)
     if contrast.measure not in _STATISTICS:
-        asked = next(answered for answered in answers if answered.block.id == block)
-        codes = [setting.code for setting in asked.block.settings if condition in (None, setting.condition)]
-        rows = asked.values[contrast.measure][:, sorted({asked.block.columns[code] for code in codes})].mean(axis=1)
+        block_answers = next(answered for answered in answers if answered.block.id == block)
+        codes = [setting.code for setting in block_answers.block.settings if condition in (None, setting.condition)]
+        rows = block_answers.values[contrast.measure][
+            :, sorted({block_answers.block.columns[code] for code in codes})
+        ].mean(axis=1)
         return {
-            person: Measured(value=float(row))
-            for person, row in zip(asked.people, rows, strict=True)
+            person: ParticipantValue(value=float(row))
+            for person, row in zip(block_answers.people, rows, strict=True)
             if not math.isnan(row)
         }
     result = next(level for level in levels if level.block == block)
     statistic, attribute = _STATISTICS[contrast.measure]
     ratio = _is_ratio(contrast, levels)
-    numbers: dict[str, list[Measured]] = {}
+    measured_values: dict[str, list[ParticipantValue]] = {}
     for row in statistic.own(result):
         if (value := getattr(row, attribute)) is not None:
-            measured = Measured(value=math.log(value) if ratio else value, variance=_variance(row, result, ratio=ratio))
-            numbers.setdefault(str(row.participant), []).append(measured)
+            measured = ParticipantValue(
+                value=math.log(value) if ratio else value, variance=_variance_of_estimate(row, result, ratio=ratio)
+            )
+            measured_values.setdefault(str(row.participant), []).append(measured)
     return {
-        person: Measured(
-            value=float(np.mean([measured.value for measured in each])),
-            variance=sum(measured.variance for measured in each) / len(each) ** 2,
+        person: ParticipantValue(
+            value=float(np.mean([measured.value for measured in values])),
+            variance=sum(measured.variance for measured in values) / len(values) ** 2,
         )
-        for person, each in numbers.items()
+        for person, values in measured_values.items()
     }
 
 
-def _variance(row: Any, result: LevelsResult, *, ratio: bool) -> float:
+def _variance_of_estimate(row: Any, result: LevelsResult, *, ratio: bool) -> float:
     """Return the variance of an estimate on the scale of the test; 0 if it is unknown."""
     if not isinstance(row, ThresholdEstimate) or row.variance is None:
         return 0.0
@@ -345,11 +357,11 @@ def _test_contrast(
     study: Study, contrast: Contrast, answers: Sequence[BlockAnswers], levels: Sequence[LevelsResult], strictest: float
 ) -> ContrastResult:
     """Return a contrast before correction, with enough resamples for an alpha of ``strictest``."""
-    compared = _compare(study, contrast, answers, levels)
+    compared = _collect_samples(study, contrast, answers, levels)
     ratio, means = _is_ratio(contrast, levels), compared.means(strictest)
     names, within = _side_names(study, contrast), _within_names(study, contrast)
     is_ordinal = contrast.measure not in _STATISTICS and not contrast.is_interaction
-    standardised = _standardised(compared, is_ordinal=is_ordinal)
+    standardised = _standardised_effects(compared, is_ordinal=is_ordinal)
     effect = ends = p_equal = p = p_bootstrap = p_skewed = statistic = error = None
     method, why = "none", _TOO_FEW if means is None else _ALIKE
     if means is not None:
@@ -396,18 +408,20 @@ def _test_contrast(
         p_bootstrap=p_bootstrap,
         p_skewed=p_skewed,
         p_equivalent=p_equal,
-        not_excluded=_not_excluded(contrast, compared, ratio=ratio),
+        not_excluded=_largest_possible_share(contrast, compared, ratio=ratio),
         higher=None if contrast.groups else int((compared.values[0] > SAME).sum()),
         left_out=compared.left_out,
-        sides=tuple(_side(name, held, ratio=ratio) for name, held in zip(names, compared.sides, strict=True)),
-        sd=_sd(compared.values[0].tolist()) if contrast.groups is None else None,
+        sides=tuple(
+            _summarize_side(name, values, ratio=ratio) for name, values in zip(names, compared.sides, strict=True)
+        ),
+        sd=_sample_sd(compared.values[0].tolist()) if contrast.groups is None else None,
         standardised=standardised.effect,
         ordinal=standardised.ordinal,
         bayes_factor=standardised.bayes_factor,
         within_names=within,
         cells=tuple(
-            _side(name, held, ratio=ratio)
-            for name, held in zip((within or contrast.within or ()) * 2, compared.cells, strict=False)
+            _summarize_side(name, values, ratio=ratio)
+            for name, values in zip((within or contrast.within or ()) * 2, compared.cells, strict=False)
         ),
         measure_name=_measure_name(study, contrast),
         block_title=_block_titles(study, contrast)[0],
@@ -441,24 +455,23 @@ def _within_names(study: Study, contrast: Contrast) -> tuple[str, str] | None:
 def _measure_name(study: Study, contrast: Contrast) -> str:
     """Return the measure with the short text of its statement or question; "" if it has none."""
     if contrast.form is not None:
-        where, measure = contrast.form, contrast.measure
+        form, measure = contrast.form, contrast.measure
         scores = (
-            f"{score.title} score" for score in study.others.scores if (score.where.id, score.name) == (where, measure)
+            f"{score.title} score" for score in study.others.scores if (score.where.id, score.name) == (form, measure)
         )
         questions = (
             f"“{question.short}” ({question.where.title})"
             for question in study.others.questions
-            if (question.where.id, question.id) == (where, measure)
+            if (question.where.id, question.id) == (form, measure)
         )
-        named = chain(scores, questions)
-        return next(named, "")
+        return next(chain(scores, questions), "")
     items = (item for block in study.blocks if block.id in contrast.blocks for item in block.items)
     item = next((item for item in items if item.id == contrast.measure), None)
     return "" if item is None else f"agreement with “{item.short}”"
 
 
 def inclusion_words(contrasts: Iterable[Contrast]) -> str:
-    """Return who is compared, for power, preregistration and report."""
+    """Return a sentence on which participants are compared, for power analysis, preregistration and report."""
     beyond = any(contrast.measure == "threshold" for contrast in contrasts)
     return (
         "Participants are included if both of their values are available"
@@ -474,8 +487,8 @@ def equality_limits(contrast: Contrast, bound: float, *, ratio: bool) -> tuple[f
     return abs(math.log(bound)) if ratio else bound, largest
 
 
-def _not_excluded(contrast: Contrast, compared: Compared, *, ratio: bool) -> float | None:
-    """Return the upper limit of the share of participants that may differ by more than the bound."""
+def _largest_possible_share(contrast: Contrast, compared: ContrastSamples, *, ratio: bool) -> float | None:
+    """Return the upper confidence limit of the share of participants who differ by more than the bound."""
     if contrast.bound is None or not compared.smallest:
         return None
     if contrast.groups is not None:
@@ -486,8 +499,8 @@ def _not_excluded(contrast: Contrast, compared: Compared, *, ratio: bool) -> flo
 
 def question(contrast: ContrastResult) -> str:
     """Return the hypothesis in words."""
-    words = contrast.hypothesis
-    return f"{words[:1].upper()}{words[1:]}"
+    hypothesis = contrast.hypothesis
+    return f"{hypothesis[:1].upper()}{hypothesis[1:]}"
 
 
 def answer(contrast: ContrastResult) -> str:
@@ -495,8 +508,8 @@ def answer(contrast: ContrastResult) -> str:
     sentences = [f"Not tested: {contrast.note}." if contrast.p_adjusted is None else _difference_words(contrast)]
     kind = "ratio" if contrast.ratio else "difference"
     if contrast.contrast.bound is not None and _lies_beyond(contrast, contrast.contrast.bound):
-        what = "All differences lie" if contrast.interval is None else "The whole confidence interval lies"
-        sentences.append(f"{what} outside the equivalence bounds (not equivalent).")
+        subject = "All differences lie" if contrast.interval is None else "The whole confidence interval lies"
+        sentences.append(f"{subject} outside the equivalence bounds (not equivalent).")
     elif contrast.equivalent:
         people = (
             "of people show a difference larger than the bound"
@@ -527,49 +540,49 @@ def _lies_beyond(contrast: ContrastResult, bound: float) -> bool:
 
 def _difference_words(contrast: ContrastResult) -> str:
     first, second = map(quoted_title, contrast.compared)
-    what, expected = number_text.capitalised(contrast.effect_words), contrast.contrast.expected
+    quantity, expected = number_text.capitalised(contrast.effect_words), contrast.contrast.expected
     if contrast.verdict in FOUND:
         side = "higher" if (contrast.effect or 0.0) > (1.0 if contrast.ratio else 0.0) else "lower"
-        said = f"{what} was {side} in {first} than in {second}"
+        claim = f"{quantity} was {side} in {first} than in {second}"
     elif expected is None:
-        said = f"{what} did not differ significantly between {first} and {second}"
+        claim = f"{quantity} did not differ significantly between {first} and {second}"
     else:
-        said = f"{what} was not significantly {expected} in {first} than in {second}"
-    decimals = _decimals(contrast)
+        claim = f"{quantity} was not significantly {expected} in {first} than in {second}"
+    decimals = _matching_decimals(contrast)
     means = listed([mean_words(side, decimals) for side in contrast.sides if side.mean is not None])
     higher = (
         ""
         if contrast.higher is None
-        else f" It was higher in {first} for {contrast.higher} of {contrast.n} participants{_ties(contrast)}."
+        else f" It was higher in {first} for {contrast.higher} of {contrast.n} participants{_ties_words(contrast)}."
     )
     effect = f"mean {'ratio' if contrast.ratio else 'difference'} {number(contrast.effect, decimals)}"
     unadjusted = "unadjusted " * (contrast.members > 1) + "two-sided " * (expected is not None)
     p_kind = "adjusted " * (contrast.members > 1) + "one-sided " * (expected is not None)
     size = "" if contrast.standardised is None else f", {_effect_size_words(contrast.standardised)}"
     return (
-        f"{said} (means {means}; {effect}, {unadjusted}95 % confidence interval {interval(contrast.interval)}{size}, "
+        f"{claim} (means {means}; {effect}, {unadjusted}95 % confidence interval {interval(contrast.interval)}{size}, "
         f"{p_kind}{p_equals(contrast.p_adjusted or 0.0)}, n = {contrast.n}).{_adjustment_words(contrast)}"
         f"{higher}{_bayes_words(contrast)}"
     )
 
 
 def _adjustment_words(contrast: ContrastResult) -> str:
-    """Return p before the adjustment, if only the adjustment makes it larger than 0.05, with a leading space, or ""."""
+    """Return a sentence with the unadjusted p if only the adjustment raises p above 0.05, otherwise ""."""
     p, adjusted = contrast.largest_p, contrast.p_adjusted
     if contrast.verdict in FOUND or p is None or adjusted is None or not p <= 0.05 < adjusted:
         return ""
     return f" Before the adjustment for {contrast.members} hypotheses, {p_equals(p)}."
 
 
-def _ties(contrast: ContrastResult) -> str:
-    """Return how many participants have equal values on both sides: " and equal for 1"."""
+def _ties_words(contrast: ContrastResult) -> str:
+    """Return a clause that counts participants with equal values on both sides, " and equal for 1", or ""."""
     same = 1.0 if contrast.ratio else 0.0
     ties = sum(math.isclose(value, same, abs_tol=1e-12) for value in contrast.differences.values())
     return f" and equal for {ties}" if ties else ""
 
 
-def _decimals(contrast: ContrastResult) -> int:
-    """Return the number of decimals (2 or 3) at which the shown difference equals that of the shown means, else 2."""
+def _matching_decimals(contrast: ContrastResult) -> int:
+    """Return the fewest decimals (2 or 3) at which the printed means differ by the printed difference, otherwise 2."""
     means, effect = [side.mean for side in contrast.sides if side.mean is not None], contrast.effect
     if len(means) != 2 or effect is None or contrast.ratio or not math.isclose(means[0] - means[1], effect):
         return 2
@@ -604,7 +617,7 @@ def _bayes_words(contrast: ContrastResult) -> str:
 
 
 def t_test_name(contrast: Contrast, *, ratio: bool) -> str:
-    """Return the name of a contrast's t test and the values that it uses; ``ratio``: logarithms."""
+    """Return the name of a contrast's t test and the values that it uses: logarithms for a ``ratio``."""
     used = ["within-participant differences"] * contrast.is_interaction + ["log-transformed values"] * ratio
     values = f" on {' of '.join(used)}" if used else ""
     return f"two-sample t test{values} with unequal variances" if contrast.groups else f"paired t test{values}"
@@ -638,18 +651,18 @@ def contrast_methods(results: Results) -> Iterator[str]:
             "equivalence. In addition, the sample had to be large enough that it would probably include a member of "
             "any minority that could shift the mean by as much as the bound."
         )
-    if gone := {
+    if exclusions := {
         f"{question(contrast)}: {_left_out_words(contrast)}": None for contrast in contrasts if contrast.left_out
     }:
-        yield f"Some participants were excluded from a test because a value was missing ({'; '.join(gone)})."
+        yield f"Some participants were excluded from a test because a value was missing ({'; '.join(exclusions)})."
 
 
 def _tests_used(contrasts: Sequence[ContrastResult]) -> Iterator[str]:
     """Yield the test of each hypothesis."""
-    for place, contrast in enumerate(contrasts, start=1):
+    for index, contrast in enumerate(contrasts, start=1):
         test = t_test_name(contrast.contrast, ratio=contrast.ratio)
         sides = "two-sided" if contrast.contrast.expected is None else "one-sided"
-        label = f"Hypothesis {place}" if len(contrasts) > 1 else "The hypothesis"
+        label = f"Hypothesis {index}" if len(contrasts) > 1 else "The hypothesis"
         yield f"{label} ({contrast.hypothesis}) was tested with a {sides} {test}."
     if any(contrast.contrast.groups for contrast in contrasts):
         yield "Comparisons between groups used the degrees of freedom of the smaller group (Hsu 1938)."
@@ -748,15 +761,15 @@ def _effect_size_notes(contrasts: Sequence[ContrastResult]) -> str:
     return f"{_SIZES}{logs}{_DELTA * any(contrast.ordinal is not None for contrast in contrasts)}"
 
 
-def _row_words(results: Results, contrast: ContrastResult, words: str) -> str:
+def _row_words(results: Results, contrast: ContrastResult, sides: str) -> str:
     """Return the name of a row: number of the hypothesis, measure, and the sides compared."""
-    places = (place for place, result in enumerate(results.contrasts, start=1) if result is contrast)
-    place = f"{next(places)}. " if len(results.contrasts) > 1 else ""
-    return f"{place}{number_text.capitalised(contrast.effect_words)}: {words}"
+    positions = (position for position, result in enumerate(results.contrasts, start=1) if result is contrast)
+    prefix = f"{next(positions)}. " if len(results.contrasts) > 1 else ""
+    return f"{prefix}{number_text.capitalised(contrast.effect_words)}: {sides}"
 
 
-class _Described(NamedTuple):
-    """The numbers of one side of a hypothesis, or the differences between its sides."""
+class _SideDescription(NamedTuple):
+    """Descriptive statistics of one side of a hypothesis, or of the differences between its sides."""
 
     name: str
     values: Sequence[float]
@@ -765,15 +778,15 @@ class _Described(NamedTuple):
     standard_error: float | None
 
 
-def _describe_sides(results: Results, contrast: ContrastResult) -> Iterator[_Described]:
+def _describe_sides(results: Results, contrast: ContrastResult) -> Iterator[_SideDescription]:
     for side in contrast.sides:
         name = _row_words(results, contrast, side.name)
-        yield _Described(
+        yield _SideDescription(
             name=name, values=[*side.values.values()], mean=side.mean, sd=side.sd, standard_error=side.standard_error
         )
     if differences := [*contrast.differences.values()]:
         name = _row_words(results, contrast, contrast.comparison)
-        yield _Described(
+        yield _SideDescription(
             name=name, values=differences, mean=contrast.effect, sd=contrast.sd, standard_error=contrast.standard_error
         )
 
@@ -782,7 +795,7 @@ _DIRECTIONS: Final = {"difference": "differences are first minus second", "ratio
 
 
 def _direction_words(kinds: Sequence[str]) -> str:
-    """Return which way differences and ratios go, and what their standard errors are."""
+    """Return sentences on the direction of differences and ratios, and on their standard errors."""
     logs = ", or of the mean logarithm for a ratio" * ("ratio" in kinds)
     return (
         f"In the text, figures and tables, {listed([_DIRECTIONS[kind] for kind in kinds])}, in the order of the "

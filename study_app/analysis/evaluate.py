@@ -1,4 +1,4 @@
-"""From a study to all that can be said about it: the one place that decides which tests apply to which block."""
+"""Evaluate a study: compute all results, and decide which tests apply to which block."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -31,15 +31,15 @@ from study_app.analysis.results import (
 from study_app.protocol.orders import Evenness, evenness
 
 SEED: Final = 1
-"""Of all random rearrangements and resamples: the same results give the same numbers."""
+"""The seed of all permutations and resamples, so that the same data always give the same numbers."""
 
 
 def evaluate(study: Study, *, recordings: bool = True, progress: Progress = report_no_progress) -> Results:
     """Run all tests on the answers and, with ``recordings``, the recordings of a study.
 
-    While the key is sealed there are only counts and comparisons of codes; ``BlockResult.absent`` lists what awaits the
-    key, and what too few participants cannot show. A part that fails is listed in ``Results.failures`` and, with the
-    reason, in its block's ``absent``; all other parts are complete.
+    While the key is sealed there are only counts and comparisons of codes. ``BlockResult.absent`` lists results that
+    require the key or more participants. A part that fails is listed in ``Results.failures`` and, with the reason, in
+    the ``absent`` results of its block; all other parts are complete.
 
     Examples
     --------
@@ -55,13 +55,13 @@ def evaluate(study: Study, *, recordings: bool = True, progress: Progress = repo
     """
     failures = Failures()
     try:
-        return _evaluate_study(study, failures, partial(_ending, progress), recordings=recordings)
+        return _evaluate_study(study, failures, partial(_report_or_end, progress), recordings=recordings)
     except Ended as ended:
         raise ended.error from None
 
 
-def _ending(progress: Progress, what: str, share: float) -> None:
-    """Report progress; an exception from the callback ends the evaluation."""
+def _report_or_end(progress: Progress, what: str, share: float) -> None:
+    """Report progress; wrap an exception of the callback in `Ended`, so that it is not recorded as a failure."""
     try:
         progress(what, share)
     except BaseException as error:
@@ -73,7 +73,7 @@ def _evaluate_study(study: Study, failures: Failures, progress: Progress, *, rec
         failures.attempt("all tests", partial(block_answers, study, block, SEED, failures), block=block.id)
         for block in study.blocks
     ]
-    asked = with_gates([one for one in collected if not isinstance(one, Failure)])
+    gated = with_gates([answers for answers in collected if not isinstance(answers, Failure)])
 
     def block_result(number: int, block: Block) -> BlockResult:
         def tell(what: str) -> None:
@@ -86,7 +86,7 @@ def _evaluate_study(study: Study, failures: Failures, progress: Progress, *, rec
         result = (
             failure
             if isinstance(failure, Failure)
-            else test(next(answers for answers in asked if answers.block is block))
+            else test(next(answers for answers in gated if answers.block is block))
         )
         return empty_result(block, NotTested(result.what, result.why)) if isinstance(result, Failure) else result
 
@@ -104,7 +104,7 @@ def _evaluate_study(study: Study, failures: Failures, progress: Progress, *, rec
         decided=study.decided,
         people=study.people,
         blocks=blocks,
-        contrasts=failures.value("the hypotheses", lambda: contrast_results(study, asked, levels), ()),
+        contrasts=failures.value("the hypotheses", lambda: contrast_results(study, gated, levels), ()),
         delivered=failures.value("the delivered delays", lambda: _delivery_check(study), ()),
         orders=failures.value("the trial orders", lambda: _order_balance(study), {}),
         seed=SEED,
@@ -121,13 +121,13 @@ def evaluate_block(study: Study | None, answers: BlockAnswers, tell: Callable[[s
 
     ``tell`` is called with the name of each finding before it is computed.
     """
-    block, own = answers.block, study is not None and study.own_codes
+    block, has_own_codes = answers.block, study is not None and study.own_codes
     result = summarize_block(study, answers)
     for finding in all_findings():
         if not finding.what:
             continue
-        if block.kind not in (finding.kinds if block.revealed else () if own else finding.sealed):
-            if not block.revealed and block.kind in (*finding.waits, *(finding.sealed if own else ())):
+        if block.kind not in (finding.kinds if block.revealed else () if has_own_codes else finding.sealed):
+            if not block.revealed and block.kind in (*finding.waits, *(finding.sealed if has_own_codes else ())):
                 result = replace(result, absent=(*result.absent, NotTested(finding.what, SEALED)))
             continue
         tell(finding.what)
@@ -140,9 +140,9 @@ def evaluate_block(study: Study | None, answers: BlockAnswers, tell: Callable[[s
 
 
 def _delivery_check(study: Study) -> tuple[Delivered, ...]:
-    """Return the manipulation check by setting or, while sealed, over all settings of a block.
+    """Return the manipulation check of each setting or, while the key is sealed, of each block.
 
-    Delays must not be revealed by code before the key is opened.
+    Errors by code could reveal the delays before the key is opened.
     """
     counted = study.trials[study.trials["counted"]]
     delivery = []
@@ -160,7 +160,7 @@ def _delivery_check(study: Study) -> tuple[Delivered, ...]:
 
 def _measure_delivery(block: Block, code: str | None, delay_ms: float | None, rows: pd.DataFrame) -> Delivered:
     errors = rows["delay_error_mean_ms"].dropna().astype(float)
-    mean = float(errors.mean()) if len(errors) else None
+    mean_ms = float(errors.mean()) if len(errors) else None
     return Delivered(
         block=block.id,
         code=code,
@@ -169,21 +169,21 @@ def _measure_delivery(block: Block, code: str | None, delay_ms: float | None, ro
         measured=len(errors),
         judged=int(rows["valid"].notna().sum()),
         valid=int(rows["valid"].fillna(value=False).sum()),
-        error_mean_ms=mean,
+        error_mean_ms=mean_ms,
         error_worst_ms=float(errors.iloc[errors.abs().argmax()]) if len(errors) else None,
-        achieved_ms=None if delay_ms is None or mean is None else delay_ms + mean,
+        achieved_ms=None if delay_ms is None or mean_ms is None else delay_ms + mean_ms,
     )
 
 
 def _order_balance(study: Study) -> dict[str, Evenness]:
-    """Return how balanced the orders of trials were as run (block id → counts), including excluded trials.
+    """Return the balance of the trial orders as run (block id → counts), including excluded trials.
 
-    They are unknown in a sealed study in which each site or each participant has its own codes.
+    It is unknown in a sealed study in which each site or each participant has its own codes.
     """
     if study.own_codes or (study.sites and not study.revealed):
         return {}
-    here = study.participants.loc[study.participants["counted"], ["participant", "session"]]
-    rows = study.trials[study.trials["phase"] == "main"].merge(here, on=["participant", "session"])
+    included = study.participants.loc[study.participants["counted"], ["participant", "session"]]
+    rows = study.trials[study.trials["phase"] == "main"].merge(included, on=["participant", "session"])
     rows = rows.drop_duplicates(["participant", "session", "trial"], keep="last")
     rows = rows.sort_values(["participant", "session", "index"])
     return {

@@ -1,4 +1,4 @@
-"""The page and its parts: one HTML file with its style and pictures inside, without scripts."""
+"""HTML of a report: headings, tables and figures of one file that includes its style and pictures, without scripts."""
 
 import base64
 import math
@@ -18,20 +18,20 @@ from study_app.analysis.wording import number, with_d_z
 _T = TypeVar("_T")
 
 LONG = 32
-"""Cells of more letters are broken into lines."""
+"""The most characters of a table cell that is not wrapped on screen."""
 
 _SHORT = 16
-"""On paper, cells of more letters are."""
+"""The most characters of a table cell that is not wrapped on paper."""
 
 _FOLDED = 12
-"""A table of more rows is folded."""
+"""The most rows of a table that is not folded."""
 
 _PX_PER_PT = 1.9
-"""Pixels of the page for a point of a figure that has the room."""
+"""Pixels for each point of a figure that has enough space."""
 _BESIDE_PT = 420
-"""Of a figure that fills its place beside an answer; narrower ones do not, so that all texts are equally large."""
+"""The width of a figure that fills the space beside an answer; narrower figures keep the same text size."""
 _LEAST_LETTERS_PX = 11
-"""Height of the smallest letters of a figure on a screen; a figure without the room scrolls."""
+"""The smallest height of text in a figure on screen; a figure without enough space scrolls."""
 
 _VARIABLES = {
     style.TEXT: "text",
@@ -49,7 +49,7 @@ _VARIABLES = {
     style.SEALED_GROUND: "sunk",
     "#ffffff": "paper",
 }
-"""The colours of figures that the page has by name, since they change with light and dark."""
+"""The CSS variable of each colour of figures, so that colours follow the light or dark style."""
 _COLOUR = re.compile("|".join(_VARIABLES), re.IGNORECASE)
 _LETTERS = re.compile(r"(<text.*?</text>)", re.DOTALL)
 HEAD = re.compile(r"^.*?(?=<svg)|<metadata>.*?</metadata>", re.DOTALL)
@@ -66,7 +66,7 @@ def _environment() -> Environment:
 
 
 def _typeset(value: Any) -> Any:
-    """Return a text in which the z of d_z is a subscript; other values are unchanged."""
+    """Return a text with the z of d_z as a subscript; other values are unchanged."""
     if isinstance(value, Markup) or not isinstance(value, str) or "d_z" not in value:
         return value
     return Markup(with_d_z(Markup.escape(value), "d<sub>z</sub>"))  # noqa: S704 - the text is escaped
@@ -77,41 +77,41 @@ def render(template: str, **values: Any) -> Markup:
     return Markup(_environment().get_template(template).render(**values))  # noqa: S704 - the template escapes
 
 
-def _part(macro: str, *values: object) -> Markup:
+def _render_macro(macro: str, *values: object) -> Markup:
     return Markup(getattr(_environment().get_template("parts.html").module, macro)(*values))  # noqa: S704
 
 
 def heading(level: int, words: str) -> Markup:
     """Return a heading."""
-    return _part("heading", level, words)
+    return _render_macro("heading", level, words)
 
 
 def paragraph(words: str, kind: str = "") -> Markup:
     """Return a paragraph of ``kind`` (a class of the style)."""
-    return _part("paragraph", words, kind)
+    return _render_macro("paragraph", words, kind)
 
 
 def try_part(
     failures: Failures, what: str, title: Markup, make: Callable[[], Iterable[str]], *, block: str | None = None
 ) -> list[str]:
-    """Return a part of the page or, if it fails, its title and the reason; the failure is recorded."""
-    made = failures.attempt(what, lambda: list(make()), block=block)
-    return [title, box([paragraph(f"Not available: {made.why}.")], "care")] if isinstance(made, Failure) else made
+    """Return a part of the page or, if it fails, its title and the reason; record the failure."""
+    part = failures.attempt(what, lambda: list(make()), block=block)
+    return [title, box([paragraph(f"Not available: {part.why}.")], "care")] if isinstance(part, Failure) else part
 
 
 def chunks(parts: Sequence[str]) -> list[list[str]]:
     """Return the parts of a section grouped by heading."""
-    found: list[list[str]] = []
+    groups: list[list[str]] = []
     for part in parts:
-        if not found or part.startswith("<h3"):
-            found.append([])
-        found[-1].append(part)
-    return found
+        if not groups or part.startswith("<h3"):
+            groups.append([])
+        groups[-1].append(part)
+    return groups
 
 
 def bullets(lines: Iterable[str]) -> Markup:
     """Return a bullet list; empty without lines."""
-    return _part("bullets", lines)
+    return _render_macro("bullets", lines)
 
 
 def table(
@@ -122,8 +122,8 @@ def table(
     A table with many rows is always ``folded``.
     """
     kinds = ["" if place < words or place >= len(head) - last else "n" for place in range(len(head))]
-    cells = [[(kind or _width(cell), cell) for kind, cell in zip(kinds, row, strict=True)] for row in rows]
-    return _part("table", list(zip(kinds, head, strict=True)), cells, folded or len(cells) > _FOLDED)
+    cells = [[(kind or _text_cell_class(cell), cell) for kind, cell in zip(kinds, row, strict=True)] for row in rows]
+    return _render_macro("table", list(zip(kinds, head, strict=True)), cells, folded or len(cells) > _FOLDED)
 
 
 def table_of(
@@ -143,31 +143,31 @@ def ends_of(interval: Callable[[Any], object], level: float = 0.95) -> tuple[tup
     )
 
 
-def _width(words: str) -> str:
+def _text_cell_class(words: str) -> str:
     """Return the CSS class of a text cell; only sentences are wrapped."""
     return "long" if len(words) > LONG else "words" if len(words) > _SHORT else ""
 
 
 def box(parts: Iterable[Markup], kind: str = "box") -> Markup:
-    """Return related parts in one box."""
-    return _part("box", parts, kind)
+    """Return parts in one box; ``kind`` is a class of the style."""
+    return _render_macro("box", parts, kind)
 
 
-def picture(one: Picture, *, beside: bool = False) -> Markup:
+def picture(figure: Picture, *, beside: bool = False) -> Markup:
     """Return a figure with its caption, inlined with the page's colours and font.
 
     The caption of a figure ``beside`` an answer is omitted.
     """
-    if "svg" not in one.files:
-        width, png = round(0.4 * int.from_bytes(one.files["png"][16:20])), one.files["png"]
-        drawing = _part("png", width, one.caption, base64.b64encode(png).decode("ascii"))
+    if "svg" not in figure.files:
+        width, png = round(0.4 * int.from_bytes(figure.files["png"][16:20])), figure.files["png"]
+        drawing = _render_macro("png", width, figure.caption, base64.b64encode(png).decode("ascii"))
     else:
-        drawing = _inline_svg(one.files["svg"].decode(), one.caption)
-    return _part("picture", drawing, "" if beside else one.caption)
+        drawing = _inline_svg(figure.files["svg"].decode(), figure.caption)
+    return _render_macro("picture", drawing, "" if beside else figure.caption)
 
 
-def _inline_svg(svg: str, words: str) -> Markup:
-    """Return an SVG's drawing with the page's colours; white text and its background are kept."""
+def _inline_svg(svg: str, caption: str) -> Markup:
+    """Return an SVG for inlining, with the page's colours; texts on a coloured background keep theirs."""
     parts = _LETTERS.split(HEAD.sub("", svg))
     parts[::2] = [_COLOUR.sub(lambda match: f"var(--{_VARIABLES[match[0].lower()]})", part) for part in parts[::2]]
     parts[1::2] = [
@@ -176,13 +176,13 @@ def _inline_svg(svg: str, words: str) -> Markup:
     ]
     width = round(_PX_PER_PT * float(size[1])) if (size := _SIZE.search(svg)) else 600
     share = min(100, round(100 * width / (_PX_PER_PT * _BESIDE_PT)))
-    view = size[0] if size else ""
-    root = re.sub(r' (?:width|height)="[^"]*"', "", view, count=2)
-    label = Markup.escape(words)
-    least = math.ceil(_LEAST_LETTERS_PX / SMALL * float(size[1])) if size else 0
-    look = f"width: {width}px; --share: {share}%; --least: {least}px"
-    shown = root.replace("<svg ", f'<svg role="img" aria-label="{label}" style="{look}" ', 1)
-    return Markup("".join(parts).replace(view, shown, 1))  # noqa: S704 - matplotlib escapes its texts
+    svg_tag = size[0] if size else ""
+    root_tag = re.sub(r' (?:width|height)="[^"]*"', "", svg_tag, count=2)
+    label = Markup.escape(caption)
+    least_px = math.ceil(_LEAST_LETTERS_PX / SMALL * float(size[1])) if size else 0
+    css = f"width: {width}px; --share: {share}%; --least: {least_px}px"
+    styled_tag = root_tag.replace("<svg ", f'<svg role="img" aria-label="{label}" style="{css}" ', 1)
+    return Markup("".join(parts).replace(svg_tag, styled_tag, 1))  # noqa: S704 - matplotlib escapes its texts
 
 
 @cache

@@ -1,4 +1,4 @@
-"""A figure laid out like a page, what it is drawn from, and its bytes in each form."""
+"""Figures laid out in points, the data they are drawn from, and their files in each format."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -26,10 +26,10 @@ from study_app.protocol.participants import EACH_GROUP
 
 MARGIN_PT = 4.0
 SMALL = 7.2
-"""Of the smallest text [pt]: 11 px where a window of 1366 px shows the figure."""
+"""Size of the smallest text [pt]: 11 px if a window 1366 px wide shows the figure."""
 
 Style: TypeAlias = dict[str, Any]
-"""How marks of a figure look, as arguments of matplotlib."""
+"""Arguments of matplotlib for the appearance of a figure's marks."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -155,10 +155,10 @@ class Sheet:
         baseline, x, right = 15.0, MARGIN_PT, self.width_pt - MARGIN_PT
         widths = [self.text_width(mark.words, SMALL, "bold") + 11 for mark in marks]
         room = right - x - 18 - sum(widths) - 5 * len(widths) - self.text_width(counts[-1], 7.5)
-        whole = title
+        cut = title
         while title and self.text_width(title, 10, "bold") > room:
-            whole = whole[:-1]
-            title = f"{whole.rstrip()}…" if whole else ""
+            cut = cut[:-1]
+            title = f"{cut.rstrip()}…" if cut else ""
         self.text(x, baseline, title, size=10, weight="bold")
         x += self.text_width(title, 10, "bold") + 8
         for mark, width in zip(marks, widths, strict=True):
@@ -178,14 +178,14 @@ POINT: Final[Style] = {
     "markeredgewidth": 0.4,
     "markeredgecolor": "#ffffff",
 }
-"""Of a participant's number; the edge separates points that touch."""
+"""The point of one participant; the edge separates points that touch."""
 
 
 def spread_points(places_pt: Sequence[float] | NDArray[np.float64], most_pt: float) -> NDArray[np.float64]:
-    """Return an offset [pt] across the scale for each point, so that points overlap only if there is no room.
+    """Return an offset [pt] across the scale for each point, so that points overlap only if there is no space.
 
-    Offsets lie within ±``most_pt``; points that have room to both sides have none. Without room for all, points are
-    placed between others, a quarter of a point apart or more.
+    Offsets lie within ±``most_pt`` and are 0 for points far from all others. If there is no space left, a point is
+    placed where it overlaps the others least.
     """
     places, apart = np.asarray(places_pt, dtype=float), POINT["markersize"] + POINT["markeredgewidth"]
     step = apart / 4
@@ -201,7 +201,7 @@ def spread_points(places_pt: Sequence[float] | NDArray[np.float64], most_pt: flo
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """The common elements of every figure: title, marks, texts on n (longest first), and fonts."""
+    """The elements that all figures have: title, marks, texts on n (longest first), and fonts."""
 
     title: str
     marks: Sequence[Mark]
@@ -248,14 +248,14 @@ class Picture:
 
 
 FigureTask: TypeAlias = tuple[str, str, Callable[[], Picture | None]]
-"""The ID of a block, a file name, and what draws the figure if there are data."""
+"""The ID of a block, a file name, and the function that draws the figure, or returns None without data."""
 
 
 def draw_figures(tasks: Iterable[FigureTask], failures: Failures | None = None) -> Iterator[Picture]:
     """Yield the figures; one that fails is omitted and added to ``failures``."""
-    held = Failures() if failures is None else failures
+    collected = Failures() if failures is None else failures
     for block, name, draw in tasks:
-        drawn = held.attempt(f"figure {name}", draw, block=block)
+        drawn = collected.attempt(f"figure {name}", draw, block=block)
         if drawn is not None and not isinstance(drawn, Failure):
             yield drawn
 
@@ -271,7 +271,7 @@ def picture_of(
     counts: Sequence[str] | None = None,
     numbers: str = "",
 ) -> Picture:
-    """Return the figure that ``draw`` draws in each format; ``counts`` give n if it differs from the study's."""
+    """Return a figure drawn by ``draw`` in each of ``forms``; ``counts`` are texts on n, by default the study's."""
     people = (counted(study.n, "participant"),) if counts is None else counts
     drawn = draw(Look(title, study_marks(study), people, style.fonts())).figure
     files = {form: style.file_bytes(drawn, form, f"{study.name}: {title}") for form in forms}
@@ -288,7 +288,7 @@ def tab_separated(study: Study, table: pd.DataFrame) -> str:
 
 
 def sample_words(study: Study, n: int) -> str:
-    """Return the last sentence of a caption: who took part."""
+    """Return the last sentence of a caption, on the number of participants."""
     return f"{capitalised(counted(n, 'participant'))}{' (SIMULATED, not people)' if study.simulated else ''}."
 
 
@@ -311,5 +311,5 @@ class Drawing:
     def picture(
         self, title: str, caption: str, draw: Callable[[Look], Sheet], counts: Sequence[str] = ("",), numbers: str = ""
     ) -> Picture:
-        """Return the figure that ``draw`` draws in each format."""
+        """Return the figure drawn by ``draw`` in each format."""
         return picture_of(self.study, self.block.id, self.name, title, caption, draw, self.forms, counts, numbers)

@@ -1,4 +1,4 @@
-"""Sessions that meet a planned rule of exclusion: what is proposed and decided, and the conclusions both ways."""
+"""Sessions that meet a planned exclusion rule: proposals, decisions, and the results with and without the sessions."""
 
 from __future__ import annotations
 
@@ -65,9 +65,9 @@ def planned_exclusions(study: Study, results: Results) -> PlannedExclusions | No
 
 
 def proposals(study: Study, results: Results | None) -> tuple[Proposal, ...]:
-    """Return the sessions that meet a rule or answer below chance, each with the decision about it.
+    """Return the sessions that meet a rule or have answers below chance, each with the decision about it.
 
-    Without ``results`` no threshold is known.
+    Without ``results``, the rule on thresholds is not applied.
     """
     planned = _planned_limits(study)
     excluded = (
@@ -90,10 +90,10 @@ def proposals(study: Study, results: Results | None) -> tuple[Proposal, ...]:
     met = (
         Proposal(participant=str(who), session=int(session), rule=rule, why=why)
         for rule, rows in (
-            ("below_chance", _below_chance(study)),
-            ("threshold_beyond_levels", _beyond_levels(study, results)),
-            ("constant_answers", _constant(study, planned.get("constant_answers"))),
-            ("fast_answers", _fast(study, planned.get("fast_answers"))),
+            ("below_chance", _sessions_below_chance(study)),
+            ("threshold_beyond_levels", _thresholds_beyond_levels(study, results)),
+            ("constant_answers", _constant_answers(study, planned.get("constant_answers"))),
+            ("fast_answers", _fast_answers(study, planned.get("fast_answers"))),
         )
         if rule in planned or rule == "below_chance"
         for (who, session), why in rows
@@ -104,7 +104,7 @@ def proposals(study: Study, results: Results | None) -> tuple[Proposal, ...]:
         else proposal
         for proposal in met
     )
-    return tuple(sorted((*excluded, *decided), key=lambda one: (*one.what, one.rule)))
+    return tuple(sorted((*excluded, *decided), key=lambda proposal: (*proposal.what, proposal.rule)))
 
 
 def _planned_limits(study: Study) -> dict[Any, float | None]:
@@ -119,7 +119,7 @@ def rule_conditions(study: Study) -> dict[str, str]:
 
 
 def rule_sentences(study: Study, results: Results | None) -> tuple[str, ...]:
-    """Return each planned rule and how many sessions met it, as in `proposals`."""
+    """Return a sentence on each planned rule and the number of sessions that met it, as in `proposals`."""
     conditions = rule_conditions(study)
     met = Counter(proposal.rule for proposal in proposals(study, results)) if conditions else Counter()
     return tuple(
@@ -134,20 +134,20 @@ def _met_words(sessions: int, *, is_known: bool) -> str:
     return f"{capitalised(counted(sessions, 'session')) if sessions else 'No session'} met this rule."
 
 
-_Rows = Iterator[tuple[Any, str]]
+_SessionReasons = Iterator[tuple[Any, str]]
 
 
-def _below_chance(study: Study) -> _Rows:
+def _sessions_below_chance(study: Study) -> _SessionReasons:
     if study.revealed and study.levels:
-        for one in below_chance(tracks(replace(study, with_below_chance=True)), study.levels):
+        for session in below_chance(tracks(replace(study, with_below_chance=True)), study.levels):
             yield (
-                (one.participant, one.session),
-                f"{one.right} of {one.n} answers in {one.block} are correct, which is fewer than expected by chance "
-                f"({p_equals(one.p)}); the answer keys may have been swapped",
+                (session.participant, session.session),
+                f"{session.right} of {session.n} answers in {session.block} are correct, which is fewer than expected "
+                f"by chance ({p_equals(session.p)}); the answer keys may have been swapped",
             )
 
 
-def _beyond_levels(study: Study, results: Results | None) -> _Rows:
+def _thresholds_beyond_levels(study: Study, results: Results | None) -> _SessionReasons:
     sessions = study.participants[study.participants["counted"]]
     for block in () if results is None else results.levels:
         for row in block.statistics.get("thresholds", ()):
@@ -159,7 +159,7 @@ def _beyond_levels(study: Study, results: Results | None) -> _Rows:
                     )
 
 
-def _constant(study: Study, limit: float | None) -> _Rows:
+def _constant_answers(study: Study, limit: float | None) -> _SessionReasons:
     answers = study.responses[study.responses["counted"] & study.responses["response"].notna()]
     for session, rows in answers.groupby(SESSION):
         most = int(rows["response"].value_counts().max())
@@ -167,17 +167,17 @@ def _constant(study: Study, limit: float | None) -> _Rows:
             yield session, f"{percent(most / len(rows))} of the {len(rows)} answers to statements are identical"
 
 
-def _fast(study: Study, limit: float | None) -> _Rows:
+def _fast_answers(study: Study, limit: float | None) -> _SessionReasons:
     answers = study.answered[study.answered["counted"]]
     times = (answers["first_choice_s"] - answers["onset_s"]).astype("Float64")
-    for session, some in times.dropna().groupby([answers[name] for name in SESSION]):
-        median = float(some.median())
+    for session, session_times in times.dropna().groupby([answers[name] for name in SESSION]):
+        median = float(session_times.median())
         if limit is not None and median < limit:
-            yield session, f"half of the {len(some)} answers were given within {number(median)} s"
+            yield session, f"half of the {len(session_times)} answers were given within {number(median)} s"
 
 
 def undecided(study: Study, results: Results | None) -> tuple[Exclusion, ...]:
-    """Return the proposed exclusions that await a decision; they have no time yet."""
+    """Return the proposed exclusions that await a decision; their time is empty."""
     return tuple(
         Exclusion(
             participant=proposal.participant,
@@ -195,12 +195,12 @@ def undecided(study: Study, results: Results | None) -> tuple[Exclusion, ...]:
 def _exclude_sessions(study: Study, sessions: Collection[tuple[str, int]]) -> Study:
     """Return the study as if these sessions were excluded."""
 
-    def masked(table: pd.DataFrame) -> pd.DataFrame:
+    def without_sessions(table: pd.DataFrame) -> pd.DataFrame:
         if "counted" not in table:
             return table
         of_rows = zip(table["participant"].astype(str), table["session"].astype(int), strict=True)
-        stays = pd.Series([what not in sessions for what in of_rows], index=table.index, dtype=bool)
-        return table.assign(counted=table["counted"] & stays)
+        is_kept = pd.Series([what not in sessions for what in of_rows], index=table.index, dtype=bool)
+        return table.assign(counted=table["counted"] & is_kept)
 
-    tables: dict[str, Any] = {name: masked(getattr(study, name)) for name in _TABLES}
+    tables: dict[str, Any] = {name: without_sessions(getattr(study, name)) for name in _TABLES}
     return replace(study, **tables)

@@ -1,4 +1,4 @@
-"""Questions that no block of statements holds: their answers, measures and scores."""
+"""Questions other than statements after trials: measures of their answers, and scores of questionnaires."""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
@@ -20,9 +20,9 @@ Numbers: TypeAlias = Mapping[str, Any]
 
 @dataclass(frozen=True, slots=True)
 class Measure:
-    """A measure.
+    """A measure of the answers to a question.
 
-    ``of`` returns the numbers of a group of answers by name, from rows with ``response``, ``value`` and
+    ``of`` computes the numbers of a group of answers by name, from rows with ``response``, ``value`` and
     ``cannot_judge``. ``cells`` returns the cells of a table row by heading; a measure without cells lists its
     ``texts``.
     """
@@ -33,7 +33,7 @@ class Measure:
 
 
 def given_answers(answers: pd.DataFrame) -> pd.DataFrame:
-    """Return the answers without missing ones and those off the scale."""
+    """Return the answers on the scale, without missing ones."""
     return answers[answers["response"].notna()]
 
 
@@ -58,7 +58,7 @@ def _quartile_cells(numbers: Numbers) -> dict[str, str]:
     }
 
 
-def _distribution(_asked: PlacedQuestion, answers: pd.DataFrame) -> Numbers:
+def _distribution(_question: PlacedQuestion, answers: pd.DataFrame) -> Numbers:
     values = given_answers(answers)["value"].to_numpy(dtype=float)
     return {
         **counts_of_missing(answers),
@@ -69,7 +69,7 @@ def _distribution(_asked: PlacedQuestion, answers: pd.DataFrame) -> Numbers:
     }
 
 
-def _distribution_cells(_asked: PlacedQuestion, numbers: Numbers) -> dict[str, str]:
+def _distribution_cells(_question: PlacedQuestion, numbers: Numbers) -> dict[str, str]:
     least, most = numbers["smallest"], numbers["largest"]
     return {
         "n": str(numbers["n"]),
@@ -82,20 +82,20 @@ def _distribution_cells(_asked: PlacedQuestion, numbers: Numbers) -> dict[str, s
 _DISTRIBUTION: Final = Measure("distribution", _distribution, _distribution_cells)
 
 
-def _option_counts(asked: PlacedQuestion, answers: pd.DataFrame) -> Numbers:
-    chosen = [asked.question.counted(str(response)) for response in given_answers(answers)["response"]]
+def _option_counts(question: PlacedQuestion, answers: pd.DataFrame) -> Numbers:
+    chosen = [question.question.counted(str(response)) for response in given_answers(answers)["response"]]
     return {
         **counts_of_missing(answers),
-        "counts": {option: sum(option in one for one in chosen) for option in asked.levels},
+        "counts": {option: sum(option in answer for answer in chosen) for option in question.levels},
     }
 
 
-def _option_cells(asked: PlacedQuestion, numbers: Numbers) -> dict[str, str]:
+def _option_cells(question: PlacedQuestion, numbers: Numbers) -> dict[str, str]:
     total = numbers["n"] or 1
     return {
         **{
-            words: f"{(count := numbers['counts'][option])} ({100 * count / total:.0f} %)"
-            for option, words in asked.levels.items()
+            text: f"{(count := numbers['counts'][option])} ({100 * count / total:.0f} %)"
+            for option, text in question.levels.items()
         },
         "n": str(numbers["n"]),
         "missing": str(numbers["missing"]),
@@ -105,16 +105,16 @@ def _option_cells(asked: PlacedQuestion, numbers: Numbers) -> dict[str, str]:
 _OPTION_COUNTS: Final = Measure("counts", _option_counts, _option_cells)
 
 
-def _point_counts(asked: PlacedQuestion, answers: pd.DataFrame) -> Numbers:
+def _point_counts(question: PlacedQuestion, answers: pd.DataFrame) -> Numbers:
     chosen = given_answers(answers)["response"].value_counts()
     return {
         **counts_of_missing(answers),
-        "counts": {point: int(chosen.get(point, 0)) for point in asked.levels},
+        "counts": {point: int(chosen.get(point, 0)) for point in question.levels},
         **quartiles_or_none(given_answers(answers)["value"].to_numpy(dtype=float))._asdict(),
     }
 
 
-def _point_cells(_asked: PlacedQuestion, numbers: Numbers) -> dict[str, str]:
+def _point_cells(_question: PlacedQuestion, numbers: Numbers) -> dict[str, str]:
     return {
         **{point: str(count) for point, count in numbers["counts"].items()},
         "n": str(numbers["n"]),
@@ -126,56 +126,60 @@ def _point_cells(_asked: PlacedQuestion, numbers: Numbers) -> dict[str, str]:
 _POINT_COUNTS: Final = Measure("rating", _point_counts, _point_cells)
 
 
-def _texts(_asked: PlacedQuestion, answers: pd.DataFrame) -> Numbers:
+def _listed_texts(_question: PlacedQuestion, answers: pd.DataFrame) -> Numbers:
     texts = given_answers(answers).sort_values(["participant", "session"], kind="stable")
     pairs = zip(texts["participant"], texts["response"], strict=True)
     return {**counts_of_missing(answers), "texts": [f"{person}: {text}" for person, text in pairs]}
 
 
-_TEXTS: Final = Measure("texts", _texts, None)
+_TEXTS: Final = Measure("texts", _listed_texts, None)
 
 
 MEASURES: Final = {measure.id: measure for measure in (_POINT_COUNTS, _OPTION_COUNTS, _DISTRIBUTION, _TEXTS)}
-"""Every measure by the id that a kind of question names it by."""
+"""All measures by the ID with which a kind of question selects one."""
 
-_ONE: Final = ["participant", "session", "trial"]
+_QUESTIONNAIRE_COLUMNS: Final = ["participant", "session", "trial"]
 
 
 def question_results(study: Study) -> tuple[QuestionResult, ...]:
     """Return the numbers of every question in session order."""
-    return tuple(_question_result(study, asked) for asked in study.others.questions)
+    return tuple(_question_result(study, question) for question in study.others.questions)
 
 
 def score_results(study: Study) -> tuple[ScoreResult, ...]:
     """Return every score in session order."""
-    return tuple(_score(study, asked) for asked in study.others.scores)
+    return tuple(_score_result(study, score) for score in study.others.scores)
 
 
-def _question_result(study: Study, asked: PlacedQuestion) -> QuestionResult:
-    measure, parts = by_name(MEASURES, asked.question.measure), groups_shown(study)
+def _question_result(study: Study, question: PlacedQuestion) -> QuestionResult:
+    measure, parts = by_name(MEASURES, question.question.measure), groups_shown(study)
     return QuestionResult(
-        where=asked.where.id,
-        title=asked.where.title,
-        is_form=asked.where.is_form,
-        item=asked.id,
-        text=asked.text,
-        short=asked.short,
-        kind=asked.question.kind_id,
+        where=question.where.id,
+        title=question.where.title,
+        is_form=question.where.is_form,
+        item=question.id,
+        text=question.text,
+        short=question.short,
+        kind=question.question.kind_id,
         measure=measure.id,
-        figure=asked.question.figure,
+        figure=question.question.figure,
         groups=tuple(
-            GroupAnswers(code, group if group and code is None else with_group(name, group), measure.of(asked, rows))
-            for of_groups in zip(*(_groups(asked.where, part.answers_to(asked)) for _, part in parts), strict=True)
+            GroupAnswers(code, group if group and code is None else with_group(name, group), measure.of(question, rows))
+            for of_groups in zip(
+                *(_answers_by_setting(question.where, part.answers_to(question)) for _, part in parts), strict=True
+            )
             for (group, _), (code, name, rows) in zip(parts, of_groups, strict=True)
         ),
-        options=asked.levels,
+        options=question.levels,
         weighs=any(
-            asked.id in score.score.weights_from for score in study.others.scores if score.where.id == asked.where.id
+            question.id in score.score.weights_from
+            for score in study.others.scores
+            if score.where.id == question.where.id
         ),
     )
 
 
-def _groups(where: QuestionPlace, answers: pd.DataFrame) -> Iterator[tuple[str | None, str, pd.DataFrame]]:
+def _answers_by_setting(where: QuestionPlace, answers: pd.DataFrame) -> Iterator[tuple[str | None, str, pd.DataFrame]]:
     """Yield the answers about each setting with code and name, or all answers in a form that is asked once."""
     if not where.settings:
         yield None, "All", answers
@@ -183,39 +187,39 @@ def _groups(where: QuestionPlace, answers: pd.DataFrame) -> Iterator[tuple[str |
         yield setting.code, where.name(setting), answers[answers["code"] == setting.code]
 
 
-def scored(study: Study, asked: PlacedScore) -> pd.DataFrame:
+def scored(study: Study, placed_score: PlacedScore) -> pd.DataFrame:
     """Return one row per completed questionnaire: ``participant``, ``code`` and ``score``."""
-    rows = pd.concat([study.answers_to(question) for question in asked.questions])
-    bounds = {question.id: question.bounds for question in asked.questions}
+    rows = pd.concat([study.answers_to(question) for question in placed_score.questions])
+    bounds = {question.id: question.bounds for question in placed_score.questions}
     scores: list[dict[str, Any]] = []
-    one = _ONE if not asked.where.is_form else [*_ONE, "code"]
-    for (participant, *_), answers in rows.groupby(one, dropna=False, sort=True):
+    columns = _QUESTIONNAIRE_COLUMNS if not placed_score.where.is_form else [*_QUESTIONNAIRE_COLUMNS, "code"]
+    for (participant, *_), answers in rows.groupby(columns, dropna=False, sort=True):
         answered = {
             str(item): str(response) if pd.isna(value) else float(value)
             for item, response, value in zip(answers["item"], answers["response"], answers["value"], strict=True)
             if not pd.isna(response)
         }
-        code = str(answers["code"].iloc[0]) if asked.where.settings else None
-        scores.append({"participant": participant, "code": code, "score": asked.score.compute(answered, bounds)})
+        code = str(answers["code"].iloc[0]) if placed_score.where.settings else None
+        scores.append({"participant": participant, "code": code, "score": placed_score.score.compute(answered, bounds)})
     return pd.DataFrame(scores, columns=["participant", "code", "score"])
 
 
-def _score(study: Study, asked: PlacedScore) -> ScoreResult:
-    known = asked.instrument is not None and asked.instrument in Instrument.names()
+def _score_result(study: Study, score: PlacedScore) -> ScoreResult:
+    known = score.instrument is not None and score.instrument in Instrument.names()
     return ScoreResult(
-        where=asked.where.id,
-        title=asked.where.title,
-        name=asked.name,
-        instrument=asked.instrument,
-        source=str(Instrument(asked.instrument).table["source"]) if known and asked.instrument is not None else None,
+        where=score.where.id,
+        title=score.where.title,
+        name=score.name,
+        instrument=score.instrument,
+        source=str(Instrument(score.instrument).table["source"]) if known and score.instrument is not None else None,
         groups=tuple(
-            GroupAnswers(code, name, _summary(rows["score"].dropna().to_numpy(dtype=float)))
-            for code, name, rows in _groups(asked.where, scored(study, asked))
+            GroupAnswers(code, name, _score_summary(rows["score"].dropna().to_numpy(dtype=float)))
+            for code, name, rows in _answers_by_setting(score.where, scored(study, score))
         ),
     )
 
 
-def _summary(values: Any) -> dict[str, Any]:
+def _score_summary(values: Any) -> dict[str, Any]:
     n = len(values)
     return {
         "n": n,

@@ -1,6 +1,6 @@
-"""What an evaluation finds, as frozen values, and how findings are put into words.
+"""The results of an evaluation as frozen dataclasses, and their texts in reports.
 
-Nothing in them is NaN or infinite: what does not exist is None.
+Numbers are never NaN or infinite; a value that does not exist is None.
 """
 
 import re
@@ -52,7 +52,7 @@ class Delivered:
 _T = TypeVar("_T")
 _U = TypeVar("_U")
 Progress: TypeAlias = Callable[[str, float], object]
-"""Receives what is being done, and which share of all is done (0 to 1); what it raises ends the evaluation."""
+"""Called with the current activity and the share done (0 to 1); an exception that it raises ends the evaluation."""
 
 
 def report_no_progress(_what: str, _share: float) -> None:
@@ -61,7 +61,7 @@ def report_no_progress(_what: str, _share: float) -> None:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Failure:
-    """A part (``what``, of a block or of none) that could not be computed: the error and its location."""
+    """A part of the results (``what``) that could not be computed: the error and its location in the program."""
 
     what: str
     error: str
@@ -80,7 +80,10 @@ class Failure:
 
 
 class Ended(BaseException):
-    """The evaluation is ended: an exception of the progress function, which is no failure of the calling part."""
+    """Ends the evaluation with an exception of the progress function.
+
+    It is a BaseException, so that the part that called the function is not recorded as failed.
+    """
 
     def __init__(self, error: BaseException) -> None:
         super().__init__(str(error))
@@ -88,7 +91,7 @@ class Ended(BaseException):
 
 
 class Failures:
-    """The failures of one report."""
+    """Collects the failures of one report."""
 
     def __init__(self, found: Iterable[Failure] = ()) -> None:
         self.found = list(found)
@@ -99,10 +102,10 @@ class Failures:
             return compute()
         except Exception as error:  # noqa: BLE001 - a failing part must not prevent the report
             last = traceback.extract_tb(error.__traceback__)[-1]
-            words, where = f"{type(error).__name__}: {error}", f"{Path(last.filename).name}, line {last.lineno}"
-            if isinstance(said := explain_error(error), PlugInError):
-                words, where = str(said), ""
-            failure = Failure(what=what, error=words, where=where, block=block)
+            message, where = f"{type(error).__name__}: {error}", f"{Path(last.filename).name}, line {last.lineno}"
+            if isinstance(explained := explain_error(error), PlugInError):
+                message, where = str(explained), ""
+            failure = Failure(what=what, error=message, where=where, block=block)
             self.found.append(failure)
             return failure
 
@@ -113,8 +116,8 @@ class Failures:
 
 
 Verdict: TypeAlias = Literal["shown", "suggested", "not shown", "out of reach", "not tested"]
-"""What may be said: ``shown`` (primary), ``suggested`` (exploratory), ``not shown``, ``out of reach`` of so few
-participants however they had answered, or ``not tested``. None of them says that there is nothing."""
+"""The conclusion of a test: ``shown`` (primary), ``suggested`` (exploratory), ``not shown``, ``out of reach`` (so few
+participants could not show an effect) or ``not tested``. None of them is evidence that there is no effect."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -169,7 +172,7 @@ class BlockResult:
 
 @dataclass(frozen=True, slots=True)
 class GroupAnswers:
-    """The numbers of the answers about one setting, or (``code`` None) of all."""
+    """Summary numbers of the answers about one setting, or about all settings if ``code`` is None."""
 
     code: str | None
     name: str
@@ -259,7 +262,7 @@ class LevelsResult:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ContrastSide:
-    """One side of a hypothesis: the number of each participant, and their mean with its interval.
+    """One side of a hypothesis: the value of each participant, and their mean with its interval.
 
     The mean is that of the test: of logarithms for a ratio, with the weights of the group means. ``sd`` is the standard
     deviation between participants and ``standard_error`` that of the mean, of logarithms for a ratio.
@@ -279,17 +282,16 @@ class ContrastResult(Outcome):
     """The test of the ``compared`` quantity; the effect is first ÷ second with ``ratio``, otherwise first − second.
 
     ``n`` participants are compared; ``left_out`` are the others with the reasons. ``higher`` is the number of
-    participants with a higher number in the first; None between groups. ``p_bootstrap`` and ``p_skewed`` (t corrected
-    for skewness) must show the difference, too. ``equivalent`` tells whether the effect is
-    shown to lie within the study's bound, by ``p_equivalent``, which is corrected over the hypotheses with a bound;
-    None without a bound. ``not_excluded`` is then the upper limit of the 95 % interval of the share of participants
-    that differ by more. ``sides`` are the numbers of those compared, ``sd`` is the standard deviation of the
-    differences within participants; ``standardised`` is d_z or g, ``ordinal`` is Cliff's delta of answers to a
-    statement, and ``bayes_factor`` the ratio of the likelihoods with and without a difference. ``within_names`` are the
-    names of the blocks or conditions of an interaction, ``cells`` the numbers of each group under each of them, group
-    by group, ``measure_name`` is the measure in words, and ``block_title`` is that of the first block.
-    ``standard_error`` is that of the mean difference, of logarithms for a ratio, and ``freedom`` are the degrees of
-    freedom of t.
+    participants with a higher value on the first side; None between groups. ``p_bootstrap`` and ``p_skewed`` (t
+    corrected for skewness) must also show the difference. ``equivalent`` tells whether the effect is shown to lie
+    within the study's bound, by ``p_equivalent``, which is corrected over the hypotheses with a bound; None without a
+    bound. ``not_excluded`` is then the upper limit of the 95 % interval of the share of participants that differ by
+    more. ``sides`` are the numbers of those compared, ``sd`` is the standard deviation of the differences within
+    participants; ``standardised`` is d_z or g, ``ordinal`` is Cliff's delta of answers to a statement, and
+    ``bayes_factor`` the ratio of the likelihoods with and without a difference. ``within_names`` are the names of the
+    blocks or conditions of an interaction, ``cells`` the numbers of each group under each of them, group by group,
+    ``measure_name`` is the measure in words, and ``block_title`` is that of the first block. ``standard_error`` is that
+    of the mean difference, of logarithms for a ratio, and ``freedom`` are the degrees of freedom of t.
     """
 
     contrast: Contrast
@@ -332,7 +334,7 @@ class ContrastResult(Outcome):
 
     @property
     def effect_words(self) -> str:
-        """What the two sides are compared in, with the titles that participants or operators see."""
+        """The compared quantity as text, with the titles that participants or operators see."""
         return self.contrast.effect_words(self.within_names, self.measure_name, self.block_title)
 
     @property
@@ -342,7 +344,7 @@ class ContrastResult(Outcome):
 
     @property
     def largest_p(self) -> float | None:
-        """The p before correction: all tests must show a difference. None if nothing could be tested."""
+        """The largest uncorrected p, because all tests must show a difference; None if nothing was tested."""
         return max((p for p in (self.p, self.p_bootstrap, self.p_skewed) if p is not None), default=None)
 
 
@@ -377,7 +379,7 @@ BADGES: Final = {
     "not shown": "not significant",
     "out of reach": "too few participants",
 }
-"""Verdicts as the first page and the table of hypotheses name them."""
+"""The names of verdicts on the first page and in the table of hypotheses."""
 
 VERDICTS_MEAN: Final = (
     "Shown (“significant” on the first page): the adjusted p value is at most {alpha}. Suggested (“significant, "
@@ -398,18 +400,18 @@ def beyond_phrase(tested: Equivalence) -> str:
     return f"{tested.beyond.count} of {tested.beyond.n} [{100 * ends.low:.0f}, {100 * ends.high:.0f}] %"
 
 
-def settings_noun(found: BlockResult | Block) -> str:
-    """Return the noun for what a block compares: "liquid", "delay" or "view"; "condition" while the key is sealed."""
-    return found.kind.removesuffix("s") if found.revealed else "condition"
+def settings_noun(block: BlockResult | Block) -> str:
+    """Return the noun for a block's settings: "liquid", "delay" or "view"; "condition" while the key is sealed."""
+    return block.kind.removesuffix("s") if block.revealed else "condition"
 
 
 def short_text(result: BlockResult, item: str) -> str:
     """Return the short text of a statement."""
-    return next(one.short for one in result.items if one.id == item)
+    return next(statement.short for statement in result.items if statement.id == item)
 
 
 def name(result: BlockResult, code: str) -> str:
-    """Return the name of a setting; only the delay in ms in a block of delays, which has one liquid."""
+    """Return the name of a setting; in a block of delays, which has only one liquid, the delay."""
     for setting, text in zip(result.settings, result.names, strict=True):
         if setting.code == code:
             return ms(setting.delay_ms or 0.0) if result.delays_ms else text
@@ -422,7 +424,7 @@ def lead_phrase(result: BlockResult) -> str:
 
 
 def statistic(outcome: Outcome) -> str:
-    """Return a statistic with its sign."""
+    """Return a statistic as text: its symbol and value."""
     return f"{statistic_symbol(outcome)} {number(outcome.statistic)}"
 
 
@@ -431,7 +433,7 @@ def statistic_symbol(outcome: Outcome) -> str:
     return outcome.statistic_name.replace("chi2", "χ²")
 
 
-def said_of_presentations(result: BlockResult) -> tuple[str, ...]:
+def presentation_sentences(result: BlockResult) -> tuple[str, ...]:
     """Return sentences on repeated presentations and sessions; empty if there is one of each."""
     fewest, most = result.presentations
     lines = []
@@ -497,24 +499,25 @@ def incomplete_words(result: BlockResult) -> str:
         for person in people:
             statements.setdefault(person, []).append(f"“{short_text(result, item)}”")
     every = len(result.items)
-    who = [
+    excluded = [
         f"{person} ({'all statements' if len(items) == every else listed(items)})"
         for person, items in sorted(statements.items())
     ]
     return (
         f"Participants excluded from tests across all {settings_noun(result)}s because an answer is missing: "
-        f"{listed(who)}."
+        f"{listed(excluded)}."
     )
 
 
 def missing_sentences(result: BlockResult) -> tuple[str, ...]:
-    """Return what was not computed, one sentence per reason."""
+    """Return sentences on the results that were not computed, one for each reason."""
     reasons: dict[str, list[str]] = {}
     for not_tested in result.absent:
         reasons.setdefault(not_tested.why, []).append(not_tested.what)
     return tuple(
-        f"{listed([f'the {one}' for one in what])} {'was' if len(what) == 1 else 'were'} not computed because {why}."
+        f"{listed([f'the {part}' for part in parts])} {'was' if len(parts) == 1 else 'were'} not computed because "
+        f"{why}."
         if why != SEALED
-        else f"{listed([f'the {one}' for one in what])} {'is' if len(what) == 1 else 'are'} {why}."
-        for why, what in reasons.items()
+        else f"{listed([f'the {part}' for part in parts])} {'is' if len(parts) == 1 else 'are'} {why}."
+        for why, parts in reasons.items()
     )

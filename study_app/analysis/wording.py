@@ -1,4 +1,4 @@
-"""How numbers, intervals, p values and lists are written in sentences and tables of the report.
+"""Format numbers, intervals, p values and lists for sentences and tables of the report.
 
 Numbers have at most three significant digits, p values three decimals; report.json and tests.csv have all digits.
 """
@@ -10,7 +10,7 @@ from typing import Final, Protocol
 from study_app.number_text import MINUS, exact_text
 
 _DIGITS: Final = 3
-"""Significant digits that a sentence or a cell shows."""
+"""Significant digits in sentences and table cells."""
 _NUMBERS: Final = (
     *("no", "one", "two", "three", "four", "five", "six"),
     *("seven", "eight", "nine", "ten", "eleven", "twelve"),
@@ -21,12 +21,12 @@ _D_Z: Final = re.compile(r"\bd_z\b")
 
 
 def with_d_z(text: str, symbol: str) -> str:
-    """Return a text in which ``symbol`` stands for the effect size d_z."""
+    """Return a text with d_z, the effect size, replaced by ``symbol``."""
     return _D_Z.sub(symbol, text)
 
 
 class Ends(Protocol):
-    """An interval."""
+    """Anything with the ends of an interval."""
 
     @property
     def low(self) -> float:
@@ -70,7 +70,7 @@ def significant(value: float) -> str:
 
 
 def p_value(p: float | None) -> str:
-    """Return a p value as journals print it: .023, < .001, > .999; a dash for None."""
+    """Return a p value in the style of journals: .023, < .001, > .999; a dash for None."""
     if p is None:
         return "–"
     if p < 0.001:
@@ -79,7 +79,7 @@ def p_value(p: float | None) -> str:
 
 
 def p_equals(p: float) -> str:
-    """Return a p within a sentence: p = .023, p < .001, p > .999."""
+    """Return a p value for a sentence: p = .023, p < .001, p > .999."""
     text = p_value(p)
     return f"p = {text}" if text.startswith(".") else f"p {text}"
 

@@ -1,6 +1,6 @@
-"""Orders to the worker process that reads and evaluates studies, its answers, and its client.
+"""Messages to and from the worker process that reads and evaluates studies, and its client.
 
-The libraries and tables of an evaluation stay in that process.
+The libraries for an evaluation and its tables are only loaded in that process.
 """
 
 from collections.abc import Mapping
@@ -105,8 +105,8 @@ class StudyFound:
     """A study that could be read.
 
     ``trials`` are the main trials of each session (participant, number): number and description, by code while the key
-    is sealed. ``doubts`` are files that differ from their recorded state. ``colours`` are those of figures by purpose.
-    ``groups`` are the groups by which figures can be split.
+    is sealed. ``doubts`` are files that differ from their recorded state. ``colours`` maps purposes to the colours of
+    figures. ``groups`` are the groups by which figures can be split.
     """
 
     name: str
@@ -121,8 +121,8 @@ class StudyFound:
 
 
 @dataclass(frozen=True, slots=True)
-class Proposed:
-    """The exclusions that rules propose and that await a decision; they have no time yet.
+class ProposedExclusions:
+    """Exclusions that rules propose and that await a decision; their time is empty.
 
     ``rules`` are sentences: each planned rule, and how many sessions met it.
     """
@@ -136,8 +136,8 @@ class FigureDrawn:
     """A figure as SVG, which replaces an earlier one of the same ``key``: its ``name`` and ``split``.
 
     ``split`` is "" for all participants, the only group shown, or `EACH_GROUP` if the figure compares the groups.
-    Without ``svg``, ``caption`` gives the reason. ``numbers`` are its data as tab-separated lines. A figure of the
-    first page has the ``question`` that it answers, the ``verdict`` and the ``answer`` as sentences.
+    If there is no ``svg``, ``caption`` gives the reason. ``numbers`` are its data as tab-separated lines. A figure on
+    the first page has the ``question`` that it answers, the ``verdict`` and the ``answer`` as sentences.
     """
 
     name: str
@@ -180,7 +180,9 @@ class Done:
     warnings: tuple[str, ...] = ()
 
 
-Answer: TypeAlias = StudiesFound | SessionsFound | StudyFound | Proposed | FigureDrawn | FirstPage | Progress | Done
+Answer: TypeAlias = (
+    StudiesFound | SessionsFound | StudyFound | ProposedExclusions | FigureDrawn | FirstPage | Progress | Done
+)
 
 
 AnalysisClient: TypeAlias = WorkerClient[Order, Answer]

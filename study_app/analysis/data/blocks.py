@@ -1,7 +1,7 @@
-"""What a study asks: blocks, their settings, statements, levels and questions, and what was decided beforehand.
+"""The content of a study: blocks, settings, statements, levels, questions, and analysis decisions.
 
-While the key is sealed a setting is its code and nothing else. Texts are in English where the study has it, otherwise
-in its first language.
+While the key is sealed, only the code of a setting is known. Texts are in English if the study has them in English,
+otherwise in its first language.
 """
 
 import re
@@ -26,9 +26,9 @@ Kind: TypeAlias = Compared
 KINDS: Final[tuple[Kind, ...]] = get_args(Kind)
 
 _CODE: Final = re.compile(r"([A-Za-z0-9]+-)?[A-Z][0-9]+")
-"""A code, in merged studies after its site: L1, Utrecht-L1."""
+"""A code, which follows the name of the site in merged studies: L1, Utrecht-L1."""
 _DELAY_PREFIX: Final = "D"
-"""Codes of delay settings are D1, D2 …: what tells a block of delays in sealed receipts of earlier versions."""
+"""Delay settings have the codes D1, D2 …, which identify blocks of delays in sealed receipts of earlier versions."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,8 +45,8 @@ class Setting:
     """The condition presented under a code; all other fields are None until the key is opened.
 
     ``label`` is the item that names the liquid, if there is one, ``link`` describes a delayed force, ``view`` the
-    displayed view (empty for the drawn tank). A track ("8/1") has neither liquid nor delay, but the condition ``of``
-    whose number it varies.
+    displayed view (empty for the drawn tank). A track ("8/1") has neither liquid nor delay; ``of`` is the condition of
+    which it varies one parameter.
     """
 
     code: str
@@ -113,17 +113,17 @@ class Block:
         return setting_name(setting, self.settings)
 
 
-def settings_of(key: Key) -> dict[tuple[str, str], Setting]:
+def settings_from_key(key: Key) -> dict[tuple[str, str], Setting]:
     """Return the settings that the opened key defines: (block id, code) → setting."""
     return {
-        (block, code): _setting(key, block, code, presented)
+        (block, code): _setting_from_key(key, block, code, presented)
         for block, codes in key.codes.items()
         for code, presented in codes.items()
     }
 
 
-def _setting(key: Key, block: str, code: str, presented: str) -> Setting:
-    """Return the setting of a code: a condition, or a track of a design such as "8/1", with its standard."""
+def _setting_from_key(key: Key, block: str, code: str, presented: str) -> Setting:
+    """Return the setting of a code: a condition, or a track of a design, such as "8/1"."""
     conditions = key.tables["conditions"]
     if presented in conditions:
         return _setting_of_condition(conditions[presented], code, presented)
@@ -151,14 +151,14 @@ def _setting_of_condition(condition: Mapping[str, Any], code: str, name: str) ->
 
 def main_blocks(protocol: Mapping[str, Any], key: Key | None) -> tuple[Block, ...]:
     """Return the main blocks with questions, in session order, from the protocol in a receipt."""
-    asked = [
+    blocks = [
         protocol["blocks"][step]
         for step in RecordedSessions.model_validate(protocol).steps
         if step in protocol["blocks"]
     ]
     return tuple(
-        _block(protocol, block, block_titles(protocol)[block["id"]], key)
-        for block in asked
+        _main_block(protocol, block, block_titles(protocol)[block["id"]], key)
+        for block in blocks
         if block["phase"] == "main" and block["questionnaire"] is not None and _statements(protocol, block)
     )
 
@@ -168,15 +168,15 @@ def _statements(protocol: Mapping[str, Any], block: Mapping[str, Any]) -> list[M
     return [item for item in protocol["questionnaires"][block["questionnaire"]]["items"] if "kind" not in item]
 
 
-def _block(protocol: Mapping[str, Any], block: Mapping[str, Any], title: str, key: Key | None) -> Block:
+def _main_block(protocol: Mapping[str, Any], block: Mapping[str, Any], title: str, key: Key | None) -> Block:
     language = display_language(protocol)
     questionnaire = protocol["questionnaires"][block["questionnaire"]]
     scale = protocol["scales"][questionnaire["scale"]]
     off_scale = scale["cannot_judge"]
-    settings = _settings_in(protocol, block["id"], key)
+    settings = _block_settings(protocol, block["id"], key)
     kind: Kind = block.get("compares") or ("delays" if block["code_prefix"] == _DELAY_PREFIX else "liquids")
     if key is not None:
-        kind = _settings_from_key(key, block["id"], block["codes"], block.get("compares"))[1]
+        kind = _ordered_settings(key, block["id"], block["codes"], block.get("compares"))[1]
     return Block(
         id=block["id"],
         title=title,
@@ -191,12 +191,12 @@ def _block(protocol: Mapping[str, Any], block: Mapping[str, Any], title: str, ke
     )
 
 
-def _settings_in(protocol: Mapping[str, Any], block: str, key: Key | None) -> tuple[Setting, ...]:
+def _block_settings(protocol: Mapping[str, Any], block: str, key: Key | None) -> tuple[Setting, ...]:
     """Return the settings of a block in code order or, once known, in condition order."""
     table = protocol["blocks"][block]
     if key is None:
         return tuple(Setting(code=code) for code in table["codes"])
-    return _settings_from_key(key, block, table["codes"], table.get("compares"))[0]
+    return _ordered_settings(key, block, table["codes"], table.get("compares"))[0]
 
 
 def setting_name(setting: Setting, others: Sequence[Setting]) -> str:
@@ -204,8 +204,8 @@ def setting_name(setting: Setting, others: Sequence[Setting]) -> str:
 
     The track or the condition's ID follows a name that several settings share.
     """
-    name, (_, is_track, track) = _presented_name(setting, others), (setting.condition or "").partition("/")
-    if sum(_presented_name(other, others) == name for other in others) < 2:
+    name, (_, is_track, track) = _name_without_track(setting, others), (setting.condition or "").partition("/")
+    if sum(_name_without_track(other, others) == name for other in others) < 2:
         return name
     return f"{name}, track {track}" if is_track else f"{name} ({setting.condition})"
 
@@ -215,24 +215,24 @@ def name_in_sentence(name: str) -> str:
     return name if _CODE.fullmatch(name) else name[:1].lower() + name[1:]
 
 
-def _presented_name(setting: Setting, others: Sequence[Setting]) -> str:
+def _name_without_track(setting: Setting, others: Sequence[Setting]) -> str:
     if setting.liquid is None or setting.delay_ms is None:
         return setting.code if setting.standard is None else f"Standard {setting.standard}"
     liquid = setting.liquid.replace("_", " ")
-    named = liquid[:1].upper() + liquid[1:]
-    named = f"{named}, {setting.view or 'tank'}" if len({other.view for other in others}) > 1 else named
-    named = f"{named}, {setting.delay_ms:g} ms" if len({other.delay_ms for other in others}) > 1 else named
-    return f"{named}, {setting.link}" if setting.link else named
+    name = liquid[:1].upper() + liquid[1:]
+    name = f"{name}, {setting.view or 'tank'}" if len({other.view for other in others}) > 1 else name
+    name = f"{name}, {setting.delay_ms:g} ms" if len({other.delay_ms for other in others}) > 1 else name
+    return f"{name}, {setting.link}" if setting.link else name
 
 
-def _settings_from_key(
+def _ordered_settings(
     key: Key, block: str, codes: Sequence[str], kind: Kind | None
 ) -> tuple[tuple[Setting, ...], Kind]:
     """Return the settings by name: delays in ascending order, others in the protocol's order.
 
     Without ``kind``, as in receipts of earlier versions, one liquid with several delays is a block of delays.
     """
-    known = settings_of(key)
+    known = settings_from_key(key)
     settings = [known[block, code] for code in codes]
     if kind is None:
         delays = {setting.delay_ms for setting in settings}
@@ -248,20 +248,20 @@ def _settings_from_key(
 
 
 def published_words(published: Published, unit: str | None) -> str:
-    """Return a published value with its conditions as text; ``unit`` is that of the varied parameter."""
-    known = [
+    """Return a published value and how it was measured, as text; ``unit`` is that of the varied parameter."""
+    details = [
         *([] if published.standard is None else [f"standard {published.standard:g} {unit or ''}".rstrip()]),
         *([] if published.low is None or published.high is None else [f"{published.low:g} to {published.high:g}"]),
         *([] if published.percent is None else [f"at {published.percent:g} % correct"]),
         *([] if published.n is None else [f"n = {published.n}"]),
     ]
     source = f"{published.source}: " if published.source else ""
-    return f"{source}{published.value_words(unit or '')}" + (f" ({', '.join(known)})" if known else "")
+    return f"{source}{published.value_words(unit or '')}" + (f" ({', '.join(details)})" if details else "")
 
 
 def compared_percent(published: Iterable[Published]) -> float | None:
     """Return the percentage correct at which published thresholds were measured; None if unknown or not unique."""
-    percents = {one.percent for one in published if one.measure in {"weber", "threshold"}}
+    percents = {value.percent for value in published if value.measure in {"weber", "threshold"}}
     return percents.pop() if len(percents) == 1 else None
 
 
@@ -298,7 +298,7 @@ class LevelBlock:
     published: tuple[Published, ...] = ()
     wrong_most: float | None = None
     reference: Setting | None = None
-    """The condition that the block's other conditions are compared with; None with a stimulus or a sealed key."""
+    """The condition with which the block's others are compared; None with a stimulus or a sealed key."""
 
     @property
     def has_correct_answer(self) -> bool:
@@ -318,7 +318,7 @@ class LevelBlock:
 
     @property
     def assumed(self) -> Assumed | None:
-        """The assumptions about its psychometric function; None if there is none, or the key is sealed."""
+        """The assumptions about its psychometric function; None if it has no such function, or the key is sealed."""
         if self.stimulus is None or not self.stimulus.rises(self.design):
             return None
         if self.method is None:
@@ -328,7 +328,7 @@ class LevelBlock:
 
 def contrasts_of(key: Key) -> tuple[Contrast, ...]:
     """Return the contrasts in the opened key."""
-    return tuple(Contrast.model_validate(one) for one in key.tables.get("analysis", {}).get("contrasts", ()))
+    return tuple(Contrast.model_validate(table) for table in key.tables.get("analysis", {}).get("contrasts", ()))
 
 
 def level_blocks(protocol: Mapping[str, Any], key: Key | None) -> tuple[LevelBlock, ...]:
@@ -355,11 +355,11 @@ def _level_block(protocol: Mapping[str, Any], step: str, key: Key | None, whole:
             reference = _setting_of_condition(key.tables["conditions"][block.standard], block.standard, block.standard)
         if whole.analysis is not None:
             published = tuple(published for published in whole.analysis.published if published.block == step)
-    elif (written := protocol.get("designs", {}).get(table["design"])) is not None:
-        design = DESIGN_KINDS[written["kind"]].model_validate(written)
+    elif (recorded := protocol.get("designs", {}).get(table["design"])) is not None:
+        design = DESIGN_KINDS[recorded["kind"]].model_validate(recorded)
     else:
         design = default_design(table["design"])
-    title, settings = block_titles(protocol)[step], _settings_in(protocol, step, key)
+    title, settings = block_titles(protocol)[step], _block_settings(protocol, step, key)
     return LevelBlock(
         step, title, table["phase"], design, stimulus, settings, method, published,
         (table.get("catch") or {}).get("wrong_most"), reference,
@@ -374,9 +374,10 @@ Spending: TypeAlias = Literal["obrien-fleming", "pocock"]
 class Decided:
     """The ``analysis`` table of the protocol.
 
-    ``made`` is False without such a table; ``changed`` is True if sessions were run with different ones, of which this
-    is the first: in both cases all findings are exploratory. With planned ``looks``, ``alpha`` is that of look number
-    ``look`` (0: before the first one, where findings are also exploratory), and ``planned_alpha`` the overall one.
+    ``made`` is False without such a table. ``changed`` is True if the table differs between sessions; this is that of
+    the first session. In both cases all findings are exploratory. With planned ``looks``, ``alpha`` applies to look
+    number ``look`` (0: before the first look, when findings are also exploratory), and ``planned_alpha`` is the overall
+    alpha.
     """
 
     made: bool
@@ -426,22 +427,22 @@ class Decided:
         """
         if self.look is None:
             return ""
-        planned = f"{' and '.join([', '.join(map(str, self.looks[:-1])), str(self.looks[-1])])} participants"
+        planned_looks = f"{' and '.join([', '.join(map(str, self.looks[:-1])), str(self.looks[-1])])} participants"
         if self.look == 0:
-            return f"Looks are planned at {planned}. None has been reached yet, so all results are exploratory."
+            return f"Looks are planned at {planned_looks}. None has been reached yet, so all results are exploratory."
         if n not in self.looks:
             from study_app.analysis.statistics.outcome import error_of_every_report  # noqa: PLC0415 - loads scipy
 
             alpha = self.planned_alpha or self.alpha
             return (
-                f"This look at {n} participants was unplanned; looks are planned at {planned}. Adjusted p values of up "
-                f"to {significant(self.alpha)} are treated as significant, as at the last planned look. If there were "
-                "no effect and the data were tested in this way after every participant, the false-positive rate "
+                f"This look at {n} participants was unplanned; looks are planned at {planned_looks}. Adjusted p values "
+                f"of up to {significant(self.alpha)} are treated as significant, as at the last planned look. If there "
+                "were no effect and the data were tested in this way after every participant, the false-positive rate "
                 f"would be {100 * error_of_every_report(self.looks, alpha, self.spending):.1f} % instead of "
                 f"{100 * alpha:g} %."
             )
         return (
-            f"This is look {self.look} of {len(self.looks)}, planned at {planned}. Adjusted p values of up to "
+            f"This is look {self.look} of {len(self.looks)}, planned at {planned_looks}. Adjusted p values of up to "
             f"{significant(self.alpha)} are significant ({SPENDINGS[self.spending]} alpha spending)."
         )
 
@@ -458,7 +459,7 @@ TRENDS: Final = {
     "ranks": "a sign-flip permutation test on the participants' rank correlations between answers and delays",
     "slopes": "Student's t test on the slopes from each participant's regression of answers on delays",
 }
-"""How a trend over the delay is tested, in words."""
+"""Descriptions of the tests of a trend over the delay."""
 
 SPENDINGS: Final[Mapping[Spending, str]] = {"obrien-fleming": "O'Brien–Fleming", "pocock": "Pocock"}
 NOTHING_DECIDED: Final = Decided(
@@ -475,7 +476,7 @@ NOTHING_DECIDED: Final = Decided(
 
 
 def decisions(protocol: Protocol) -> Decided:
-    """Return the analysis decisions of a protocol, with defaults if it has no table."""
+    """Return the analysis decisions of a protocol; those of an empty table if it has none."""
     return read_decided([(protocol.analysis or Analysis()).model_dump(mode="json")])
 
 
@@ -509,8 +510,8 @@ def read_decided(tables: Sequence[Mapping[str, Any] | None]) -> Decided:
 
 
 START: Final = "0"
+"""The code of a form before the first block; no block has this ID."""
 AFTER: Final = "After "
-"""The code of a form before the first block, which no block has as its id."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -595,7 +596,7 @@ class PlacedScore:
 
     @property
     def bounds(self) -> tuple[float, float] | None:
-        """The lowest and the highest possible score; None if there are none."""
+        """The lowest and the highest possible score; None if scores are unlimited."""
         return self.score.range_of({question.id: question.scale_ends for question in self.questions})
 
 
@@ -611,7 +612,7 @@ NO_QUESTIONS: Final = OtherQuestions()
 
 
 def other_questions(protocol: Mapping[str, Any], key: Key | None) -> OtherQuestions:
-    """Return the other questions of the protocol in a receipt, in session order."""
+    """Return the questions other than statements after trials, in session order, from the protocol in a receipt."""
     if protocol.get("format", 1) < 2:
         return NO_QUESTIONS
     questions: list[PlacedQuestion] = []
@@ -619,7 +620,7 @@ def other_questions(protocol: Mapping[str, Any], key: Key | None) -> OtherQuesti
     scales = {name: Scale.model_validate(table) for name, table in protocol["scales"].items()}
     for where, table in _questionnaires(protocol, key):
         context = Context(scales, table.get("scale"), display_language(protocol))
-        placed = tuple(PlacedQuestion(where, _question(item, where), context) for item in table["items"])
+        placed = tuple(PlacedQuestion(where, _read_question(item, where), context) for item in table["items"])
         questions += [question for question in placed if where.is_form or not isinstance(question.question, Statement)]
         scores += [
             PlacedScore(where, name, table.get("instrument"), Score.model_validate(score), placed)
@@ -634,7 +635,7 @@ def _questionnaires(protocol: Mapping[str, Any], key: Key | None) -> Iterator[tu
         if step in protocol["blocks"]:
             block = protocol["blocks"][step]
             if block["phase"] == "main" and block["questionnaire"] is not None:
-                where = QuestionPlace(step, titles[step], False, _settings_in(protocol, step, key))
+                where = QuestionPlace(step, titles[step], False, _block_settings(protocol, step, key))
                 yield where, protocol["questionnaires"][block["questionnaire"]]
         elif step in protocol["questionnaires"]:
             table, after = protocol["questionnaires"][step], sessions.follows(step)
@@ -644,18 +645,18 @@ def _questionnaires(protocol: Mapping[str, Any], key: Key | None) -> Iterator[tu
 
 
 def _form_title(protocol: Mapping[str, Any], form: str) -> str:
-    """Return the name of a form for readers: its standard questionnaire, otherwise the title that participants see."""
+    """Return the name of a form in reports: that of its standard questionnaire, or the title that participants see."""
     forms = protocol["questionnaires"]
     title, instrument = forms[form]["title"], forms[form].get("instrument")
-    words = form.replace("_", " ").capitalize() if title is None else text_in(title, display_language(protocol))
+    name = form.replace("_", " ").capitalize() if title is None else text_in(title, display_language(protocol))
     if instrument not in Instrument.names():
-        return words
+        return name
     is_alone = sum(other.get("instrument") == instrument for other in forms.values()) == 1
     published = Instrument(instrument).published_name
-    return published if is_alone else f"{published} ({words})"
+    return published if is_alone else f"{published} ({name})"
 
 
-def _question(table: Mapping[str, Any], where: QuestionPlace) -> Question:
+def _read_question(table: Mapping[str, Any], where: QuestionPlace) -> Question:
     try:
         return question_of(table)
     except (KeyError, ValueError) as error:

@@ -1,7 +1,7 @@
 """Measures of single statements: counts of all seven levels, medians, quartiles, agreement.
 
-One statement is ordinal, so there are no means. Quartiles are linear (Hyndman & Fan 1996, type 7: numpy's default).
-All seven levels are always there, chosen or not.
+Answers to one statement are ordinal, so no means are calculated. Quartiles are interpolated linearly (Hyndman & Fan
+1996, type 7: numpy's default). All seven levels are listed, even those that nobody chose.
 """
 
 import math
@@ -43,21 +43,23 @@ def aggregate(
     filled = answers["response"].astype("Float64").to_numpy(na_value=np.nan)
     responses = np.asarray(filled, dtype=np.float64)
     cannot_judge = answers["cannot_judge"].astype("boolean").to_numpy(dtype=bool, na_value=False)
-    people, nowhere = answers["participant"].to_numpy(), np.zeros(0, np.intp)
+    people, no_rows = answers["participant"].to_numpy(), np.zeros(0, np.intp)
     rows = []
     for code in codes:
         for item in items:
-            at = groups.get((code, item), nowhere)
-            measured = _measures(responses[at], people[at], int(cannot_judge[at].sum()), presented.get(code, 0))
+            indices = groups.get((code, item), no_rows)
+            measured = _statement_measures(
+                responses[indices], people[indices], int(cannot_judge[indices].sum()), presented.get(code, 0)
+            )
             rows.append({"code": code, "item": item, "presented_excluded": excluded.get(code, 0), **measured})
     return pd.DataFrame(rows, columns=list(COLUMNS))
 
 
-def _measures(responses: Array, people: NDArray[Any], cannot_judge: int, presented: int) -> dict[str, float]:
-    there = ~np.isnan(responses)
-    values = responses[there]
+def _statement_measures(responses: Array, people: NDArray[Any], cannot_judge: int, presented: int) -> dict[str, float]:
+    is_given = ~np.isnan(responses)
+    values = responses[is_given]
     return {
-        "participants": len(set(people[there])),
+        "participants": len(set(people[is_given])),
         "presented": presented,
         "n": len(values),
         "cannot_judge": cannot_judge,
@@ -85,7 +87,7 @@ class QuartilesOrNone(NamedTuple):
 
 
 def quartiles(values: Array) -> Quartiles:
-    """Return the quartiles of ``values`` (n,) without NaN; NaN if there are none."""
+    """Return the quartiles of ``values`` (n,), ignoring NaN; NaN if no values remain."""
     valid = values[~np.isnan(values)]
     if not len(valid):
         return Quartiles(median=math.nan, q1=math.nan, q3=math.nan)
@@ -95,10 +97,10 @@ def quartiles(values: Array) -> Quartiles:
 
 def quartiles_or_none(values: Array) -> QuartilesOrNone:
     """Return the result of `quartiles` with None instead of NaN."""
-    found = quartiles(values)
-    if math.isnan(found.median):
+    computed = quartiles(values)
+    if math.isnan(computed.median):
         return QuartilesOrNone(median=None, q1=None, q3=None)
-    return QuartilesOrNone(median=found.median, q1=found.q1, q3=found.q3)
+    return QuartilesOrNone(median=computed.median, q1=computed.q1, q3=computed.q3)
 
 
 def number_or_none(value: Any) -> float | None:
@@ -118,8 +120,8 @@ def presentations(
     order = [name for name in ("session", "trial") if name in chosen]
     chosen = chosen.sort_values(order, kind="stable") if order else chosen
     rows = {participant: row for row, participant in enumerate(participants)}
-    people = np.array([rows[str(one)] for one in chosen["participant"]], dtype=np.int64)
-    places = np.array([columns[str(one)] for one in chosen["code"]], dtype=np.int64)
+    people = np.array([rows[str(participant)] for participant in chosen["participant"]], dtype=np.int64)
+    places = np.array([columns[str(code)] for code in chosen["code"]], dtype=np.int64)
     settings = len(set(columns.values()))
     number = chosen.groupby([people, places]).cumcount().to_numpy() if len(chosen) else people
     shape = (len(participants), settings, int(number.max()) + 1 if len(number) else 1)
@@ -133,10 +135,10 @@ def medians(values: Array) -> Array:
     """Return the medians (participants, settings) of (participants, settings, presentations), NaN without answers."""
     if values.shape[2] == 1:
         return values[..., 0]
-    there = ~np.isnan(values)
+    is_given = ~np.isnan(values)
     result = np.full(values.shape[:2], np.nan)
-    some = there.any(axis=2)
-    result[some] = np.nanmedian(values[some], axis=1)
+    has_answers = is_given.any(axis=2)
+    result[has_answers] = np.nanmedian(values[has_answers], axis=1)
     return result
 
 

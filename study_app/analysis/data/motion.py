@@ -1,9 +1,9 @@
-"""How participants moved and what force they felt: from one target to the next, and over whole trials.
+"""Measures of movement and force: over whole trials, and for reaches from one target to the next.
 
-Times and places are the device's, undelayed: the same clock that decided when a target was reached.
+Times and positions are those of the device, without the delay, as when the session decided that a target was reached.
 
-Measures of trials stand in the trials' tables; those of reaches come out of the recordings, where they were kept. The
-first reach of a trial begins wherever the hand was and is left out.
+Measures of trials are in the tables of trials; those of reaches are computed from the recordings that were stored. The
+first reach of a trial is left out, because it begins wherever the hand happens to be.
 """
 
 import math
@@ -26,13 +26,13 @@ from study_app.store.merged import session_in
 from study_app.store.recordings import SealedRecording, read_samples
 
 _CUTOFF_HZ: Final = 10.0
-"""Below this lies what a hand does on purpose; speeds are low-passed here (Butterworth, both ways, order 4 in all)."""
+"""Voluntary movement is slower than this; speeds are low-pass filtered (zero-phase Butterworth, total order 4)."""
 
 _PROMINENCE: Final = 0.1
-"""A peak of speed counts as a submovement if it stands out by this share of the reach's highest speed."""
+"""A peak of speed is a submovement if its prominence is at least this share of the reach's highest speed."""
 
 _SHORTEST: Final = 32
-"""So many samples are needed to be filtered; a shorter reach is one submovement."""
+"""The fewest samples that can be filtered; a shorter reach counts as one submovement."""
 
 REACH_DEFINITIONS: Final = {
     "movement_time_s": "from the moment a target lights up until the hand enters it for the last time, excluding the "
@@ -73,17 +73,17 @@ def reaches(times_ns: NDArray[np.int64], positions_m: Array, targets: Targets) -
     """Return the completed reaches of a trial from times (n,) and hand positions (n, 3)."""
     seconds = (times_ns - times_ns[0]) / 1e9 if len(times_ns) else np.zeros(0)
     movements = []
-    for number, held in enumerate(_target_samples(times_ns, positions_m, targets)):
-        lit, entered, reached = held.lit, held.entered, held.reached
+    for number, samples in enumerate(_target_samples(times_ns, positions_m, targets)):
+        lit, entered, reached = samples.lit, samples.entered, samples.reached
         target = number % len(targets.centres_m)
-        way = positions_m[lit : entered + 1]
+        path_m = positions_m[lit : entered + 1]
         movements.append(
             Reach(
                 target=target,
                 lit_s=round(float(seconds[lit]), 9),
                 reached_s=round(float(seconds[reached]), 9),
                 movement_time_s=round(float(seconds[entered] - seconds[lit]), 9),
-                path_mm=1000 * path_length_m(way),
+                path_mm=1000 * path_length_m(path_m),
                 overshoot_mm=1000 * _overshoot_m(positions_m[lit : reached + 1], targets, target),
                 submovements=submovements(seconds[lit : reached + 1], positions_m[lit : reached + 1]),
             )
@@ -91,7 +91,7 @@ def reaches(times_ns: NDArray[np.int64], positions_m: Array, targets: Targets) -
     return tuple(movements)
 
 
-class _Held(NamedTuple):
+class _ReachSamples(NamedTuple):
     """The samples at which a target was lit, entered for the last time, and reached."""
 
     lit: int
@@ -99,8 +99,8 @@ class _Held(NamedTuple):
     reached: int
 
 
-def _target_samples(times_ns: NDArray[np.int64], positions_m: Array, targets: Targets) -> Iterator[_Held]:
-    """Yield those samples for each target that was reached, in order."""
+def _target_samples(times_ns: NDArray[np.int64], positions_m: Array, targets: Targets) -> Iterator[_ReachSamples]:
+    """Yield the samples of each completed reach, in order."""
     dwell_ns = round(targets.dwell_s * 1e9)
     lit = number = 0
     while lit < len(times_ns):
@@ -111,7 +111,7 @@ def _target_samples(times_ns: NDArray[np.int64], positions_m: Array, targets: Ta
         for entered, left in zip(edges[::2], edges[1::2], strict=True):
             reached = int(np.searchsorted(times_ns, times_ns[entered] + dwell_ns))
             if reached < left:
-                yield _Held(lit=lit, entered=int(entered), reached=reached)
+                yield _ReachSamples(lit=lit, entered=int(entered), reached=reached)
                 lit, number = reached, number + 1
                 break
         else:
@@ -119,13 +119,13 @@ def _target_samples(times_ns: NDArray[np.int64], positions_m: Array, targets: Ta
 
 
 def path_length_m(positions_m: Array) -> float:
-    """Return the length of a path (n, 3)."""
+    """Return the length of a path (n, 3) [m]."""
     return float(np.linalg.norm(np.diff(positions_m, axis=0), axis=1).sum())
 
 
 def submovements(seconds: Array, positions_m: Array) -> int:
     """Return the number of speed peaks along a path (n, 3) at ``seconds`` (n,); at least 1."""
-    from scipy.signal import filtfilt, find_peaks  # noqa: PLC0415 - 0.2 s of every report without targets
+    from scipy.signal import filtfilt, find_peaks  # noqa: PLC0415 - takes 0.2 s to import, and is only needed with targets
 
     if len(seconds) < _SHORTEST:
         return 1
@@ -139,7 +139,7 @@ def submovements(seconds: Array, positions_m: Array) -> int:
 
 
 def _low_pass(rate_hz: float) -> tuple[Array, Array]:
-    """Return scipy's ``butter(2, _CUTOFF_HZ, fs=rate_hz)``, whose general design takes longer than the filtering."""
+    """Return ``scipy.signal.butter(2, _CUTOFF_HZ, fs=rate_hz)``; scipy's general design takes longer than filtering."""
     warped = math.tan(math.pi * _CUTOFF_HZ / rate_hz)
     damped, square = math.sqrt(2) * warped, warped**2
     scale = 1 / (1 + damped + square)
@@ -147,13 +147,13 @@ def _low_pass(rate_hz: float) -> tuple[Array, Array]:
     return below, np.array([1.0, 2 * scale * (square - 1), scale * (1 - damped + square)])
 
 
-def _overshoot_m(way: Array, targets: Targets, target: int) -> float:
-    """Return how far a path went beyond the far edge of its target, as seen from the previous target."""
+def _overshoot_m(path_m: Array, targets: Targets, target: int) -> float:
+    """Return how far a path went beyond the far edge of its target [m], as seen from the previous target."""
     line = targets.centres_m[target] - targets.centres_m[target - 1]
     length = float(np.linalg.norm(line))
     if length == 0.0:
         return 0.0
-    beyond = (way - targets.centres_m[target]) @ (line / length)
+    beyond = (path_m - targets.centres_m[target]) @ (line / length)
     return max(0.0, float(beyond.max()) - targets.radius_m)
 
 
@@ -169,8 +169,8 @@ TRIAL_DEFINITIONS: Final = {
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Moved:
-    """One measure in one condition: quartiles over ``n`` participants' medians."""
+class MovementQuartiles:
+    """One movement measure in one setting: the quartiles of ``n`` participants' medians."""
 
     block: str
     code: str
@@ -182,7 +182,7 @@ class Moved:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Reached:
+class TrialReaches:
     """The reaches of one valid trial, without the first."""
 
     participant: str
@@ -196,16 +196,16 @@ class Reached:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Performance:
-    """All movement measures; ``reaching`` are the blocks with a reaching task, the only ones with reaches.
+    """All movement measures; ``reaching`` are the IDs of the blocks with a reaching task.
 
-    Of the valid ``trials`` with reaching, ``recorded`` have a readable recording; ``unread`` gives the reasons for the
-    others, one line each. For ``judged`` trials it is known whether they met the protocol's limits; ``invalid``
-    ones did not but are included in the measures.
+    Of the valid ``trials`` in these blocks, ``recorded`` have a readable recording; ``unread`` has one line for each
+    reason why others have none. For ``judged`` trials it is known whether they met the protocol's limits; ``invalid``
+    trials did not, but the measures include them.
     """
 
-    moved: tuple[Moved, ...]
+    moved: tuple[MovementQuartiles, ...]
     reaching: tuple[str, ...]
-    reached: tuple[Reached, ...]
+    reached: tuple[TrialReaches, ...]
     trials: int
     recorded: int
     judged: int
@@ -214,7 +214,7 @@ class Performance:
 
     def medians(self, block: str) -> pd.DataFrame:
         """Return each participant's median of every reaching measure, by (code, participant)."""
-        return _medians(_reach_table(self.reached), block, OF_REACHES)
+        return _participant_medians(_reach_table(self.reached), block, OF_REACHES)
 
     def recorded_in(self, block: str) -> bool:
         """Return whether a block has any reaches."""
@@ -225,9 +225,9 @@ def performance(study: Study, each: Callable[[int, int], object] = lambda _done,
     """Measure the valid trials; ``each`` is called with the number of recordings read and the total."""
     rows = study.trials[study.trials["counted"]]
     tasks = {block.id: _targets(study.protocol, block) for block in study.blocks}
-    where = tuple(name for name, targets in tasks.items() if targets is not None)
-    reaching = rows[rows["block"].isin(where)]
-    found: list[Reached] = []
+    reaching_blocks = tuple(name for name, targets in tasks.items() if targets is not None)
+    reaching = rows[rows["block"].isin(reaching_blocks)]
+    trial_reaches: list[TrialReaches] = []
     unread: dict[str, int] = {}
     for number, row in enumerate(reaching.to_dict("records")):
         each(number, len(reaching))
@@ -240,33 +240,33 @@ def performance(study: Study, each: Callable[[int, int], object] = lambda _done,
         if isinstance(reached, str):
             unread[reached] = unread.get(reached, 0) + 1
         else:
-            found.append(reached)
+            trial_reaches.append(reached)
     of_trials = rows.assign(
         path_m=rows["path_length_m"],
         at_limit_percent=100 * rows["limiter_norm"].astype("Float64") / rows["ticks"].replace(0, pd.NA),
     )
-    moved = [quartile for block in study.blocks for quartile in _quartiles(block, of_trials, OF_TRIALS)]
-    if found:
-        of_reaches = _reach_table(found)
+    moved = [quartile for block in study.blocks for quartile in _movement_quartiles(block, of_trials, OF_TRIALS)]
+    if trial_reaches:
+        of_reaches = _reach_table(trial_reaches)
         moved += [
             quartile
             for block in study.blocks
-            if block.id in where
-            for quartile in _quartiles(block, of_reaches, OF_REACHES)
+            if block.id in reaching_blocks
+            for quartile in _movement_quartiles(block, of_reaches, OF_REACHES)
         ]
     return Performance(
         moved=tuple(moved),
-        reaching=where,
-        reached=tuple(found),
+        reaching=reaching_blocks,
+        reached=tuple(trial_reaches),
         trials=len(reaching),
-        recorded=len(found),
+        recorded=len(trial_reaches),
         judged=int(rows["valid"].notna().sum()),
         invalid=int((~rows["valid"].fillna(value=True)).sum()),
         unread=tuple(f"{count} × {reason}" for reason, count in unread.items()),
     )
 
 
-def _reach_table(reached: Iterable[Reached]) -> pd.DataFrame:
+def _reach_table(reached: Iterable[TrialReaches]) -> pd.DataFrame:
     """Return one row per reach, with the trial's participant, block and code."""
     of_trial, of_reach = attrgetter("participant", "block", "code"), attrgetter(*OF_REACHES)
     rows = [(*of_trial(trial), *of_reach(reach)) for trial in reached for reach in trial.found]
@@ -275,27 +275,27 @@ def _reach_table(reached: Iterable[Reached]) -> pd.DataFrame:
 
 def _targets(protocol: Mapping[str, Any], block: Block) -> Targets | None:
     """Return the targets of a block's task, None if it has none."""
-    named = protocol.get("blocks", {}).get(block.id, {}).get("task")
-    task = protocol.get("tasks", {}).get(named, {})
+    name = protocol.get("blocks", {}).get(block.id, {}).get("task")
+    task = protocol.get("tasks", {}).get(name, {})
     if task.get("kind") != "reach":
         return None
     return Targets(np.asarray(task["targets_mm"], dtype=float) / 1000, task["radius_mm"] / 1000, task["dwell_s"])
 
 
-def _read_reaches(folder: Path, row: Mapping[Any, Any], targets: Targets) -> Reached | str:
-    """Return the reaches of a trial, or why they are unknown."""
+def _read_reaches(folder: Path, row: Mapping[Any, Any], targets: Targets) -> TrialReaches | str:
+    """Return the reaches of a trial, or the reason why they are unknown."""
     if reason := _explain_missing_recording(folder, row):
         return reason
     try:
-        samples = read_samples(_file(folder, row))
+        samples = read_samples(_recording_path(folder, row))
     except SealedRecording:
         return "the recording is sealed (liquid-study unblind unseals it)"
     except StoreError:
         return "a recording is damaged (liquid-study verify shows which one)"
-    kept = (samples["scene"] == samples["scene"][-1:]) & (samples["limiters"] & LIMITER_GLITCH == 0)
-    times_ns, positions_m = samples["time_ns"][kept], samples["position_m"][kept]
+    is_valid = (samples["scene"] == samples["scene"][-1:]) & (samples["limiters"] & LIMITER_GLITCH == 0)
+    times_ns, positions_m = samples["time_ns"][is_valid], samples["position_m"][is_valid]
     is_during = times_ns <= times_ns[:1] + round(float(row["duration_s"]) * 1e9)
-    return Reached(
+    return TrialReaches(
         participant=str(row["participant"]),
         session=int(row["session"]),
         trial=int(row["trial"]),
@@ -311,23 +311,23 @@ def _explain_missing_recording(folder: Path, row: Mapping[Any, Any]) -> str:
         return "no recording was stored"
     if pd.isna(row["duration_s"]):
         return "the trial's duration was not recorded"
-    return "" if _file(folder, row).is_file() else "the recording is missing from the folder"
+    return "" if _recording_path(folder, row).is_file() else "the recording is missing from the folder"
 
 
-def _file(folder: Path, row: Mapping[Any, Any]) -> Path:
+def _recording_path(folder: Path, row: Mapping[Any, Any]) -> Path:
     return session_in(folder, str(row["participant"]), int(row["session"])).path / str(row["recording"])
 
 
-def _medians(rows: pd.DataFrame, block: str, measures: Sequence[str]) -> pd.DataFrame:
+def _participant_medians(rows: pd.DataFrame, block: str, measures: Sequence[str]) -> pd.DataFrame:
     return rows[rows["block"] == block].groupby(["code", "participant"])[list(measures)].median()
 
 
-def _quartiles(block: Block, rows: pd.DataFrame, measures: Sequence[str]) -> Iterator[Moved]:
-    """Yield the quartiles over participants of each one's median, by measure and setting."""
-    medians = _medians(rows, block.id, measures)
+def _movement_quartiles(block: Block, rows: pd.DataFrame, measures: Sequence[str]) -> Iterator[MovementQuartiles]:
+    """Yield the quartiles of the participants' medians, by measure and setting."""
+    medians = _participant_medians(rows, block.id, measures)
     for measure in measures:
         for code in block.codes:
             values = medians[measure][medians.index.get_level_values("code") == code].dropna().to_numpy(dtype=float)
-            yield Moved(
+            yield MovementQuartiles(
                 block=block.id, code=code, measure=measure, n=len(values), **quartiles_or_none(values)._asdict()
             )

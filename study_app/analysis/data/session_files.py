@@ -1,4 +1,4 @@
-"""The sessions of a results folder as typed tables, checked against their receipts, excluded rows marked."""
+"""Read sessions into typed tables, check them against their receipts, and mark excluded rows."""
 
 import contextlib
 from collections.abc import Mapping, Sequence
@@ -52,45 +52,46 @@ _DTYPES: Final[dict[str, Any]] = {
     "flag": "boolean",
 }
 
-_Whole: TypeAlias = NDArray[np.int64]
+_Counts: TypeAlias = NDArray[np.int64]
 
 
-def tables(paths: Sequence[Path], columns: tuple[Column, ...]) -> tuple[pd.DataFrame, _Whole]:
-    """Read one table of many sessions, typed by the dictionary, and the number of rows of each file.
+def _read_typed_tables(paths: Sequence[Path], columns: tuple[Column, ...]) -> tuple[pd.DataFrame, _Counts]:
+    """Read one table of many sessions with the types of ``columns``, and the number of rows of each file.
 
-    Sealed columns are missing, as are cells with ``n/a``.
+    Cells with ``n/a`` are missing values, and so are all cells of a sealed column that a file does not have.
     """
     values: dict[str, list[Any]] = {column.name: [] for column in columns}
-    known: dict[str, dict[str, Any]] = {column.name: {} for column in columns}
+    parsed: dict[str, dict[str, Any]] = {column.name: {} for column in columns}
     lengths = []
     for path in paths:
-        texts, rows = _texts(path, columns)
+        texts, rows = _cell_texts(path, columns)
         lengths.append(rows)
         for column in columns:
-            of_file = texts.get(column.name, [MISSING] * rows)
-            values[column.name] += _values(column, of_file, known[column.name], path)
+            texts_of_column = texts.get(column.name, [MISSING] * rows)
+            values[column.name] += _parse_column(column, texts_of_column, parsed[column.name], path)
     typed = {column.name: pd.array(values[column.name], dtype=_DTYPES[column.kind]) for column in columns}
     return pd.DataFrame(typed), np.array(lengths, dtype=np.int64)
 
 
-def _texts(path: Path, columns: tuple[Column, ...]) -> tuple[Mapping[str, Sequence[str]], int]:
-    """Return the cells of a file by column, and its number of rows."""
+def _cell_texts(path: Path, columns: tuple[Column, ...]) -> tuple[Mapping[str, Sequence[str]], int]:
+    """Return the cells of a file as text by column, and its number of rows."""
     try:
         names, *rows = read_cells(read_regular(path))
     except OSError as error:
-        raise _unreadable_error(path, error, _again(path)) from error
+        raise _unreadable_error(path, error, _rebuild_remedy(path)) from error
     except ValueError as error:
-        raise AnalysisError(f"{path} {error}: it has been truncated or changed; {_again(path)}") from error
-    held = tuple(column for column in columns if column.name in names or not column.sealed)
-    if tuple(names) != header(held):
+        raise AnalysisError(f"{path} {error}: it has been truncated or changed; {_rebuild_remedy(path)}") from error
+    present = tuple(column for column in columns if column.name in names or not column.sealed)
+    if tuple(names) != header(present):
         raise AnalysisError(
             f"{path} does not begin with the columns of this table: it has been changed, or was written by a different "
-            f"version of the program (expected {len(held)} columns: {', '.join(header(held)[:4])} …); {_again(path)}"
+            f"version of the program (expected {len(present)} columns: {', '.join(header(present)[:4])} …); "
+            f"{_rebuild_remedy(path)}"
         )
     return (dict(zip(names, zip(*rows, strict=True), strict=True)) if rows else {}), len(rows)
 
 
-def _values(column: Column, texts: Sequence[str], known: dict[str, Any], path: Path) -> list[Any]:
+def _parse_column(column: Column, texts: Sequence[str], known: dict[str, Any], path: Path) -> list[Any]:
     """Return the values of a column in a file; ``known`` caches the value of each text over all files."""
     for text in dict.fromkeys(texts):
         try:
@@ -98,16 +99,16 @@ def _values(column: Column, texts: Sequence[str], known: dict[str, Any], path: P
                 known[text] = None if text == MISSING and column.sealed else column.value(text)
         except ValueError as error:
             row = texts.index(text) + 2
-            raise AnalysisError(f"{path}, row {row}, column {column.name}: {error}; {_again(path)}") from error
+            raise AnalysisError(f"{path}, row {row}, column {column.name}: {error}; {_rebuild_remedy(path)}") from error
     return [known[text] for text in texts]
 
 
-def _again(path: Path) -> str:
+def _rebuild_remedy(path: Path) -> str:
     return f"create it again from the journal with liquid-study rebuild {path.parent}"
 
 
-def document(path: Path) -> dict[str, Any]:
-    """Read a JSON object."""
+def _read_json_object(path: Path) -> dict[str, Any]:
+    """Read a JSON object; raise AnalysisError if the file is unreadable or holds something else."""
     try:
         parsed = parse_json(read_regular(path))
     except OSError as error:
@@ -127,7 +128,7 @@ def _unreadable_error(path: Path, error: OSError, remedy: str = "restore it from
 
 
 class Bench(NamedTuple):
-    """Damping, friction and mass from a receipt's bench measurement, each the mean over axes."""
+    """Damping [N·s/m], friction [N] and mass [kg] from a receipt's bench measurement, each averaged over the axes."""
 
     damping_nspm: float
     friction_n: float
@@ -136,10 +137,10 @@ class Bench(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class Session:
-    """The questions, answers and facts of one session (``visit``: one row of ``Study.participants``).
+    """The contents of one session's receipt; ``visit`` is its row of ``Study.participants``.
 
-    ``own_dynamics`` are the device's own damping [N·s/m], friction [N] and mass [kg], means over axes; None if they
-    were not measured. ``device_velocity`` tells whether the device measured its velocity.
+    ``own_dynamics`` are the device's own damping, friction and mass; None if they were not measured.
+    ``device_velocity`` tells whether the device measured its velocity.
     """
 
     folder: SessionFolder
@@ -169,16 +170,16 @@ def read_session(folder: SessionFolder, key: Key | None, like: Session | None = 
 
     ``like`` is another session of the study, with which equal values are shared to save memory.
     """
-    receipt = document(folder.receipt)
+    receipt = _read_json_object(folder.receipt)
     try:
         protocol = receipt["protocol"]
         if like is not None and protocol == like.protocol:
             protocol = like.protocol
-        head = protocol["study"]
+        study_table = protocol["study"]
         study, title, version = (
-            check_study_name(head["name"]),
-            text_in(head["title"], display_language(protocol)),
-            str(head["version"]),
+            check_study_name(study_table["name"]),
+            text_in(study_table["title"], display_language(protocol)),
+            str(study_table["version"]),
         )
         visit = {
             "participant": folder.participant,
@@ -193,10 +194,10 @@ def read_session(folder: SessionFolder, key: Key | None, like: Session | None = 
         }
         own_dynamics = _own_dynamics(receipt["device"].get("bench"))
         device_velocity = receipt["device"].get("estimator") == "device"
-        alike = like is not None and protocol is like.protocol
-        blocks = like.blocks if like is not None and alike else main_blocks(protocol, key)
-        others = like.others if like is not None and alike else other_questions(protocol, key)
-        levels = like.levels if like is not None and alike else level_blocks(protocol, key)
+        same_protocol = like is not None and protocol is like.protocol
+        blocks = like.blocks if like is not None and same_protocol else main_blocks(protocol, key)
+        others = like.others if like is not None and same_protocol else other_questions(protocol, key)
+        levels = like.levels if like is not None and same_protocol else level_blocks(protocol, key)
     except (KeyError, TypeError, AttributeError, ValueError) as error:
         raise AnalysisError(
             f"{folder.receipt} does not describe the session ({type(error).__name__}, {error}): it has been changed, "
@@ -234,20 +235,23 @@ def _own_dynamics(bench: Mapping[str, Any] | None) -> Bench | None:
 
 
 def estimators_of(records: Sequence[Session]) -> str | None:
-    """Return the names of the velocity estimators of all sessions: "kalman", "device" or "kalman or device"."""
-    own = records[0].protocol.get("scene", {}).get("velocity", {}).get("kind")
+    """Return the velocity estimators of all sessions as text: "kalman", "device" or "kalman or device"."""
+    configured = records[0].protocol.get("scene", {}).get("velocity", {}).get("kind")
     measured = [record.device_velocity for record in records]
-    names = [*([] if all(measured) or own is None else [str(own)]), *(["device"] if any(measured) else [])]
+    names = [
+        *([] if all(measured) or configured is None else [str(configured)]),
+        *(["device"] if any(measured) else []),
+    ]
     return " or ".join(names) or None
 
 
 def mean_dynamics(records: Sequence[Session]) -> OwnDynamics | None:
     """Return the mean of the device dynamics over sessions; None if no session recorded them."""
-    known = [record.own_dynamics for record in records if record.own_dynamics is not None]
-    if not known:
+    measured = [record.own_dynamics for record in records if record.own_dynamics is not None]
+    if not measured:
         return None
-    means = Bench._make(np.mean(known, axis=0).tolist())
-    return OwnDynamics(**means._asdict(), sessions=len(known), of=len(records))
+    means = Bench._make(np.mean(measured, axis=0).tolist())
+    return OwnDynamics(**means._asdict(), sessions=len(measured), of=len(records))
 
 
 def _masking_text(answer: Mapping[str, Any] | None) -> str | None:
@@ -264,39 +268,44 @@ def read_tables(sessions: Sequence[Session], name: str) -> pd.DataFrame:
     The columns ``session_status`` and ``trials_missing`` are added.
     """
     paths = [session.folder.table(session.study, name) for session in sessions]
-    table, lengths = tables(paths, {"responses": RESPONSES, "trials": TRIALS, "intervals": INTERVALS}[name])
-    _check_own(sessions, paths, table, lengths)
+    table, lengths = _read_typed_tables(paths, {"responses": RESPONSES, "trials": TRIALS, "intervals": INTERVALS}[name])
+    _check_session_columns(sessions, paths, table, lengths)
     if name == "responses":
         _check_answers(sessions, paths, table, lengths)
     status = np.repeat([session.visit["status"] for session in sessions], lengths)
-    known = [session.visit["missing"] for session in sessions]
-    missing = np.repeat(np.array([None if one is None else one.count for one in known], dtype=object), lengths)
+    missing_trials = [session.visit["missing"] for session in sessions]
+    missing_counts = np.repeat(
+        np.array([None if trials is None else trials.count for trials in missing_trials], dtype=object), lengths
+    )
     return table.assign(
-        session_status=pd.array(status, dtype="string"), **{TRIALS_MISSING.name: pd.array(missing, dtype="Int64")}
+        session_status=pd.array(status, dtype="string"),
+        **{TRIALS_MISSING.name: pd.array(missing_counts, dtype="Int64")},
     )
 
 
-def _check_own(sessions: Sequence[Session], paths: Sequence[Path], table: pd.DataFrame, lengths: _Whole) -> None:
-    """Raise an error if a row does not belong to the session of its file."""
-    own: dict[str, list[Any]] = {
+def _check_session_columns(
+    sessions: Sequence[Session], paths: Sequence[Path], table: pd.DataFrame, lengths: _Counts
+) -> None:
+    """Raise AnalysisError if a row does not belong to the session of its file."""
+    expected: dict[str, list[Any]] = {
         "study": [session.study for session in sessions],
         "participant": [session.folder.participant for session in sessions],
         "session": [session.folder.number for session in sessions],
     }
-    for column, values in own.items():
-        found = table[column].to_numpy()
-        foreign = np.flatnonzero(found != np.repeat(np.array(values, dtype=object), lengths))
-        if len(foreign):
-            which, row = _place(lengths, int(foreign[0]))
+    for column, values in expected.items():
+        recorded = table[column].to_numpy()
+        mismatches = np.flatnonzero(recorded != np.repeat(np.array(values, dtype=object), lengths))
+        if len(mismatches):
+            index, row = _row_location(lengths, int(mismatches[0]))
             raise AnalysisError(
-                f"{paths[which]}, row {row}, column {column}: {str(found[foreign[0]])!r} instead of "
-                f"{str(values[which])!r}; the file belongs to a different session. Restore this session's file from a "
+                f"{paths[index]}, row {row}, column {column}: {str(recorded[mismatches[0]])!r} instead of "
+                f"{str(values[index])!r}; the file belongs to a different session. Restore this session's file from a "
                 "backup"
             )
 
 
-def _check_answers(sessions: Sequence[Session], paths: Sequence[Path], table: pd.DataFrame, lengths: _Whole) -> None:
-    """Raise an error if an answer has no question, or was given twice."""
+def _check_answers(sessions: Sequence[Session], paths: Sequence[Path], table: pd.DataFrame, lengths: _Counts) -> None:
+    """Raise AnalysisError if an answer has no question, or was given twice."""
     blocks = sessions[0].blocks
     asked = {(block.id, code, item.id) for block in blocks for code in block.codes for item in block.items}
     asked |= {
@@ -306,50 +315,51 @@ def _check_answers(sessions: Sequence[Session], paths: Sequence[Path], table: pd
     }
     main = np.flatnonzero(table["phase"].eq("main").fillna(False).to_numpy(dtype=bool))
     answered = zip(*(table[name].to_numpy()[main] for name in ("block", "code", "item")), strict=True)
-    for index, (block, code, item) in zip(main, answered, strict=True):
+    for place, (block, code, item) in zip(main, answered, strict=True):
         if (block, code, item) not in asked:
-            which, row = _place(lengths, int(index))
+            index, row = _row_location(lengths, int(place))
             raise AnalysisError(
-                f"{paths[which]}, row {row}: the receipt does not contain the statement {item!r} for code {code!r} in "
+                f"{paths[index]}, row {row}: the receipt does not contain the statement {item!r} for code {code!r} in "
                 f"block {block!r}. The file has been changed or belongs to a different study: create it again from the "
-                f"journal with liquid-study rebuild {sessions[which].folder.path}"
+                f"journal with liquid-study rebuild {sessions[index].folder.path}"
             )
     twice = np.flatnonzero(
         table.duplicated(["participant", "session", "form", "after_block", "trial", "attempt", "item"])
     )
     if len(twice):
-        which, row = _place(lengths, int(twice[0]))
+        index, row = _row_location(lengths, int(twice[0]))
         answer = table.iloc[int(twice[0])]
         raise AnalysisError(
-            f"{paths[which]}, row {row}: the answer to {answer['item']!r} in trial {answer['trial']} occurs "
+            f"{paths[index]}, row {row}: the answer to {answer['item']!r} in trial {answer['trial']} occurs "
             "twice; create the table again from the journal with liquid-study rebuild "
-            f"{sessions[which].folder.path}"
+            f"{sessions[index].folder.path}"
         )
 
 
-def _place(lengths: _Whole, index: int) -> tuple[int, int]:
-    """Return the session of the row at ``index``, and the row's line number in its file."""
+def _row_location(lengths: _Counts, index: int) -> tuple[int, int]:
+    """Return the index of the session to which a row belongs, and the row's line number in its file."""
     ends = np.cumsum(lengths)
-    which = int(np.searchsorted(ends, index, side="right"))
-    return which, int(index - ends[which] + lengths[which]) + 2
+    session = int(np.searchsorted(ends, index, side="right"))
+    return session, int(index - ends[session] + lengths[session]) + 2
 
 
-def with_excluded(table: pd.DataFrame, listed: Sequence[Exclusion]) -> pd.DataFrame:
-    """Return a table of sessions or trials with ``excluded`` and ``exclusion_reason`` added.
+def mark_excluded(table: pd.DataFrame, listed: Sequence[Exclusion]) -> pd.DataFrame:
+    """Return a table of sessions or trials with the columns ``excluded`` and ``exclusion_reason`` added.
 
     A session is excluded with all its trials, a trial with all its attempts.
     """
     if not listed:
         return table.assign(excluded=False, exclusion_reason=pd.Series(pd.NA, index=table.index, dtype="string"))
-    by_what: dict[tuple[str, int, int | None], list[Exclusion]] = {}
+    by_session_and_trial: dict[tuple[str, int, int | None], list[Exclusion]] = {}
     for exclusion in listed:
-        by_what.setdefault(exclusion.what, []).append(exclusion)
+        by_session_and_trial.setdefault(exclusion.what, []).append(exclusion)
     trials = table["trial"] if "trial" in table.columns else [None] * len(table)
     matching = [
         [
             exclusion
-            for which in dict.fromkeys((None, None if pd.isna(trial) else trial))  # exclusions of sessions first
-            for exclusion in by_what.get((participant, session, which), ())
+            # exclusions of the session first
+            for excluded_trial in dict.fromkeys((None, None if pd.isna(trial) else trial))
+            for exclusion in by_session_and_trial.get((participant, session, excluded_trial), ())
         ]
         for participant, session, trial in zip(table["participant"], table["session"], trials, strict=True)
     ]
@@ -360,8 +370,8 @@ def with_excluded(table: pd.DataFrame, listed: Sequence[Exclusion]) -> pd.DataFr
     )
 
 
-def check_there(study: StudyFolder, trials: pd.DataFrame, listed: Sequence[Exclusion]) -> None:
-    """Raise an error if an excluded session or trial does not exist, for example because of a typing error."""
+def check_exclusions_exist(study: StudyFolder, trials: pd.DataFrame, listed: Sequence[Exclusion]) -> None:
+    """Raise AnalysisError if an excluded session or trial does not exist, for example because of a typing error."""
     sessions = {(session.participant, session.number) for session in study.sessions()}
     presented = set(zip(trials["participant"], trials["session"], trials["trial"], strict=True))
     for exclusion in listed:

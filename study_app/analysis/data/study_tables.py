@@ -1,14 +1,12 @@
 """A study as tables: every session of a results folder, pooled over sites, and its groups of participants.
 
-Each site has a key of its own, so that L1 of one is not L1 of another. Until all keys are open a code is SITE-CODE, and
-each site has settings of its own; then a code is the id of its condition, and the sites have the same settings.
+Each site has its own key, so the code L1 stands for different conditions at different sites. Until all keys are open,
+codes are SITE-CODE and each site has its own settings; afterwards the ID of a condition is its code, and all sites have
+the same settings.
 
-Everything recorded is kept; the column ``counted`` says what enters measures and figures: main trials of sessions that
-reached their end, of a repeated trial the last attempt, without what ``exclusions.csv`` leaves out; it leaves out
-sessions with too many missing trials, unless a person included them again. Practice and baseline stay
-apart by their ``phase``.
-
-Without groups or sites, and until the study is unblinded, there is nothing.
+The tables contain everything that was recorded. The column ``counted`` marks the rows that enter measures and figures:
+main trials of completed sessions that are not excluded and, if a trial was repeated, only its last attempt. Sessions
+with too many missing trials are excluded unless a person included them again.
 """
 
 from __future__ import annotations
@@ -41,16 +39,16 @@ from study_app.analysis.data.blocks import (
     Setting,
     contrasts_of,
     read_decided,
-    settings_of,
+    settings_from_key,
 )
 from study_app.analysis.data.session_files import (
     Session,
-    check_there,
+    check_exclusions_exist,
     estimators_of,
+    mark_excluded,
     mean_dynamics,
     read_session,
     read_tables,
-    with_excluded,
 )
 from study_app.errors import AnalysisError, StoreError
 from study_app.protocol.model import RULES, Contrast
@@ -78,10 +76,12 @@ def _with_merged_code(site: str, setting: Setting) -> Setting:
     return replace(setting, code=code)
 
 
-def _unique_settings(each: Mapping[str, Iterable[Setting]]) -> tuple[Setting, ...]:
+def _unique_settings(settings_by_site: Mapping[str, Iterable[Setting]]) -> tuple[Setting, ...]:
     """Return the settings of all sites without duplicates, in order of first occurrence."""
     return tuple(
-        dict.fromkeys(_with_merged_code(site, setting) for site, settings in each.items() for setting in settings)
+        dict.fromkeys(
+            _with_merged_code(site, setting) for site, settings in settings_by_site.items() for setting in settings
+        )
     )
 
 
@@ -103,7 +103,7 @@ def _pooled_questions(sites: Mapping[str, OtherQuestions]) -> OtherQuestions:
 
     def questions(asked: Mapping[str, Sequence[PlacedQuestion]]) -> tuple[PlacedQuestion, ...]:
         return tuple(
-            replace(question, where=where({site: those[place].where for site, those in asked.items()}))
+            replace(question, where=where({site: of_site[place].where for site, of_site in asked.items()}))
             for place, question in enumerate(next(iter(asked.values())))
         )
 
@@ -133,12 +133,12 @@ def _add_site(site: str, settings: Settings, table: pd.DataFrame) -> pd.DataFram
 
 
 def _pooled_dynamics(sites: Iterable[OwnDynamics | None], sessions: int) -> OwnDynamics | None:
-    known = [site for site in sites if site is not None]
-    if not known:
+    measured = [site for site in sites if site is not None]
+    if not measured:
         return None
-    weights = [dynamics.sessions for dynamics in known]
+    weights = [dynamics.sessions for dynamics in measured]
     damping_nspm, friction_n, mass_kg = (
-        float(np.average([getattr(dynamics, name) for dynamics in known], weights=weights))
+        float(np.average([getattr(dynamics, name) for dynamics in measured], weights=weights))
         for name in ("damping_nspm", "friction_n", "mass_kg")
     )
     return OwnDynamics(
@@ -200,7 +200,7 @@ class Study:
     _aggregates: dict[tuple[str, ...], pd.DataFrame] = field(
         init=False, default_factory=dict, repr=False, compare=False
     )
-    """Those of blocks and items: a report needs each eight times (0.02 s)."""
+    """Cached measures by block and items: computing them takes 0.02 s, and a report needs each table eight times."""
 
     @property
     def people(self) -> tuple[str, ...]:
@@ -234,7 +234,7 @@ class Study:
 
     @property
     def contents(self) -> int:
-        """The number of different study files used by these sessions."""
+        """The number of different study files that the included sessions used."""
         return int(self.participants.loc[self.participants["counted"], "protocol_hash"].nunique())
 
     @property
@@ -264,7 +264,7 @@ class Study:
         return not self.revealed and self.protocol.get("study", {}).get("codes") == "participant"
 
     def tell_doubts(self, warn: Callable[[str], object] | None) -> None:
-        """Issue one warning per file that differs from its recorded state."""
+        """Call ``warn`` once for each file that differs from its recorded state."""
         if warn is None:
             return
         for doubt in self.doubts:
@@ -298,18 +298,20 @@ class Study:
     def excluded_trials(self, block: Block) -> pd.DataFrame:
         """Return the individually excluded trials of a block: last attempts in included sessions."""
         rows = self.trials[self.trials["excluded"] & (self.trials["block"] == block.id)]
-        here = self.participants.loc[self.participants["counted"], ["participant", "session"]]
+        included = self.participants.loc[self.participants["counted"], ["participant", "session"]]
         return (
-            rows.sort_values("attempt").drop_duplicates(_TRIAL, keep="last").merge(here, on=["participant", "session"])
+            rows.sort_values("attempt")
+            .drop_duplicates(_TRIAL, keep="last")
+            .merge(included, on=["participant", "session"])
         )
 
     def aggregate(self, block: Block) -> pd.DataFrame:
-        """Return the measures of a block: see ``measures.aggregate``."""
+        """Return the measures of a block (see ``measures.aggregate``)."""
         items = [item.id for item in block.items]
         if (key := (block.id, *items)) not in self._aggregates:
             excluded = Counter(map(str, self.excluded_trials(block)["code"]))
-            found = measures.aggregate(self.answers(block), self.presented(block), block.codes, items, excluded)
-            self._aggregates[key] = found
+            measured = measures.aggregate(self.answers(block), self.presented(block), block.codes, items, excluded)
+            self._aggregates[key] = measured
         return self._aggregates[key]
 
 
@@ -343,17 +345,19 @@ def load_study(folder: Path, *, planned: bool = True) -> Study:
 
 
 def _load_sites(merged: Merged, *, planned: bool) -> Study:
-    places = {name: StudyFolder(merged.folder(name)) for name in merged.names}
-    if missing := [place.path for place in places.values() if not place.path.is_dir()]:
+    folders = {name: StudyFolder(merged.folder(name)) for name in merged.names}
+    if missing := [site.path for site in folders.values() if not site.path.is_dir()]:
         raise StoreError(f"{missing[0]} is missing, but {merged.manifest.name} lists it: restore it from a backup")
     opened = has_opened_keys(merged.path)
-    read = partial(_load, sealed=not opened, planned=planned)
-    sites = {name: read(place.path) for name, place in places.items() if place.sessions()}
+    load_site = partial(_load, sealed=not opened, planned=planned)
+    sites = {name: load_site(site.path) for name, site in folders.items() if site.sessions()}
     if not sites:
         raise AnalysisError(
             f"{merged.path} does not contain any sessions, because all participants at its sites withdrew"
         )
-    return pool_sites(merged.path, sites, [it for place in places.values() for it in tombstones(place).values()])
+    return pool_sites(
+        merged.path, sites, [tombstone for site in folders.values() for tombstone in tombstones(site).values()]
+    )
 
 
 def pool_sites(folder: Path, sites: Mapping[str, Study], withdrawn: Sequence[Tombstone]) -> Study:
@@ -377,10 +381,10 @@ def pool_sites(folder: Path, sites: Mapping[str, Study], withdrawn: Sequence[Tom
         levels=_pooled_blocks({site: study.levels for site, study in sites.items()}),
         others=_pooled_questions({site: study.others for site, study in sites.items()}),
         settings={
-            (block, own.code): own
+            (block, merged.code): merged
             for site, study in sites.items()
             for (block, _), setting in study.settings.items()
-            for own in [_with_merged_code(site, setting)]
+            for merged in [_with_merged_code(site, setting)]
         },
         responses=table("responses"),
         trials=table("trials"),
@@ -405,40 +409,40 @@ def _load(folder: Path, *, sealed: bool = False, planned: bool = True) -> Study:
     place = StudyFolder(folder)
     sessions = [session for session in place.sessions() if not is_never_begun(session.path)]
     if not sessions:
-        raise AnalysisError(_no_sessions(place.path))
+        raise AnalysisError(_no_sessions_message(place.path))
     refuse_earlier_columns(place)
-    key = None if sealed else _key(place, sessions)
+    key = None if sealed else _read_key(place, sessions)
     listed = tuple(row for row in exclusions(place.path) if planned or row.rule_or_person not in RULES)
     records = [read_session(sessions[0], key)]
     records += [read_session(session, key, like=records[0]) for session in sessions[1:]]
     listed += tuple(_find_missing_exclusions(place, records, listed))
     for session in records[1:]:
-        _check_alike(records[0], session)
+        _check_poolable(records[0], session)
     responses, trials = read_tables(records, "responses"), read_tables(records, "trials")
     if key is None:  # tables of earlier versions have these columns
         trials = _drop_columns(trials, SEALED)
-    check_there(place, trials, listed)
+    check_exclusions_exist(place, trials, listed)
     after_trials = responses[responses["trial"].notna()]
-    both = pd.concat([after_trials, trials])[[*_TRIAL, "attempt"]]
-    last = both.groupby(_TRIAL)["attempt"].max().rename("last_attempt")
-    counted = _add_counted(with_excluded(after_trials, listed), last)
-    of_forms = with_excluded(responses[responses["trial"].isna()], listed)
-    answers_count = of_forms["session_status"].isin(REACHED_END) & ~of_forms["excluded"]
-    of_forms = of_forms.assign(counted=answers_count.astype(bool))
-    answered = pd.concat([counted, of_forms]).sort_index() if len(of_forms) else counted
-    participants = with_excluded(pd.DataFrame([session.visit for session in records]), listed)
+    attempts = pd.concat([after_trials, trials])[[*_TRIAL, "attempt"]]
+    last_attempts = attempts.groupby(_TRIAL)["attempt"].max().rename("last_attempt")
+    counted = _add_counted(mark_excluded(after_trials, listed), last_attempts)
+    form_answers = mark_excluded(responses[responses["trial"].isna()], listed)
+    is_counted = form_answers["session_status"].isin(REACHED_END) & ~form_answers["excluded"]
+    form_answers = form_answers.assign(counted=is_counted.astype(bool))
+    answered = pd.concat([counted, form_answers]).sort_index() if len(form_answers) else counted
+    participants = mark_excluded(pd.DataFrame([session.visit for session in records]), listed)
     return Study(
         folder=place.path,
         name=records[0].study,
         title=records[0].title,
         version=records[0].version,
         blocks=records[0].blocks,
-        settings={} if key is None else settings_of(key),
+        settings={} if key is None else settings_from_key(key),
         responses=_statement_answers(counted),
         answered=answered,
         levels=records[0].levels,
-        intervals=_intervals(records, listed, last, opened=key is not None),
-        trials=_add_counted(with_excluded(trials, listed), last),
+        intervals=_read_intervals(records, listed, last_attempts, opened=key is not None),
+        trials=_add_counted(mark_excluded(trials, listed), last_attempts),
         participants=participants.assign(counted=participants["status"].isin(REACHED_END) & ~participants["excluded"]),
         exclusions=listed,
         late=late_exclusions(place.path, listed),
@@ -460,11 +464,11 @@ def _load(folder: Path, *, sealed: bool = False, planned: bool = True) -> Study:
 def _find_missing_exclusions(
     place: StudyFolder, records: Sequence[Session], listed: Sequence[Exclusion]
 ) -> Iterator[Exclusion]:
-    """Yield the missing exclusion of each incomplete session whose program ended before writing it."""
+    """Yield the exclusions of incomplete sessions that the program did not write before it ended."""
     decided = {exclusion.what for exclusion in (*listed, *reversals(place.path))}
     for record in records:
-        what = (record.folder.participant, record.folder.number, None)
-        if record.visit["status"] == INCOMPLETE and what not in decided:
+        session = (record.folder.participant, record.folder.number, None)
+        if record.visit["status"] == INCOMPLETE and session not in decided:
             yield Exclusion(
                 participant=record.folder.participant,
                 session=record.folder.number,
@@ -475,44 +479,46 @@ def _find_missing_exclusions(
             )
 
 
-def _intervals(
-    records: Sequence[Session], listed: Sequence[Exclusion], last: pd.Series[int], *, opened: bool
+def _read_intervals(
+    records: Sequence[Session], listed: Sequence[Exclusion], last_attempts: pd.Series[int], *, opened: bool
 ) -> pd.DataFrame:
     """Return the intervals of all sessions; an empty table for a study without designs."""
     if not has_intervals(records[0].protocol):
         return pd.DataFrame()
     table = read_tables(records, "intervals")
     table = table if opened else _drop_columns(table, {column.name for column in INTERVALS if column.sealed})
-    return _add_counted(with_excluded(table, listed), last)
+    return _add_counted(mark_excluded(table, listed), last_attempts)
 
 
 def _drop_columns(table: pd.DataFrame, columns: AbstractSet[str]) -> pd.DataFrame:
     return table.assign(**{name: table[name].mask(table[name].notna()) for name in columns & {*table.columns}})
 
 
-def _key(place: StudyFolder, sessions: Sequence[SessionFolder]) -> Key | None:
-    """Return the opened key; raise a specific error if a session belongs to another study."""
+def _read_key(place: StudyFolder, sessions: Sequence[SessionFolder]) -> Key | None:
+    """Return the opened key, or None; raise AnalysisError if it fails because a session belongs to another study."""
     try:
         return revealed_key(place.path)
     except StoreError:
         first, *others = [read_session(session, None) for session in sessions]
         for other in others:
             if other.study != first.study:
-                raise AnalysisError(_other_study(other, first)) from None
+                raise AnalysisError(_other_study_message(other, first)) from None
         raise
 
 
-def _no_sessions(path: Path) -> str:
+def _no_sessions_message(path: Path) -> str:
     if not path.is_dir():
         return (
             f"{path} is not a folder: specify a study folder, such as results/rek2024, or one of the names that "
             "liquid-study studies lists"
         )
-    inside = sorted(found.name for found in path.iterdir() if found.is_dir() and StudyFolder(found).sessions())
-    if inside:
+    study_folders = sorted(
+        folder.name for folder in path.iterdir() if folder.is_dir() and StudyFolder(folder).sessions()
+    )
+    if study_folders:
         return (
-            f"{path} is not a study folder, but it contains study folders ({', '.join(inside)}): specify "
-            f"one, such as {path / inside[0]}"
+            f"{path} is not a study folder, but it contains study folders ({', '.join(study_folders)}): specify "
+            f"one, such as {path / study_folders[0]}"
         )
     return (
         f"{path} does not contain any sessions (data/sub-…/ses-…): specify the folder of a study that has at least one "
@@ -520,17 +526,17 @@ def _no_sessions(path: Path) -> str:
     )
 
 
-def _other_study(other: Session, first: Session) -> str:
+def _other_study_message(other: Session, first: Session) -> str:
     return (
         f"{other.folder.path} belongs to the study {other.study!r}, but {first.folder.path} belongs to "
         f"{first.study!r}: keep each study in a separate folder"
     )
 
 
-def _check_alike(first: Session, other: Session) -> None:
-    """Raise an error if sessions with different questions or keys would be pooled."""
+def _check_poolable(first: Session, other: Session) -> None:
+    """Raise AnalysisError if two sessions have different studies, keys or questions, so that they cannot be pooled."""
     if other.study != first.study:
-        raise AnalysisError(_other_study(other, first))
+        raise AnalysisError(_other_study_message(other, first))
     if other.visit["key_hash"] != first.visit["key_hash"]:
         raise AnalysisError(
             f"{other.folder.path} and {first.folder.path} used different sealed keys, so the same code may stand for "
@@ -543,9 +549,9 @@ def _check_alike(first: Session, other: Session) -> None:
         )
 
 
-def _add_counted(table: pd.DataFrame, last: pd.Series[int]) -> pd.DataFrame:
+def _add_counted(table: pd.DataFrame, last_attempts: pd.Series[int]) -> pd.DataFrame:
     """Add ``counted``: the last attempt at each main trial of completed sessions, unless excluded."""
-    joined = table.join(last, on=_TRIAL)
+    joined = table.join(last_attempts, on=_TRIAL)
     counted = (
         (joined["phase"] == "main")
         & joined["session_status"].isin(REACHED_END)
@@ -569,7 +575,7 @@ def group_members(study: Study) -> dict[str, str]:
 
     Randomised groups are unknown while the key is sealed.
     """
-    members = _members(study, "group")
+    members = _group_rows(study, "group")
     return dict(zip(map(str, members["participant"]), map(str, members["group"]), strict=True))
 
 
@@ -579,8 +585,10 @@ def split_study(study: Study, split: str) -> Study:
         return replace(study, split=split)
     people = {person for person, group in group_members(study).items() if group == split}
     tables = {name: getattr(study, name) for name in ("responses", "trials", "participants", "answered", "intervals")}
-    own = {name: table[table["participant"].isin(people)] for name, table in tables.items() if "participant" in table}
-    return replace(study, split=split, **own)
+    split_tables = {
+        name: table[table["participant"].isin(people)] for name, table in tables.items() if "participant" in table
+    }
+    return replace(study, split=split, **split_tables)
 
 
 def groups_shown(study: Study) -> list[tuple[str, Study]]:
@@ -599,7 +607,7 @@ def group_assignment(study: Study) -> str | None:
 
 def group_counts(study: Study, by: By = "group") -> dict[str, int]:
     """Return the number of included participants in each group, or at each site."""
-    counts = _members(study, by)[by].value_counts()
+    counts = _group_rows(study, by)[by].value_counts()
     return {str(group): int(counts[group]) for group in sorted(counts.index)}
 
 
@@ -609,23 +617,25 @@ def group_means(study: Study, by: By = "group") -> list[Any]:
     They have ``block``, ``item``, ``code``, ``group``, the number ``n`` of participants, and the ``mean`` and ``sd``
     over participants' means in scale points, NaN for the SD of one participant.
     """
-    members = _members(study, by)
+    members = _group_rows(study, by)
     if members.empty:
         return []
     rows = study.responses[study.responses["counted"] & study.responses["response"].notna()].merge(
         members, on="participant"
     )
     rows = rows.assign(response=rows["response"].astype(float))
-    of = ["block", "item", "code", by]
-    each = rows.groupby([*of, "participant"])["response"].mean().groupby(of).agg(["size", "mean", "std"])
-    frame = each.reset_index().set_axis(["block", "item", "code", "group", "n", "mean", "sd"], axis="columns")
+    columns = ["block", "item", "code", by]
+    statistics = (
+        rows.groupby([*columns, "participant"])["response"].mean().groupby(columns).agg(["size", "mean", "std"])
+    )
+    frame = statistics.reset_index().set_axis(["block", "item", "code", "group", "n", "mean", "sd"], axis="columns")
     order = [(block.id, item.id, code) for block in study.blocks for item in block.items for code in block.codes]
-    places = [order.index(which) for which in zip(frame["block"], frame["item"], frame["code"], strict=True)]
+    places = [order.index(cell) for cell in zip(frame["block"], frame["item"], frame["code"], strict=True)]
     frame = frame.assign(place=places).sort_values(["place", "group"])
     return list(frame.itertuples(index=False))
 
 
-def _members(study: Study, by: By) -> pd.DataFrame:
+def _group_rows(study: Study, by: By) -> pd.DataFrame:
     """Return all included participants with their group or site."""
     if by == "site":
         people = study.people if study.sites and study.revealed else ()

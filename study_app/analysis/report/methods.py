@@ -15,7 +15,7 @@ from study_app.analysis.findings.delays import ContrastsWithControl
 from study_app.analysis.findings.statement_tests import DelayTrend, Effects, MeanTests, OverAll
 from study_app.analysis.levels.evaluate import level_methods
 from study_app.analysis.planned_exclusions import NEED_KEY, proposals, rule_conditions
-from study_app.analysis.results import BlockResult, Results, lead_phrase, said_of_presentations
+from study_app.analysis.results import BlockResult, Results, lead_phrase, presentation_sentences
 from study_app.analysis.wording import counted, listed, ms, number, significant
 from study_app.protocol.blocks import block_titles
 from study_app.protocol.participants import RecordedSessions
@@ -238,7 +238,7 @@ def _design(study: Study, results: Results) -> Iterator[str]:
     blocks = {block.id: block for block in study.blocks}
     for result in results.blocks:
         yield _presentation_sentence(study, blocks[result.id], result)
-        yield from said_of_presentations(result)
+        yield from presentation_sentences(result)
     others = [*_other_questions(study, results)]
     yield from others
     if results.blocks or others:

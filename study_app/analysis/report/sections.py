@@ -16,7 +16,7 @@ from study_app.analysis.data.motion import (
     OF_TRIALS,
     REACH_DEFINITIONS,
     TRIAL_DEFINITIONS,
-    Moved,
+    MovementQuartiles,
     Performance,
 )
 from study_app.analysis.data.study_tables import By, Study, group_assignment, group_counts, group_means
@@ -44,7 +44,7 @@ from study_app.analysis.results import (
     lead_phrase,
     missing_sentences,
     name,
-    said_of_presentations,
+    presentation_sentences,
     settings_noun,
     short_text,
 )
@@ -386,7 +386,7 @@ def _parts(
     result: BlockResult, results: Results, pictures: Mapping[str, Picture]
 ) -> Iterator[tuple[str, Callable[[], Iterable[str]]]]:
     """Yield the titles of a block's parts and the functions that make them."""
-    if said := said_of_presentations(result):
+    if said := presentation_sentences(result):
         yield "presentations", lambda: [paragraph(" ".join(said))]
     if result.incomplete:
         yield "missing answers", lambda: [paragraph(incomplete_words(result), "soft")]
@@ -822,7 +822,7 @@ def motion(results: Results) -> Iterator[str]:
     )
 
 
-def _movement_measures(measured: Performance, result: BlockResult, **wanted: str) -> Iterator[Moved]:
+def _movement_measures(measured: Performance, result: BlockResult, **wanted: str) -> Iterator[MovementQuartiles]:
     """Yield the measures of a block, by code or by name."""
     for moved in measured.moved:
         if moved.block == result.id and all(getattr(moved, field) == value for field, value in wanted.items()):
@@ -843,7 +843,7 @@ def _motion_rows(
     return rows
 
 
-def _quartiles(moved: Moved) -> str:
+def _quartiles(moved: MovementQuartiles) -> str:
     digits = 2 if moved.measure.endswith(("_s", "_n", "_m", "percent")) else 1
     return f"{number(moved.median, digits)} ({number(moved.q1, digits)}–{number(moved.q3, digits)})"
 

@@ -15,7 +15,7 @@ from typing import Final, TypeAlias
 import numpy as np
 from scipy.optimize import brentq
 
-from study_app.analysis.contrasts import Compared, Measured
+from study_app.analysis.contrasts import ContrastSamples, ParticipantValue
 from study_app.analysis.findings import RecognitionResult, recognised
 from study_app.analysis.results import Verdict
 from study_app.analysis.statistics import (
@@ -113,8 +113,8 @@ def _threshold_trial(n: int, ratio: float) -> Trial:
             estimates.medians[:n] - estimates.medians[n:],
             estimates.variances[:n] + estimates.variances[n:],
         )
-        sample = tuple(Measured(value=values[k], variance=variances[k]) for k in np.argsort(values))
-        means = Compared(samples=(sample,), left_out={}).means(_ALPHA)
+        sample = tuple(ParticipantValue(value=values[k], variance=variances[k]) for k in np.argsort(values))
+        means = ContrastSamples(samples=(sample,), left_out={}).means(_ALPHA)
         return means is not None and max(float(p[0]) for p in p_differs(means, "two-sided")) <= _ALPHA
 
     return trial

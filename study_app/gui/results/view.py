@@ -23,7 +23,7 @@ from study_app.analysis.worker_messages import (
     OpenKey,
     Order,
     Progress,
-    Proposed,
+    ProposedExclusions,
     ReadStudy,
     SessionsFound,
     StudiesFound,
@@ -437,7 +437,7 @@ class ResultsPlace(Place):
                 self._take_studies(answer)
             case SessionsFound() if newest:
                 self._take_sessions(answer)
-            case Proposed() if newest:
+            case ProposedExclusions() if newest:
                 self._update_view(proposed=answer.exclusions, rules=answer.rules)
             case StudyFound() if newest:
                 self._blocks = answer.blocks

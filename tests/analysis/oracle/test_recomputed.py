@@ -151,25 +151,27 @@ def control_exchanged_with_delay(patched: pytest.MonkeyPatch) -> None:
 
 
 def conditions_exchanged(patched: pytest.MonkeyPatch) -> None:
-    def swapped(study: Any, contrast: Any, block: str, condition: Any, *rest: Any, of: Any = contrasts._values) -> Any:
+    of = contrasts._participant_values
+
+    def swapped(study: Any, contrast: Any, block: str, condition: Any, *rest: Any) -> Any:
         others = [other for other in contrast.conditions or () if other != condition] or [condition]
         return of(study, contrast, block, others[0], *rest)
 
-    patched.setattr(contrasts, "_values", swapped)
+    patched.setattr(contrasts, "_participant_values", swapped)
 
 
 def exclusions_forgotten(patched: pytest.MonkeyPatch) -> None:
-    of = study_tables.with_excluded
-    patched.setattr(study_tables, "with_excluded", lambda table, _listed: of(table, ()))
+    of = study_tables.mark_excluded
+    patched.setattr(study_tables, "mark_excluded", lambda table, _listed: of(table, ()))
 
 
 def excluded_trials_forgotten(patched: pytest.MonkeyPatch) -> None:
-    of = study_tables.with_excluded
+    of = study_tables.mark_excluded
 
     def of_sessions(table: Any, listed: Any) -> Any:
         return of(table, [exclusion for exclusion in listed if exclusion.trial is None])
 
-    patched.setattr(study_tables, "with_excluded", of_sessions)
+    patched.setattr(study_tables, "mark_excluded", of_sessions)
 
 
 def withdrawn_sessions_counted(patched: pytest.MonkeyPatch) -> None:

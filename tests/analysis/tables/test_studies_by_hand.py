@@ -195,7 +195,9 @@ def test_reaches_overshoot_and_paths_are_those_of_a_drawn_line() -> None:
         [("D1", "P1", 1.0), ("D1", "P1", 3.0), ("D1", "P2", 8.0), ("D2", "P1", None)],
         columns=["code", "participant", "path_mm"],
     ).assign(block="b")
-    found = list(motion._quartiles(block, pd.concat([rows, rows.assign(block="c", path_mm=99.0)]), ("path_mm",)))
+    found = list(
+        motion._movement_quartiles(block, pd.concat([rows, rows.assign(block="c", path_mm=99.0)]), ("path_mm",))
+    )
     assert [(one.block, one.code, one.measure, one.n, one.median) for one in found] == [
         ("b", "D1", "path_mm", 2, 5.0), ("b", "D2", "path_mm", 0, None),
     ]  # fmt: skip
@@ -223,4 +225,4 @@ def test_bench_masking_and_estimators_of_receipts_are_read() -> None:
     means = session_files.mean_dynamics([*both, session(device=True, own=None)])
     assert means == OwnDynamics(damping_nspm=2.0, friction_n=5.25, mass_kg=0.5, sessions=2, of=3)
     lengths = np.array([3, 2])
-    assert [session_files._place(lengths, index) for index in (0, 2, 3, 4)] == [(0, 2), (0, 4), (1, 2), (1, 3)]
+    assert [session_files._row_location(lengths, index) for index in (0, 2, 3, 4)] == [(0, 2), (0, 4), (1, 2), (1, 3)]
