@@ -20,7 +20,7 @@ from study_app.analysis.data.study_tables import Study, group_members
 from study_app.analysis.findings.finding import FOUND, HOLM, TESTS, BlockAnswers, verdict
 from study_app.analysis.html_page import bullets, ends_of, heading, paragraph, table_of
 from study_app.analysis.levels.answers import Settings
-from study_app.analysis.levels.evaluate import READ
+from study_app.analysis.levels.evaluate import TRACK_COLUMNS
 from study_app.analysis.levels.exponents import Exponents
 from study_app.analysis.levels.sensitivities import Sensitivities
 from study_app.analysis.levels.statistic import LevelStatistic
@@ -275,7 +275,7 @@ def _thresholds_in_two_blocks(
 ) -> tuple[list[Mapping[str, ParticipantValue]], float]:
     """Return the thresholds in two blocks, multiplied by ``per_u``, and the variance that common widths add."""
     first, second = (next(level for level in study.levels if level.id == block) for block in contrast.blocks)
-    sides, shared = thresholds_compared(first, second, tracks(study)[list(READ)])
+    sides, shared = thresholds_compared(first, second, tracks(study)[list(TRACK_COLUMNS)])
     return [
         {person: ParticipantValue(value=per_u * u.value, variance=per_u**2 * u.variance) for person, u in side.items()}
         for side in sides
@@ -324,7 +324,7 @@ def _participant_values(
     statistic, attribute = _STATISTICS[contrast.measure]
     ratio = _is_ratio(contrast, levels)
     measured_values: dict[str, list[ParticipantValue]] = {}
-    for row in statistic.own(result):
+    for row in statistic.participant_rows(result):
         if (value := getattr(row, attribute)) is not None:
             measured = ParticipantValue(
                 value=math.log(value) if ratio else value, variance=_variance_of_estimate(row, result, ratio=ratio)

@@ -1,4 +1,4 @@
-"""The answers at each level or to each condition, and the levels that participants set: of all and of each."""
+"""The answers at each level or to each condition, and the levels that participants set, by participant and group."""
 
 import math
 from collections import Counter
@@ -18,17 +18,17 @@ from study_app.analysis.levels.statistic import (
     INTERVAL,
     KINDS,
     MOTORS,
-    OF_WHOM,
+    PARTICIPANT_COLUMNS,
     LevelStatistic,
-    Shown,
-    analysed,
+    TableColumn,
+    analysed_rows,
     cell_text,
     digits,
+    group_mean_row,
     interval_text,
     level_words,
-    mean_over,
     signed,
-    standards_of,
+    standards_phrase,
     unit,
     with_unit,
 )
@@ -72,22 +72,24 @@ class SettingEstimate:
     started_high: tuple[bool, ...] = ()
 
 
-def settings(block: LevelBlock, opened: pd.DataFrame) -> Iterator[SettingEstimate]:
-    """Yield the group's settings at each standard, followed by those of its participants; none for other designs."""
+def setting_estimates(block: LevelBlock, opened: pd.DataFrame) -> Iterator[SettingEstimate]:
+    """Yield the group's mean settings at each standard, then each participant's; nothing for other designs."""
     stimulus = block.stimulus
     if stimulus is None or not block.design.adjusts:
         return
-    rows = analysed(block, opened)
-    for standard, at_standard in rows[rows["setting"].notna()].groupby("standard", dropna=False, sort=True):
-        people = at_standard.groupby("participant", sort=True)
-        own = [_setting(block, stimulus, str(person), number_or_none(standard), some) for person, some in people]
+    rows = analysed_rows(block, opened)
+    for standard, standard_rows in rows[rows["setting"].notna()].groupby("standard", dropna=False, sort=True):
+        people = standard_rows.groupby("participant", sort=True)
+        estimates = [
+            _estimate_settings(block, stimulus, str(person), number_or_none(standard), rows) for person, rows in people
+        ]
         others = ("jnd", "constant_error", "hysteresis")
-        group = mean_over(own, "pse", *others, coordinate=stimulus.coordinate, level_of=stimulus.level_of)
+        group = group_mean_row(estimates, "pse", *others, coordinate=stimulus.coordinate, level_of=stimulus.level_of)
         yield replace(group, levels=(), started_high=())
-        yield from own
+        yield from estimates
 
 
-def _setting(
+def _estimate_settings(
     block: LevelBlock, stimulus: Stimulus, person: str, standard: float | None, rows: pd.DataFrame
 ) -> SettingEstimate:
     in_u = np.vectorize(stimulus.coordinate, otypes=[float])
@@ -120,69 +122,69 @@ class Settings(LevelStatistic[SettingEstimate]):
     figures = ("settings",)
     table = "settings"
 
-    compute = staticmethod(lambda block, opened, _study, _found: settings(block, opened))
+    compute = staticmethod(lambda block, opened, _study, _found: setting_estimates(block, opened))
 
     @classmethod
-    def exported_in(cls, study: Study) -> bool:
+    def is_exported_in(cls, study: Study) -> bool:
         return any(block.design.adjusts for block in study.levels)
 
     @property
-    def _are_compared(self) -> bool:
+    def _has_constant_error(self) -> bool:
         return any(row.constant_error is not None for row in self.rows)
 
-    def shown(self) -> Sequence[Shown]:
-        in_u = "decades" if self.found.spacing == "log" else self.found.unit or "units of the level"
+    def table_columns(self) -> Sequence[TableColumn]:
+        in_u = "decades" if self.result.spacing == "log" else self.result.unit or "units of the level"
         return (
-            self.standard(),
-            *OF_WHOM,
-            (f"PSE{unit(self.found)}", lambda row: digits(row.pse)),
+            self.standard_column(),
+            *PARTICIPANT_COLUMNS,
+            (f"PSE{unit(self.result)}", lambda row: digits(row.pse)),
             INTERVAL,
             (f"JND [{in_u}]", lambda row: digits(row.jnd)),
-            (f"constant error [{in_u}]", lambda row: signed(row.constant_error)) if self._are_compared else None,
+            (f"constant error [{in_u}]", lambda row: signed(row.constant_error)) if self._has_constant_error else None,
             (f"hysteresis [{in_u}]", lambda row: signed(row.hysteresis)),
         )
 
-    def explained(self) -> str:
-        values = "logarithms of the set levels" if self.found.spacing == "log" else "set levels"
-        error = " constant error: PSE − standard;" if self._are_compared else ""
+    def explanation(self) -> str:
+        values = "logarithms of the set levels" if self.result.spacing == "log" else "set levels"
+        error = " constant error: PSE − standard;" if self._has_constant_error else ""
         return (
-            f"Settings are expressed as levels ({level_words(self.found)}). PSE (point of subjective equality): mean "
+            f"Settings are expressed as levels ({level_words(self.result)}). PSE (point of subjective equality): mean "
             f"of the {values}, with a 95 % confidence interval (Student’s t); JND (just-noticeable difference): their "
             f"standard deviation;{error} hysteresis: mean of the settings that started high minus mean of those that "
             "started low. Group values are means across participants; the group PSE has a 95 % confidence interval."
         )
 
-    def compares(self, measure: str) -> bool:
+    def is_comparable_with(self, measure: str) -> bool:
         return True
 
     def limits(self) -> Iterator[str]:
-        title = self.found.title
-        if not (own := self.own(self.found)):
+        title = self.result.title
+        if not (estimates := self.participant_rows(self.result)):
             return
         yield (
             f"{title}: settings depend on each participant's criterion for calling two stimuli equal, so the "
             "variability of settings is not a criterion-free measure of the threshold."
         )
-        if few := [str(estimate.participant) for estimate in own if estimate.hysteresis is None]:
-            words = "all settings started near the same end of the range, so the hysteresis is unknown"
-            yield f"{title}: {words} ({listed(few[:_MOST_NAMED])})."
+        if people := [str(estimate.participant) for estimate in estimates if estimate.hysteresis is None]:
+            reason = "all settings started near the same end of the range, so the hysteresis is unknown"
+            yield f"{title}: {reason} ({listed(people[:_MOST_NAMED])})."
         yield f"{title}: {MOTORS}"
 
     def methods(self, block: LevelBlock) -> Iterator[str]:
         if not self.rows or block.stimulus is None:
             return
-        against = standards_of(self.found, self.rows)
+        against = standards_phrase(self.result, self.rows)
         to = against.replace(" for ", " to match ", 1) if block.design.intervals > 1 else ""
         kind, (low, high) = KINDS[block.stimulus.level_kind], block.stimulus.levels
         yield (
-            f"In “{self.found.title}”, participants set {self.found.quantity}{to} by {block.design.paper_name}; "
+            f"In “{self.result.title}”, participants set {self.result.quantity}{to} by {block.design.paper_name}; "
             f"{kind} ranged from {low:g} to {high:g}, and the starting level alternated between the lower and the "
             "upper end of this range."
         )
 
     @classmethod
     def common_methods(cls, blocks: Sequence[LevelsResult]) -> Iterator[str]:
-        if any(map(cls.of, blocks)):
+        if any(map(cls.rows_in, blocks)):
             yield (
                 "The point of subjective equality is the mean of a participant’s settings, the just-noticeable "
                 "difference is their standard deviation, the constant error is the difference between the mean and the "
@@ -199,12 +201,12 @@ SUMMARIES: Final[dict[Reply, Summary]] = {
     "number": "geometric mean",
     "setting": "settings",
 }
-"""How the answers at a level are summarised, by the reply that the design asks for."""
+"""The summary of the answers at a level, by the kind of reply that the design asks for."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LevelAnswers:
-    """The answers at one level, of one participant or (``participant`` None) of all.
+    """The answers of one participant, or of all if ``participant`` is None, at one level.
 
     Answers to catch trials are separate, with ``catch``. A block that compares conditions has ``comparison`` instead of
     ``standard`` and ``level``. ``value`` summarises ``n`` answers of ``participants``; ``count`` is the number of
@@ -233,10 +235,10 @@ def chooses_units(block: LevelBlock) -> bool:
 def _level_answers(
     block: LevelBlock, opened: pd.DataFrame, bounds: tuple[float, float] | None
 ) -> Iterator[LevelAnswers]:
-    """Yield the answers at each level, and separately to catch trials: of all participants, then of each."""
+    """Yield the answers at each level, and separately those to catch trials: the group's, then each participant's."""
     if block.design.adjusts:
         return
-    rows = analysed(block, opened)
+    rows = analysed_rows(block, opened)
     if block.stimulus is None:
         places = {setting.condition: place for place, setting in enumerate(block.settings)}
         rows = rows.assign(comparison=rows["track"], place=rows["track"].map(places), catch=False)
@@ -244,21 +246,21 @@ def _level_answers(
     else:
         rows = rows.assign(catch=rows["catch"].fillna(False).astype(bool))
         by = ["standard", "level", "catch"]
-    units = _own_units(block, rows)
+    units = _log_units(block, rows)
     for _, at_level in rows.groupby(by, dropna=False, sort=True):
         yield from _answers_at_level(block, at_level, bounds, units)
 
 
-def _own_units(block: LevelBlock, rows: pd.DataFrame) -> Mapping[str, float]:
-    """Return ln of each participant's unit of estimates relative to the mean unit; empty with a modulus.
+def _log_units(block: LevelBlock, rows: pd.DataFrame) -> Mapping[str, float]:
+    """Return the logarithm of each participant's unit relative to the mean unit; empty with a modulus.
 
-    It is the mean over levels of the participant's mean ln answer.
+    The unit is estimated by the mean over levels of the participant's mean ln answer.
     """
     if not chooses_units(block):
         return {}
     answered = rows.assign(log=np.log(rows["value"].to_numpy(dtype=float)))
-    own = answered.groupby(["participant", "level"])["log"].mean().groupby("participant").mean()
-    return dict(own - own.mean())
+    log_units = answered.groupby(["participant", "level"])["log"].mean().groupby("participant").mean()
+    return dict(log_units - log_units.mean())
 
 
 def _answers_at_level(
@@ -269,26 +271,28 @@ def _answers_at_level(
     numbers = rows["success" if share else "value"].to_numpy(dtype=float)
     numbers = np.log(numbers) if summary == "geometric mean" else numbers
     first = rows.iloc[0]
-    make = partial(
+    make_answers = partial(
         LevelAnswers,
         standard=number_or_none(first["standard"]),
         level=number_or_none(first["level"]),
         comparison=first["comparison"] if isinstance(first["comparison"], str) else number_or_none(first["comparison"]),
         catch=bool(first["catch"]),
     )
-    summarised = partial(_summarise_mean, summary, (0.0, 1.0) if share else bounds)
+    summarise = partial(_summarise_mean, summary, (0.0, 1.0) if share else bounds)
     people = rows["participant"].to_numpy()
-    own = {person: numbers[people == person] for person in sorted(set(people))}
-    mean = summarised(np.array([one.mean() - units.get(person, 0.0) for person, one in own.items()]))
+    numbers_by_person = {person: numbers[people == person] for person in sorted(set(people))}
+    mean = summarise(np.array([values.mean() - units.get(person, 0.0) for person, values in numbers_by_person.items()]))
     count = int(numbers.sum()) if share else None
-    yield make(participant=None, n=len(numbers), participants=len(own), count=count, **mean._asdict())
-    for person, one in own.items():
-        mean = summarised(one)
+    yield make_answers(
+        participant=None, n=len(numbers), participants=len(numbers_by_person), count=count, **mean._asdict()
+    )
+    for person, values in numbers_by_person.items():
+        mean = summarise(values)
         if share:
-            count = int(one.sum())
-            exact = clopper_pearson(count, len(one))
+            count = int(values.sum())
+            exact = clopper_pearson(count, len(values))
             mean = mean._replace(low=exact.low, high=exact.high)
-        yield make(participant=person, n=len(one), participants=1, count=count, **mean._asdict())
+        yield make_answers(participant=person, n=len(values), participants=1, count=count, **mean._asdict())
 
 
 class _Mean(NamedTuple):
@@ -310,15 +314,15 @@ def _summarise_mean(summary: Summary, bounds: tuple[float, float] | None, values
     return _Mean(value=float(values.mean()), low=low, high=high)
 
 
-def _of_group(result: LevelsResult) -> tuple[LevelAnswers, ...]:
-    """Return the answers of all participants together by standard and level, without catch trials."""
-    return tuple(answer for answer in Answers.of(result) if answer.participant is None and not answer.catch)
+def _group_answers(result: LevelsResult) -> tuple[LevelAnswers, ...]:
+    """Return the group's answers by standard and level, without catch trials."""
+    return tuple(answer for answer in Answers.rows_in(result) if answer.participant is None and not answer.catch)
 
 
 def people(result: LevelsResult) -> tuple[str, ...]:
     """Return the participants who answered."""
-    answered = {str(answer.participant) for answer in Answers.own(result)}
-    return tuple(sorted(answered | {str(setting.participant) for setting in Settings.own(result)}))
+    answered = {str(answer.participant) for answer in Answers.participant_rows(result)}
+    return tuple(sorted(answered | {str(setting.participant) for setting in Settings.participant_rows(result)}))
 
 
 def summary_words(result: LevelsResult) -> str:
@@ -329,12 +333,12 @@ def summary_words(result: LevelsResult) -> str:
 
 
 def mean_words(result: LevelsResult) -> str:
-    """Return the description of a value of all participants."""
+    """Return the noun for the group's value at a level."""
     return "geometric mean" if result.summary == "geometric mean" else "mean"
 
 
 class Answers(LevelStatistic[LevelAnswers]):
-    """The answers at each level; the section has a table of all participants, and one by participant per standard."""
+    """The answers at each level; the section has a table of the group, and one by participant for each standard."""
 
     key = "answers"
     place = 1
@@ -342,9 +346,9 @@ class Answers(LevelStatistic[LevelAnswers]):
     compute = staticmethod(lambda block, opened, _study, found: _level_answers(block, opened, found.bounds))
 
     def section(self) -> Iterator[str]:
-        result = self.found
+        result = self.result
         if not result.adaptive:
-            yield self._of_group()
+            yield self._group_table()
             units = (
                 " To remove the effect of each participant's choice of unit, the interval is calculated from the ln "
                 "answers after subtracting the participant's mean ln answer."
@@ -357,14 +361,14 @@ class Answers(LevelStatistic[LevelAnswers]):
             )
         yield from drawn_figure(self.pictures, f"levels-{result.block}")
         if not result.adaptive:
-            for standard in sorted({row.standard for row in self.rows}, key=lambda one: one or 0.0):
+            for standard in sorted({row.standard for row in self.rows}, key=lambda standard: standard or 0.0):
                 yield self._people_table(standard)
 
     def _value(self, value: float) -> str:
-        return f"{100 * value:.0f} %" if self.found.summary == "share" else f"{value:.3g}"
+        return f"{100 * value:.0f} %" if self.result.summary == "share" else f"{value:.3g}"
 
-    def _of_group(self) -> str:
-        result, rows = self.found, _of_group(self.found)
+    def _group_table(self) -> str:
+        result, rows = self.result, _group_answers(self.result)
         standards = any(row.standard is not None for row in rows)
         alone = result.level_kind == "value" and not standards
         return table_of(
@@ -386,15 +390,15 @@ class Answers(LevelStatistic[LevelAnswers]):
 
     def _people_table(self, standard: float | None) -> str:
         """Return a table with one row per participant and one column per level."""
-        shown = [answers for answers in _of_group(self.found) if answers.standard == standard]
-        own = {
+        columns = [answers for answers in _group_answers(self.result) if answers.standard == standard]
+        own_answers = {
             (row.participant, row.level, row.comparison): row
             for row in self.rows
             if row.standard == standard and not row.catch
         }
 
         def cell(person: str, level: LevelAnswers) -> str:
-            answers = own.get((person, level.level, level.comparison))
+            answers = own_answers.get((person, level.level, level.comparison))
             if answers is None:
                 return "–"
             return (
@@ -403,38 +407,38 @@ class Answers(LevelStatistic[LevelAnswers]):
                 else f"{answers.count}/{answers.n}"
             )
 
-        names = [cell_text(answers.comparison if answers.level is None else answers.level) for answers in shown]
+        names = [cell_text(answers.comparison if answers.level is None else answers.level) for answers in columns]
         return table(
-            ("Participant" if standard is None else f"Standard {with_unit(self.found, standard)}", *names),
-            [[person, *(cell(person, answers) for answers in shown)] for person in people(self.found)],
+            ("Participant" if standard is None else f"Standard {with_unit(self.result, standard)}", *names),
+            [[person, *(cell(person, answers) for answers in columns)] for person in people(self.result)],
         )
 
     def methods(self, block: LevelBlock) -> Iterator[str]:
         if not self.rows:
             return
-        stimulus, title = block.stimulus, self.found.title
-        totals = Counter[str]()
+        stimulus, title = block.stimulus, self.result.title
+        trial_counts = Counter[str]()
         for row in self.rows:
             if row.participant is not None:
-                totals[row.participant] += row.n
-        least, most = min(totals.values()), max(totals.values())
+                trial_counts[row.participant] += row.n
+        least, most = min(trial_counts.values()), max(trial_counts.values())
         trials = counted(most, "trial") if least == most else f"{least} to {most} trials"
         design = f"{block.design.paper_name}, {trials} per participant"
         if stimulus is None:
-            known = [] if block.reference is None else [block.reference, *block.settings]
-            conditions = listed([*map(_condition_words, known)]) or "conditions"
+            settings = [] if block.reference is None else [block.reference, *block.settings]
+            conditions = listed([*map(_condition_words, settings)]) or "conditions"
             yield f"In “{title}” ({design}), {conditions} were compared."
             return
         kind, (low, high) = KINDS[stimulus.level_kind], stimulus.levels
         chosen = "" if block.method is None else f"; levels were chosen by {block.method.paper_name}"
-        top = f"{high:g}" if stimulus.level_kind == "weber" else with_unit(self.found, high)
+        top = f"{high:g}" if stimulus.level_kind == "weber" else with_unit(self.result, high)
         delays = dict.fromkeys(_delay_words(setting.of) for setting in block.settings if setting.of is not None)
         yield (
-            f"In “{title}” ({design}), {self.found.quantity} was judged at {kind} from {low:g} to {top}"
-            f"{standards_of(self.found, self.rows)}{''.join(delays)}{chosen}."
+            f"In “{title}” ({design}), {self.result.quantity} was judged at {kind} from {low:g} to {top}"
+            f"{standards_phrase(self.result, self.rows)}{''.join(delays)}{chosen}."
         )
         if (modulus := block.design.first) is not None:
             yield (
-                f"Before these trials, a level of {with_unit(self.found, modulus.level)} was presented as the modulus, "
-                f"to which the number {modulus.number:g} was assigned."
+                f"Before these trials, a level of {with_unit(self.result, modulus.level)} was presented as the "
+                f"modulus, to which the number {modulus.number:g} was assigned."
             )

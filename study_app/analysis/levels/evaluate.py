@@ -1,4 +1,4 @@
-"""All that is found in blocks of levels, and what reports say of it: a loop over the statistics of this folder."""
+"""Results of blocks of levels and their parts of a report, collected from the statistics in this folder."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -12,12 +12,12 @@ from study_app.analysis.data.study_tables import Study
 from study_app.analysis.html_page import heading, paragraph, table_of
 from study_app.analysis.levels.answers import SUMMARIES, Answers, Settings, chooses_units
 from study_app.analysis.levels.statistic import interval_text, statistics
-from study_app.analysis.levels.tracks import answers_timed, tracks
+from study_app.analysis.levels.tracks import timed_answers, tracks
 from study_app.analysis.page_layout import Picture
 from study_app.analysis.results import GroupAnswers, LevelsResult
 from study_app.analysis.wording import number
 
-READ: Final = (
+TRACK_COLUMNS: Final = (
     *("participant", "session", "trial", "block", "code", "track", "catch", "standard", "level", "level_delivered"),
     *("comparison", "arrangement", "analysed", "response", "value", "success", "right", "response_s", "reversal"),
     "setting",
@@ -37,13 +37,13 @@ def level_results(study: Study, rows: pd.DataFrame | None = None) -> tuple[Level
     main = [block for block in study.levels if block.phase == "main"]
     if not main:
         return ()
-    timed = answers_timed(study)
+    timed = timed_answers(study)
     opened = rows if rows is not None else tracks(study) if study.revealed else None
-    opened = None if opened is None else opened[list(READ)]  # grouping few columns is faster
-    return tuple(_levels_of_block(study, block, timed, opened) for block in main)
+    opened = None if opened is None else opened[list(TRACK_COLUMNS)]  # grouping few columns is faster
+    return tuple(_block_levels(study, block, timed, opened) for block in main)
 
 
-def _levels_of_block(study: Study, block: LevelBlock, timed: pd.DataFrame, opened: pd.DataFrame | None) -> LevelsResult:
+def _block_levels(study: Study, block: LevelBlock, timed: pd.DataFrame, opened: pd.DataFrame | None) -> LevelsResult:
     counted = timed[(timed["block"] == block.id) & timed["counted"] & timed["response"].notna()]
     stimulus = block.stimulus
     result = LevelsResult(
@@ -51,7 +51,7 @@ def _levels_of_block(study: Study, block: LevelBlock, timed: pd.DataFrame, opene
         title=block.title,
         design=block.design.kind,
         revealed=opened is not None,
-        times=tuple(_times(counted, block, setting) for setting in block.settings),
+        times=tuple(_response_times(counted, block, setting) for setting in block.settings),
         summary=SUMMARIES[block.design.reply],
         counts=block.counts,
         guess_rate=block.design.guess_rate if block.has_correct_answer else None,
@@ -78,7 +78,7 @@ def _levels_of_block(study: Study, block: LevelBlock, timed: pd.DataFrame, opene
     return result
 
 
-def _times(answers: pd.DataFrame, block: LevelBlock, setting: Setting) -> GroupAnswers:
+def _response_times(answers: pd.DataFrame, block: LevelBlock, setting: Setting) -> GroupAnswers:
     seconds = answers.loc[answers["code"] == setting.code, "response_s"].dropna().to_numpy(dtype=float)
     numbers = {"n": len(seconds), **quartiles_or_none(seconds)._asdict()}
     return GroupAnswers(setting.code, setting_name(setting, block.settings), numbers)
@@ -98,20 +98,20 @@ def level_section(result: LevelsResult, pictures: Sequence[Picture], estimator: 
         ("quartiles [s]", lambda answers: interval_text(answers.numbers["q1"], answers.numbers["q3"], number)),
     )
     at_each = "Answers at each level" if result.vary is not None or not result.revealed else "Answers"
-    if not Settings.of(result):
+    if not Settings.rows_in(result):
         yield heading(3, "Answers as a function of level" if result.adaptive else at_each)
     if not result.revealed:
         yield paragraph(_SEALED)
         return
-    if not Settings.of(result) and not Answers.of(result):
+    if not Settings.rows_in(result) and not Answers.rows_in(result):
         yield paragraph("There are no answers to analyse yet.")
         return
-    for statistic in (Settings,) if Settings.of(result) else statistics():
+    for statistic in (Settings,) if Settings.rows_in(result) else statistics():
         yield from statistic(result, {picture.name: picture for picture in pictures}, estimator).section()
 
 
 def level_findings(result: LevelsResult) -> Iterator[str]:
-    """Yield the findings of a block with n and interval; none while the key is sealed."""
+    """Yield sentences on the findings of a block, with n and interval; nothing while the key is sealed."""
     sentences = [line for statistic in statistics() for line in statistic(result).sentences()]
     yield from sentences
     if sentences and result.published:
@@ -120,26 +120,26 @@ def level_findings(result: LevelsResult) -> Iterator[str]:
 
 
 def level_limits(result: LevelsResult) -> Iterator[str]:
-    """Yield the limitations of a block's statistics."""
+    """Yield sentences on the limitations of a block's statistics."""
     for statistic in statistics():
         yield from statistic(result).limits()
 
 
 def level_methods(blocks: Sequence[LevelBlock], levels: Sequence[LevelsResult]) -> Iterator[str]:
-    """Yield the sentences about blocks with answers and an open key."""
+    """Yield the sentences of the methods paragraph about blocks with answers, once the key is open."""
     by_id = {block.id: block for block in blocks}
-    opened = [level for level in levels if level.revealed and (Answers.of(level) or Settings.of(level))]
+    opened = [level for level in levels if level.revealed and (Answers.rows_in(level) or Settings.rows_in(level))]
     for result in opened:
         for statistic in statistics():
             yield from statistic(result).methods(by_id[result.block])
-    for one in statistics():
-        yield from one.common_methods(opened)
+    for statistic in statistics():
+        yield from statistic.common_methods(opened)
 
 
 def level_entries(result: LevelsResult) -> dict[str, Any]:
     """Return the report.json entries of a block's statistics; entries of later formats only if they have rows."""
     return {
-        statistic.key: statistic.of(result)
+        statistic.key: statistic.rows_in(result)
         for statistic in statistics()
-        if statistic.since == 1 or statistic.of(result)
+        if statistic.since == 1 or statistic.rows_in(result)
     }

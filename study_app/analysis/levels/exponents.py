@@ -1,7 +1,7 @@
 """Exponents of participants and groups.
 
-An exponent of n is Stevens' power law, answer ∝ levelⁿ (Stevens 1957, Psychological Review 64, 153), or that of the
-JND over standards: 1 is Weber's law, JND ∝ standard; 0 is a constant JND.
+The exponent is that of Stevens' power law, answer ∝ levelⁿ (Stevens 1957, Psychological Review 64, 153), or that of the
+JND as a function of the standard: 1 means Weber's law, JND ∝ standard, and 0 a constant JND.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -14,7 +14,14 @@ from numpy.typing import ArrayLike
 
 from study_app.analysis.data.blocks import LevelBlock
 from study_app.analysis.data.study_tables import Study
-from study_app.analysis.levels.statistic import INTERVAL_2, OF_WHOM, LevelStatistic, Shown, interval_words, mean_over
+from study_app.analysis.levels.statistic import (
+    INTERVAL_2,
+    PARTICIPANT_COLUMNS,
+    LevelStatistic,
+    TableColumn,
+    group_mean_row,
+    interval_words,
+)
 from study_app.analysis.levels.thresholds import ThresholdEstimate, Thresholds
 from study_app.analysis.results import LevelsResult
 from study_app.analysis.wording import counted, number
@@ -22,7 +29,7 @@ from study_app.analysis.wording import counted, number
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ExponentEstimate:
-    """A participant's exponent: of a power law from ``n`` levels, or Weber's, of the JND over ``n`` standards.
+    """A participant's exponent: of a power law over ``n`` levels, or of the JND over ``n`` standards.
 
     If ``participant`` is None, it is the mean over ``n`` participants, with its 95 % interval by Student's t.
     """
@@ -42,34 +49,36 @@ def estimate_slope(levels: ArrayLike, answers: ArrayLike) -> float:
     levels, answers : (n,) array
         Level and answer of each trial, at two or more different levels, all above zero.
     """
-    log_levels, log_answers = (np.log(np.asarray(one, float)) for one in (levels, answers))
-    places, which = np.unique(log_levels, return_inverse=True)
-    means = np.bincount(which, log_answers) / np.bincount(which)
-    return float(np.polyfit(places, means, 1)[0])
+    log_levels, log_answers = (np.log(np.asarray(values, float)) for values in (levels, answers))
+    unique_levels, level_index = np.unique(log_levels, return_inverse=True)
+    means = np.bincount(level_index, log_answers) / np.bincount(level_index)
+    return float(np.polyfit(unique_levels, means, 1)[0])
 
 
 def estimated_exponents(block: LevelBlock, opened: pd.DataFrame) -> Iterator[ExponentEstimate]:
     """Yield the exponent of the group, followed by those of the participants with answers at two levels or more.
 
-    Trials of one requested level are at the mean of their delivered levels.
+    The level of trials with the same requested level is the mean of their delivered levels.
     """
     if block.design.reply != "number":
         return
     rows = opened[(opened["block"] == block.id) & opened["analysed"] & (opened["value"] > 0) & (opened["level"] > 0)]
-    own = []
-    for person, of_person in rows.groupby("participant", sort=True):
-        asked = of_person["level"].astype(float)
-        delivered = of_person["level_delivered"].astype(float).groupby(asked).transform("mean")
-        levels = delivered.where(delivered > 0, asked).to_numpy()
+    estimates = []
+    for person, person_rows in rows.groupby("participant", sort=True):
+        requested = person_rows["level"].astype(float)
+        delivered = person_rows["level_delivered"].astype(float).groupby(requested).transform("mean")
+        levels = delivered.where(delivered > 0, requested).to_numpy()
         if (count := len(np.unique(levels))) >= 2:
-            own.append(
+            estimates.append(
                 ExponentEstimate(
-                    participant=str(person), n=count, exponent=estimate_slope(levels, of_person["value"].astype(float))
+                    participant=str(person),
+                    n=count,
+                    exponent=estimate_slope(levels, person_rows["value"].astype(float)),
                 )
             )
-    if own:
-        yield mean_over(own, "exponent")
-    yield from own
+    if estimates:
+        yield group_mean_row(estimates, "exponent")
+    yield from estimates
 
 
 def jnd_slope(standards: ArrayLike, jnds: ArrayLike) -> float:
@@ -87,13 +96,13 @@ def jnd_slope(standards: ArrayLike, jnds: ArrayLike) -> float:
 def weber_exponents(thresholds: Sequence[ThresholdEstimate], level_kind: str) -> Iterator[ExponentEstimate]:
     """Yield the exponent of the group, followed by those of the participants with thresholds at two standards or more.
 
-    A JND is weber × standard, or the difference itself; a value has none.
+    The JND is the Weber fraction times the standard, or the difference itself; levels that are values have no JND.
     """
     if level_kind == "value":
         return
-    own = []
+    estimates = []
     for person in dict.fromkeys(threshold.participant for threshold in thresholds if threshold.participant is not None):
-        places = [
+        jnds = [
             (threshold.standard, threshold.threshold * (threshold.standard if level_kind == "weber" else 1.0))
             for threshold in thresholds
             if threshold.participant == person
@@ -101,15 +110,15 @@ def weber_exponents(thresholds: Sequence[ThresholdEstimate], level_kind: str) ->
             and threshold.standard > 0
             and threshold.threshold > 0
         ]
-        if len(places) >= 2:
-            own.append(ExponentEstimate(participant=person, n=len(places), exponent=jnd_slope(*np.array(places).T)))
-    if own:
-        yield mean_over(own, "exponent")
-    yield from own
+        if len(jnds) >= 2:
+            estimates.append(ExponentEstimate(participant=person, n=len(jnds), exponent=jnd_slope(*np.array(jnds).T)))
+    if estimates:
+        yield group_mean_row(estimates, "exponent")
+    yield from estimates
 
 
 class Exponents(LevelStatistic[ExponentEstimate]):
-    """Exponents of the power law, or Weber's: that of the group, followed by those of its participants."""
+    """Exponents of the power law, or Weber exponents: that of the group, followed by those of its participants."""
 
     key = "exponents"
     place = 3
@@ -118,22 +127,22 @@ class Exponents(LevelStatistic[ExponentEstimate]):
     compute = staticmethod(
         lambda block, opened, _study, found: (
             *estimated_exponents(block, opened),
-            *weber_exponents(Thresholds.of(found), found.level_kind or "value"),
+            *weber_exponents(Thresholds.rows_in(found), found.level_kind or "value"),
         )
     )
 
     @classmethod
-    def exported_in(cls, study: Study) -> bool:
+    def is_exported_in(cls, study: Study) -> bool:
         return any(block.design.reply == "number" for block in study.levels)
 
-    def exported(self) -> Iterator[Mapping[str, Any]]:
-        for row in super().exported() if self._is_power_law else ():
+    def export_rows(self) -> Iterator[Mapping[str, Any]]:
+        for row in super().export_rows() if self._is_power_law else ():
             (estimate,) = (estimate for estimate in self.rows if estimate.participant == row["participant"])
             yield {**row, "levels": estimate.n}
 
     @property
     def _is_power_law(self) -> bool:
-        return self.found.summary == "geometric mean"
+        return self.result.summary == "geometric mean"
 
     @property
     def name(self) -> str:
@@ -143,13 +152,13 @@ class Exponents(LevelStatistic[ExponentEstimate]):
     def heading(self) -> str:
         return self.name[0].upper() + self.name[1:]
 
-    def shown(self) -> Sequence[Shown]:
-        over = "standards" if Thresholds.of(self.found) else "levels"
-        participant, (_, n) = OF_WHOM
+    def table_columns(self) -> Sequence[TableColumn]:
+        over = "standards" if Thresholds.rows_in(self.result) else "levels"
+        participant, (_, n) = PARTICIPANT_COLUMNS
         return participant, (over, n), ("exponent", lambda row: number(row.exponent)), INTERVAL_2
 
-    def explained(self) -> str:
-        if Thresholds.of(self.found):
+    def explanation(self) -> str:
+        if Thresholds.rows_in(self.result):
             return (
                 "The exponent is the least-squares slope of ln JND on ln standard across a participant's standards; "
                 "the just-noticeable difference (JND) is the threshold in the unit of the standard. An exponent of 1 "
@@ -163,30 +172,30 @@ class Exponents(LevelStatistic[ExponentEstimate]):
             "t-based confidence interval."
         )
 
-    def compares(self, measure: str) -> bool:
+    def is_comparable_with(self, measure: str) -> bool:
         return measure == "exponent"
 
     def sentences(self) -> Iterator[str]:
-        weber = bool(Thresholds.of(self.found))
-        name = self.name if weber else f"{self.name} for {self.found.quantity}"
+        weber = bool(Thresholds.rows_in(self.result))
+        name = self.name if weber else f"{self.name} for {self.result.quantity}"
         meaning = "; 1 is Weber’s law, 0 is a constant JND" if weber else ""
         for row in self.rows:
             if row.participant is None:
                 yield (
-                    f"{self.found.title}: {name} {number(row.exponent)} ({interval_words(row, number)}; "
+                    f"{self.result.title}: {name} {number(row.exponent)} ({interval_words(row, number)}; "
                     f"{counted(row.n, 'participant')}){meaning}."
                 )
 
     @classmethod
     def common_methods(cls, blocks: Sequence[LevelsResult]) -> Iterator[str]:
-        held = [block for block in blocks if cls.of(block)]
-        if any(result.summary == "geometric mean" for result in held):
+        with_exponents = [block for block in blocks if cls.rows_in(block)]
+        if any(result.summary == "geometric mean" for result in with_exponents):
             yield (
                 "The exponent of magnitude estimation (Stevens 1957) is the least-squares slope of each participant’s "
                 "mean ln answer at each level on ln level; the group exponent is the mean with a 95 % confidence "
                 "interval (Student’s t)."
             )
-        if any(map(Thresholds.of, held)):
+        if any(map(Thresholds.rows_in, with_exponents)):
             yield (
                 "The Weber exponent is the least-squares slope of each participant’s ln JND on ln standard; the group "
                 "exponent is the mean with a 95 % confidence interval (Student’s t)."

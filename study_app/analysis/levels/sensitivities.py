@@ -1,4 +1,4 @@
-"""Sensitivity and bias: over all levels of a standard, for each comparison, or for each level against the lowest."""
+"""Sensitivity and bias over all levels of a standard, for each comparison, or for each level against the lowest."""
 
 import math
 from collections import Counter
@@ -15,12 +15,12 @@ from study_app.analysis.levels.columns import RESULTS
 from study_app.analysis.levels.exponents import Exponents
 from study_app.analysis.levels.statistic import (
     INTERVAL_2,
-    OF_WHOM,
+    PARTICIPANT_COLUMNS,
     LevelStatistic,
-    Shown,
-    analysed,
+    TableColumn,
+    analysed_rows,
     cell_text,
-    mean_over,
+    group_mean_row,
     unit,
 )
 from study_app.analysis.levels.thresholds import Thresholds
@@ -37,7 +37,7 @@ _MODELS: Final = {
     "column d_prime_other contains d′ for the differencing model.",
 }
 _FROM_SHARE_CORRECT: Final = ("abx", "oddity", "3ifc", "4ifc")
-"""Designs whose d′ follows from the share of correct answers alone."""
+"""Designs in which the share of correct answers alone determines d′."""
 _BIASES: Final = {
     "2ifc": " c is positive if participants are biased towards the second interval.",
     "yesno": " c is positive if participants are biased towards answering “no”.",
@@ -58,10 +58,10 @@ _BIASES: Final = {
 class SensitivityEstimate:
     """A participant's sensitivity and bias or (``participant`` None) their means over ``n`` participants.
 
-    They are for a ``standard``, a condition as ``comparison``, or ratings at a ``level`` against the lowest. ``shares``
-    are those of each answer. ``d_prime`` has a 95 % interval from its variance if known, or from the share correct; the
-    group's is Student's t. ``criterion`` is c, or k for same–different; ``other`` is d′ under the model that is not
-    ``model``.
+    They apply to a ``standard``, to a condition as ``comparison``, or to the ratings at a ``level`` against the lowest
+    level. ``shares`` are the shares of each answer. The 95 % interval of ``d_prime`` is from its variance, if known, or
+    from the share of correct answers; the group's is from Student's t. ``criterion`` is c, or k for same–different;
+    ``other`` is d′ under the model that is not ``model``.
     """
 
     participant: str | None
@@ -79,16 +79,17 @@ class SensitivityEstimate:
 
 
 _BIASED: Final = 0.2
-"""A criterion of two intervals beyond which a preference is named."""
+"""The smallest criterion in two-interval designs that is reported as a preference."""
 
 
-def preferences(of_people: Iterable[SensitivityEstimate]) -> dict[str, float]:
+def preferences(estimates: Iterable[SensitivityEstimate]) -> dict[str, float]:
     """Return the mean criterion over all standards of each participant who prefers one of two intervals.
 
-    It differs from 0 by more than `_BIASED` and by more than twice its standard error.
+    A participant prefers an interval if the criterion differs from 0 by more than `_BIASED` and twice its standard
+    error.
     """
     counts = dict[str, list[tuple[float, float]]]()
-    for estimate in of_people:
+    for estimate in estimates:
         if (
             estimate.participant is None
             or estimate.criterion is None
@@ -96,9 +97,8 @@ def preferences(of_people: Iterable[SensitivityEstimate]) -> dict[str, float]:
             or estimate.high is None
         ):
             continue
-        error = (
-            (estimate.high - estimate.d_prime) / Z_95 / math.sqrt(2)
-        )  # rows with a criterion also have the rates of d′
+        # Rows with a criterion have an interval of d′, whose error is √2 times that of the criterion.
+        error = (estimate.high - estimate.d_prime) / Z_95 / math.sqrt(2)
         counts.setdefault(estimate.participant, []).append((estimate.criterion, error))
     means = {person: np.mean([criterion for criterion, _ in rows]) for person, rows in counts.items()}
     errors = {person: math.hypot(*(error for _, error in rows)) / len(rows) for person, rows in counts.items()}
@@ -106,14 +106,14 @@ def preferences(of_people: Iterable[SensitivityEstimate]) -> dict[str, float]:
 
 
 def sensitivities(block: LevelBlock, opened: pd.DataFrame) -> Iterator[SensitivityEstimate]:
-    """Yield the group's sensitivity to each standard, condition or level, then that of its participants."""
-    rows = analysed(block, opened)
+    """Yield the group's sensitivity for each standard, condition or level, then that of its participants."""
+    rows = analysed_rows(block, opened)
     match block.design.reply:
         case "choice":
             by = "standard" if block.stimulus is not None else "track"
-            for which, some in rows.groupby(by, dropna=False, sort=True):
-                where = {"standard": number_or_none(which)} if by == "standard" else {"comparison": str(which)}
-                people = some.groupby("participant", sort=True)
+            for key, group in rows.groupby(by, dropna=False, sort=True):
+                where = {"standard": number_or_none(key)} if by == "standard" else {"comparison": str(key)}
+                people = group.groupby("participant", sort=True)
                 yield from _add_group_means(
                     [_estimate_from_choices(block, str(person), frame, where) for person, frame in people]
                 )
@@ -121,25 +121,28 @@ def sensitivities(block: LevelBlock, opened: pd.DataFrame) -> Iterator[Sensitivi
             lowest, *levels = sorted(rows["level"].dropna().unique()) or [None]
             for level in levels:
                 people = rows.groupby("participant", sort=True)
-                own = [_estimate_from_ratings(str(person), frame, lowest, level) for person, frame in people]
-                yield from _add_group_means([estimate for estimate in own if estimate is not None])
+                estimates = [_estimate_from_ratings(str(person), frame, lowest, level) for person, frame in people]
+                yield from _add_group_means([estimate for estimate in estimates if estimate is not None])
         case "number" | "setting":
             return
 
 
-def _add_group_means(own: Sequence[SensitivityEstimate]) -> Iterator[SensitivityEstimate]:
+def _add_group_means(estimates: Sequence[SensitivityEstimate]) -> Iterator[SensitivityEstimate]:
     """Yield the means over participants, followed by the values of each."""
-    if own:
-        shares = {answer: float(np.mean([estimate.shares[answer] for estimate in own])) for answer in own[0].shares}
-        yield replace(mean_over(own, "d_prime", "criterion", "other"), shares=shares)
-    yield from own
+    if estimates:
+        shares = {
+            answer: float(np.mean([estimate.shares[answer] for estimate in estimates]))
+            for answer in estimates[0].shares
+        }
+        yield replace(group_mean_row(estimates, "d_prime", "criterion", "other"), shares=shares)
+    yield from estimates
 
 
 def _estimate_from_ratings(person: str, rows: pd.DataFrame, lowest: float, level: float) -> SensitivityEstimate | None:
     noise, signal = (rows.loc[rows["level"] == at, "value"].dropna().to_numpy(float) for at in (lowest, level))
     sensitivity = rating(noise, signal)
     estimate = SensitivityEstimate(participant=person, n=len(noise) + len(signal), shares={}, level=float(level))
-    return None if sensitivity is None else _with_sensitivity(estimate, sensitivity)
+    return None if sensitivity is None else _add_sensitivity(estimate, sensitivity)
 
 
 def _estimate_from_choices(
@@ -148,15 +151,17 @@ def _estimate_from_choices(
     design = block.design
     pairs = zip(rows["arrangement"].astype(str), rows["response"].astype(str), strict=True)
     counts = Counter((design.arrangement_of(letters), answer) for letters, answer in pairs)
-    given = Counter(rows["response"].astype(str))
+    answer_counts = Counter(rows["response"].astype(str))
     sensitivity = design.sensitivity(counts, roving=block.standards_rove) if block.has_correct_answer else None
-    shares = {answer: given[answer] / len(rows) for answer in design.answers}
+    shares = {answer: answer_counts[answer] / len(rows) for answer in design.answers}
     estimate = SensitivityEstimate(participant=person, n=len(rows), shares=shares, **where)  # type: ignore[arg-type]  # standard or comparison
     if sensitivity is None:
         return estimate
-    measured = _with_sensitivity(estimate, sensitivity)
+    with_d_prime = _add_sensitivity(estimate, sensitivity)
     return (
-        _add_interval(measured, design, counts, sensitivity.model) if design.kind in _FROM_SHARE_CORRECT else measured
+        _add_interval(with_d_prime, design, counts, sensitivity.model)
+        if design.kind in _FROM_SHARE_CORRECT
+        else with_d_prime
     )
 
 
@@ -171,7 +176,7 @@ def _add_interval(
     return replace(estimate, low=d_prime_at(task, share.low), high=d_prime_at(task, share.high))
 
 
-def _with_sensitivity(estimate: SensitivityEstimate, sensitivity: Sensitivity) -> SensitivityEstimate:
+def _add_sensitivity(estimate: SensitivityEstimate, sensitivity: Sensitivity) -> SensitivityEstimate:
     half = math.nan if sensitivity.variance is None else Z_95 * math.sqrt(sensitivity.variance)
     return replace(
         estimate,
@@ -185,11 +190,11 @@ def _with_sensitivity(estimate: SensitivityEstimate, sensitivity: Sensitivity) -
 
 
 def _is_perfect(estimate: SensitivityEstimate) -> bool:
-    """Return whether all answers were correct: d′ from the share correct then has no interval."""
+    """Return whether all answers were correct, so that d′ from the share of correct answers has no interval."""
     return estimate.d_prime is not None and estimate.d_prime > 0 and estimate.high is None
 
 
-def _where(estimate: SensitivityEstimate) -> str:
+def _condition_text(estimate: SensitivityEstimate) -> str:
     return cell_text(estimate.comparison or (estimate.level if estimate.standard is None else estimate.standard))
 
 
@@ -206,17 +211,18 @@ class Sensitivities(LevelStatistic[SensitivityEstimate]):
 
     compute = staticmethod(lambda block, opened, _study, _found: sensitivities(block, opened))
 
-    def exported(self) -> Iterator[Mapping[str, Any]]:
-        exponents = {exponent.participant: exponent.exponent for exponent in Exponents.of(self.found)}
+    def export_rows(self) -> Iterator[Mapping[str, Any]]:
+        exponents = {exponent.participant: exponent.exponent for exponent in Exponents.rows_in(self.result)}
         thresholds = {
-            (threshold.participant, threshold.standard): threshold for threshold in Thresholds.own(self.found)
+            (threshold.participant, threshold.standard): threshold
+            for threshold in Thresholds.participant_rows(self.result)
         }
         columns = RESULTS[self.table].columns
-        for estimate in self.own(self.found):
+        for estimate in self.participant_rows(self.result):
             if estimate.level is not None:
                 continue
             row = {column.name: getattr(estimate, column.name, None) for column in columns}
-            row |= {"low": None, "high": None, "participant": estimate.participant, "block": self.found.block}
+            row |= {"low": None, "high": None, "participant": estimate.participant, "block": self.result.block}
             if (
                 estimate.comparison is None
                 and (threshold := thresholds.get((estimate.participant, estimate.standard))) is not None
@@ -234,58 +240,60 @@ class Sensitivities(LevelStatistic[SensitivityEstimate]):
                 "share_first": next(iter(estimate.shares.values()), None),
             }
 
-    def shown(self) -> Sequence[Shown]:
+    def table_columns(self) -> Sequence[TableColumn]:
         first = self.rows[0]
         where = "Comparison" if first.level is None else "Level"
-        measured = any(row.d_prime is not None for row in self.rows)
-        biased = any(row.criterion is not None for row in self.rows)
+        has_d_prime = any(row.d_prime is not None for row in self.rows)
+        has_criterion = any(row.criterion is not None for row in self.rows)
         answers = tuple(first.shares)
-        shares: list[Shown] = [
+        shares: list[TableColumn] = [
             (f"“{answer.replace('_', ' ')}”", lambda row, answer=answer: f"{100 * row.shares[answer]:.0f} %")  # type: ignore[misc]
             for answer in (answers[:1] if len(answers) == 2 else answers)
         ]
         return (
-            (where if first.standard is None else f"Standard{unit(self.found)}", _where)
-            if len(set(map(_where, self.rows))) > 1
+            (where if first.standard is None else f"Standard{unit(self.result)}", _condition_text)
+            if len(set(map(_condition_text, self.rows))) > 1
             else None,
-            *OF_WHOM,
-            ("d′", lambda row: number(row.d_prime)) if measured else None,
-            INTERVAL_2 if measured else None,
-            ("k" if self.found.design == "samedifferent" else "c", lambda row: number(row.criterion))
-            if biased
+            *PARTICIPANT_COLUMNS,
+            ("d′", lambda row: number(row.d_prime)) if has_d_prime else None,
+            INTERVAL_2 if has_d_prime else None,
+            ("k" if self.result.design == "samedifferent" else "c", lambda row: number(row.criterion))
+            if has_criterion
             else None,
             *shares,
         )
 
     def limits(self) -> Iterator[str]:
-        if self.found.design in _FROM_SHARE_CORRECT and (perfect := list(filter(_is_perfect, self.own(self.found)))):
-            several = len(set(map(_where, self.own(self.found)))) > 1
+        if self.result.design in _FROM_SHARE_CORRECT and (
+            perfect := list(filter(_is_perfect, self.participant_rows(self.result)))
+        ):
+            several = len(set(map(_condition_text, self.participant_rows(self.result)))) > 1
             people = listed(
-                [f"{row.participant} ({_where(row)})" if several else str(row.participant) for row in perfect]
+                [f"{row.participant} ({_condition_text(row)})" if several else str(row.participant) for row in perfect]
             )
             yield (
-                f"{self.found.title}: {people} answered all trials correctly, so these values of d′ are lower limits "
+                f"{self.result.title}: {people} answered all trials correctly, so these values of d′ are lower limits "
                 "that depend on the number of trials."
             )
-        if self.found.design != "2ifc" or self.found.vary is None:
+        if self.result.design != "2ifc" or self.result.vary is None:
             return
-        if biased := preferences(self.own(self.found)):
+        if biased := preferences(self.participant_rows(self.result)):
             people = listed([f"{person} ({number(criterion)})" for person, criterion in biased.items()])
             yield (
-                f"{self.found.title}: {people} showed a bias towards one interval (the absolute value of the "
+                f"{self.result.title}: {people} showed a bias towards one interval (the absolute value of the "
                 f"criterion c is above {_BIASED:g} and more than twice its standard error). Their threshold fits allow "
                 "for this bias."
             )
 
-    def explained(self) -> str:
+    def explanation(self) -> str:
         shares = "Percentages show how often each answer was given." if self.rows[0].shares else ""
         if all(row.d_prime is None for row in self.rows):
             return shares
-        over = "across all presented levels" if self.found.vary is not None else "for each comparison"
-        if self.found.summary == "mean":
+        over = "across all presented levels" if self.result.vary is not None else "for each comparison"
+        if self.result.summary == "mean":
             over = "for each level relative to the lowest (d_a from the area under the ROC curve)"
-        has_bias = self.found.design in _FROM_SHARE_CORRECT or any(row.criterion is not None for row in self.rows)
-        bias, model = _BIASES.get(self.found.design, "") if has_bias else "", _MODELS.get(self.rows[0].model or "", "")
+        has_bias = self.result.design in _FROM_SHARE_CORRECT or any(row.criterion is not None for row in self.rows)
+        bias, model = _BIASES.get(self.result.design, "") if has_bias else "", _MODELS.get(self.rows[0].model or "", "")
         return (
             f"d′ {over}, calculated from rates with the log-linear correction (Hautus 1995; Macmillan & Creelman "
             f"2005); the group value is the mean across participants with a t-based confidence interval.{model}{bias} "
@@ -294,7 +302,7 @@ class Sensitivities(LevelStatistic[SensitivityEstimate]):
 
     @classmethod
     def common_methods(cls, blocks: Sequence[LevelsResult]) -> Iterator[str]:
-        if any(estimate.d_prime is not None for block in blocks for estimate in cls.of(block)):
+        if any(estimate.d_prime is not None for block in blocks for estimate in cls.rows_in(block)):
             yield (
                 "Sensitivity is expressed as d′, calculated from rates with the log-linear correction (Hautus 1995) "
                 "using the model for each design (Macmillan & Creelman 2005)."

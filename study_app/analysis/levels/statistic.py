@@ -1,6 +1,6 @@
-"""The base class of statistics of levels: one declaration from which all outputs follow, and the words they share.
+"""The base class of statistics of levels, from which all outputs are generated, and texts that they share.
 
-The coordinate u of a level is its logarithm to the base of ten where levels are spaced so, otherwise the level itself.
+The coordinate u of a level is its decimal logarithm if levels are spaced logarithmically, otherwise the level itself.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -23,8 +23,8 @@ from study_app.analysis.wording import listed, number
 from study_app.discovery import modules_of
 
 _R = TypeVar("_R")
-Shown: TypeAlias = tuple[str, Callable[[Any], str]] | None
-"""A column of a table of the report: its heading and what makes a cell of a row; None is one that is left out."""
+TableColumn: TypeAlias = tuple[str, Callable[[Any], str]] | None
+"""A column of a table in the report: its heading and a function from row to cell; None is omitted."""
 
 MOTORS: Final = "the sound of the motors was not masked, so participants may have relied on it."
 
@@ -32,8 +32,8 @@ MOTORS: Final = "the sound of the motors was not masked, so participants may hav
 class LevelStatistic(Generic[_R]):
     """A statistic of blocks of levels; an instance provides its output for one block.
 
-    A subclass with a ``key`` in a module of this folder is in every output. ``_R`` is the type of its rows; the
-    ``participant`` of a group's row is None. A figure is a row of `level_figures.FIGURES`.
+    All outputs include every subclass with a ``key`` in the modules of this folder. ``_R`` is the type of its rows; the
+    ``participant`` of a group's row is None. Figures are listed in `level_figures.FIGURES`.
 
     Attributes
     ----------
@@ -65,23 +65,23 @@ class LevelStatistic(Generic[_R]):
     def __init__(
         self, result: LevelsResult, pictures: Mapping[str, Picture] | None = None, estimator: str | None = None
     ) -> None:
-        self.found = result
-        self.rows = self.of(result)
+        self.result = result
+        self.rows = self.rows_in(result)
         self.pictures = pictures or {}
         self.estimator = estimator
 
     @classmethod
-    def of(cls, result: LevelsResult) -> tuple[_R, ...]:
-        """Return its rows in a block."""
+    def rows_in(cls, result: LevelsResult) -> tuple[_R, ...]:
+        """Return the statistic's rows in a block's result."""
         return result.statistics.get(cls.key, ())
 
     @classmethod
-    def own(cls, result: LevelsResult) -> tuple[_R, ...]:
-        """Return its rows of single participants in a block."""
-        return tuple(one for one in cls.of(result) if getattr(one, "participant", None) is not None)
+    def participant_rows(cls, result: LevelsResult) -> tuple[_R, ...]:
+        """Return the rows of single participants in a block's result."""
+        return tuple(row for row in cls.rows_in(result) if getattr(row, "participant", None) is not None)
 
     @classmethod
-    def exported_in(cls, study: Study) -> bool:
+    def is_exported_in(cls, study: Study) -> bool:
         """Return whether its table is exported for a study."""
         return bool(cls.table)
 
@@ -90,43 +90,43 @@ class LevelStatistic(Generic[_R]):
         """Return the sentences of the methods paragraph that concern all blocks together."""
         return ()
 
-    def exported(self) -> Iterable[Mapping[str, Any]]:
+    def export_rows(self) -> Iterable[Mapping[str, Any]]:
         """Return the rows of its exported table, each with its participant."""
         names = ["participant", *(column.name for column in RESULTS[self.table].columns)]
-        for one in self.own(self.found):
-            yield {name: getattr(one, name, None) for name in names} | {"block": self.found.block}
+        for row in self.participant_rows(self.result):
+            yield {name: getattr(row, name, None) for name in names} | {"block": self.result.block}
 
     def section(self) -> Iterator[str]:
         """Yield the HTML of its section in the report."""
         if not self.rows:
             return
         yield heading(3, self.heading())
-        columns = [column for column in self.shown() if column is not None]
+        columns = [column for column in self.table_columns() if column is not None]
         yield table_of(self.rows, *columns, words=int(columns[0][0] == "Participant"))
-        if words := self.explained():
+        if words := self.explanation():
             yield paragraph(words, "soft")
         if published := [
-            published_words(published, self.found.unit)
-            for published in self.found.published
-            if self.compares(published.measure)
+            published_words(published, self.result.unit)
+            for published in self.result.published
+            if self.is_comparable_with(published.measure)
         ]:
             yield paragraph(f"Published: {'; '.join(published)}.")
         for name in self.figures:
-            yield from drawn_figure(self.pictures, f"{name}-{self.found.block}")
+            yield from drawn_figure(self.pictures, f"{name}-{self.result.block}")
 
     def heading(self) -> str:
         """Return the heading of its section in the report."""
         return self.title
 
-    def shown(self) -> Sequence[Shown]:
+    def table_columns(self) -> Sequence[TableColumn]:
         """Return the columns of its table in the report."""
         raise NotImplementedError
 
-    def explained(self) -> str:
+    def explanation(self) -> str:
         """Return the text below the table."""
         return ""
 
-    def compares(self, measure: str) -> bool:
+    def is_comparable_with(self, measure: str) -> bool:
         """Return whether it can be compared with published values of a measure."""
         return False
 
@@ -142,23 +142,23 @@ class LevelStatistic(Generic[_R]):
         """Return the sentences of the methods paragraph about the block."""
         return ()
 
-    def standard(self) -> Shown:
+    def standard_column(self) -> TableColumn:
         """Return the column of standards if there are several; otherwise None."""
 
-        def standard(one: Any) -> float | None:
-            return one["standard"] if isinstance(one, dict) else one.standard  # type: ignore[no-any-return]
+        def standard(row: Any) -> float | None:
+            return row["standard"] if isinstance(row, dict) else row.standard  # type: ignore[no-any-return]
 
         if len(set(map(standard, self.rows))) < 2:
             return None
-        return f"Standard{unit(self.found)}", lambda row: digits(standard(row), 4)
+        return f"Standard{unit(self.result)}", lambda row: digits(standard(row), 4)
 
 
 @cache
 def statistics() -> tuple[type[LevelStatistic[Any]], ...]:
     """Return all statistics in this folder's modules, ordered by their places."""
-    held = {var for module in modules_of(levels) for var in vars(module).values() if isinstance(var, type)}
-    classes = {one for one in held if issubclass(one, LevelStatistic) and hasattr(one, "key")}
-    return tuple(sorted(classes, key=lambda one: one.place))
+    types = {var for module in modules_of(levels) for var in vars(module).values() if isinstance(var, type)}
+    classes = {cls for cls in types if issubclass(cls, LevelStatistic) and hasattr(cls, "key")}
+    return tuple(sorted(classes, key=lambda cls: cls.place))
 
 
 def digits(value: float | None, count: int = 3) -> str:
@@ -176,9 +176,9 @@ def cell_text(value: float | str | None) -> str:
     return value.replace("_", " ") if isinstance(value, str) else digits(value, 4)
 
 
-def interval_text(low: float | None, high: float | None, written: Callable[[float], str] = digits) -> str:
+def interval_text(low: float | None, high: float | None, format_number: Callable[[float], str] = digits) -> str:
     """Return an interval as text; a dash for None."""
-    return "–" if low is None or high is None else f"{written(low)} – {written(high)}"
+    return "–" if low is None or high is None else f"{format_number(low)} – {format_number(high)}"
 
 
 def unit(result: LevelsResult) -> str:
@@ -186,14 +186,14 @@ def unit(result: LevelsResult) -> str:
     return f" [{result.unit}]" if result.unit else ""
 
 
-OF_WHOM: Final[tuple[tuple[str, Callable[[Any], str]], ...]] = (
+PARTICIPANT_COLUMNS: Final[tuple[tuple[str, Callable[[Any], str]], ...]] = (
     ("Participant", lambda row: row.participant or f"group of {row.n}"),
     ("n", lambda row: "–" if row.participant is None else str(row.n)),
 )
-"""The columns that say of whom a row is."""
-INTERVAL: Final[Shown] = ("95 % interval", lambda row: interval_text(row.low, row.high))
-INTERVAL_2: Final[Shown] = ("95 % interval", lambda row: interval_text(row.low, row.high, number))
-"""With two decimals."""
+"""The columns that identify the participant or the group of a row."""
+INTERVAL: Final[TableColumn] = ("95 % interval", lambda row: interval_text(row.low, row.high))
+INTERVAL_2: Final[TableColumn] = ("95 % interval", lambda row: interval_text(row.low, row.high, number))
+"""The interval with two decimals."""
 
 KINDS: Final = {"weber": "Weber fractions", "difference": "differences", "value": "values"}
 _LEVELS: Final[Mapping[str | None, str]] = {"weber": "Weber fraction for ", "difference": "difference in ", "value": ""}
@@ -212,7 +212,7 @@ def with_unit(result: LevelsResult, value: float) -> str:
     return f"{value:g} {result.unit or ''}".rstrip()
 
 
-def standards_of(result: LevelsResult, rows: Iterable[Any]) -> str:
+def standards_phrase(result: LevelsResult, rows: Iterable[Any]) -> str:
     """Return the standards of rows as a phrase: " for standards of 4 and 8 N·s/m"; "" without any."""
     standards = sorted({row.standard for row in rows if row.standard is not None})
     noun = "a standard" if len(standards) == 1 else "standards"
@@ -220,35 +220,37 @@ def standards_of(result: LevelsResult, rows: Iterable[Any]) -> str:
     return f" for {noun} of {values} {result.unit}".rstrip() if standards else ""
 
 
-def interval_words(one: Any, written: Callable[[float], str]) -> str:
+def interval_words(row: Any, format_number: Callable[[float], str]) -> str:
     """Return the interval of a row as text."""
-    if one.low is None or one.high is None:
+    if row.low is None or row.high is None:
         return "no interval"
-    return f"95 % interval {written(one.low)} to {written(one.high)}"
+    return f"95 % interval {format_number(row.low)} to {format_number(row.high)}"
 
 
-def analysed(block: LevelBlock, opened: pd.DataFrame, answer: str = "response") -> pd.DataFrame:
-    """Return the analysed rows of a block in which this column is known."""
+def analysed_rows(block: LevelBlock, opened: pd.DataFrame, answer: str = "response") -> pd.DataFrame:
+    """Return the analysed rows of a block with a value in the column ``answer``."""
     return opened[(opened["block"] == block.id) & opened["analysed"] & opened[answer].notna()]
 
 
-def mean_over(
-    own: Sequence[_R],
-    middle: str,
+def group_mean_row(
+    rows: Sequence[_R],
+    centre: str,
     *others: str,
     coordinate: Callable[[float], float] = float,
     level_of: Callable[[float], float] = float,
     **group: Any,
 ) -> _R:
-    """Return the group's row: means over the participants with a known value; ``group`` overrides fields.
+    """Return the group's row: means over the participants whose value is known; ``group`` overrides fields.
 
-    The field ``middle`` is a mean in the coordinate u with Student's 95 % interval.
+    The field ``centre`` is averaged in the coordinate u and has Student's 95 % interval.
     """
-    known = {name: [value for one in own if (value := getattr(one, name)) is not None] for name in (middle, *others)}
-    means: dict[str, Any] = {name: float(np.mean(values)) if values else None for name, values in known.items()}
-    u = np.array([coordinate(value) for value in known.pop(middle)])
+    known_values = {
+        name: [value for row in rows if (value := getattr(row, name)) is not None] for name in (centre, *others)
+    }
+    means: dict[str, Any] = {name: float(np.mean(values)) if values else None for name, values in known_values.items()}
+    u = np.array([coordinate(value) for value in known_values.pop(centre)])
     ends = student_interval(u) if len(u) else (None, None)
     low, high = (None if end is None else level_of(end) for end in ends)
-    means[middle] = level_of(float(u.mean())) if len(u) else None
-    first: Any = own[0]
-    return replace(first, participant=None, n=len(own), low=low, high=high, **means, **group)  # type: ignore[no-any-return]
+    means[centre] = level_of(float(u.mean())) if len(u) else None
+    first: Any = rows[0]
+    return replace(first, participant=None, n=len(rows), low=low, high=high, **means, **group)  # type: ignore[no-any-return]

@@ -1,7 +1,7 @@
 """Thresholds of participants, groups and sites.
 
-Fits take all counted answers of a participant at the levels delivered to the hand: trials of one requested level lie
-at the mean of their delivered levels.
+Fits use all counted answers of a participant at the levels delivered to the hand; the level of trials with the same
+requested level is the mean of their delivered levels.
 """
 
 import math
@@ -18,9 +18,9 @@ from study_app.analysis.data.measures import number_or_none
 from study_app.analysis.levels.answers import Answers
 from study_app.analysis.levels.statistic import (
     MOTORS,
-    OF_WHOM,
+    PARTICIPANT_COLUMNS,
     LevelStatistic,
-    Shown,
+    TableColumn,
     digits,
     interval_words,
     level_words,
@@ -53,7 +53,7 @@ _WIDTH_UNITS: Final = {"log": "decades", "linear": "level"}
 BEYOND: Final = {None: "", "above": "above ", "below": "below "}
 _OPEN_ENDS: Final = {(False, False): None, (True, False): "low", (False, True): "high", (True, True): "both"}
 _SHIFT: Final = 0.1
-"""A prior that shifts a threshold by a larger share of it is named."""
+"""The largest relative shift of a threshold by the prior on the width that is not reported."""
 _FEW_ANSWERS: Final = 40
 """The fewest answers for which the coverage of the intervals was tested."""
 _MOST_NAMED: Final = 6
@@ -68,12 +68,12 @@ REMOVED: Final = (
 class ThresholdEstimate:
     """A participant's threshold at one standard, as in `columns.RESULTS`, or the group's of ``n`` participants.
 
-    ``flat_width`` is the threshold under a flat prior on the width, ``variance`` the posterior variance in u,
-    ``change`` that of the threshold from the first to the last trial as a share of it, 0 where none is found,
-    ``open_end`` the ends of the interval beyond which the answers do not exclude a threshold, and ``compared`` the
-    level at the percentage of successes of the published value, see `compared_percent`. Of the group only threshold and
-    ``compared`` are known, each with its interval, ``early_change`` and ``error_bursts``, see `person_fit`, and
-    ``if_many_lapses``, the threshold for `grid.MANY_LAPSES`, None if the answers exclude it.
+    ``flat_width`` is the threshold under a flat prior on the width, and ``variance`` the posterior variance in u.
+    ``change`` is the relative change of the threshold from the first to the last trial, 0 if no change was detected.
+    ``open_end`` names the ends of the interval that the answers do not determine. ``compared`` is the level at the
+    percentage of successes of the published value (see `compared_percent`). The group has only a threshold and
+    ``compared``, with their intervals, ``early_change`` and ``error_bursts`` (see `person_fit`), and
+    ``if_many_lapses``, the threshold for `grid.MANY_LAPSES`, None if the answers exclude so many lapses.
     """
 
     participant: str | None
@@ -103,7 +103,7 @@ class ThresholdEstimate:
 
     @property
     def fits(self) -> bool:
-        """Whether the fit is acceptable: simulated answers deviate as much as the observed ones; true if unknown."""
+        """Whether the function fits the answers, according to simulated answers; true if unknown."""
         return self.fit_p is None or self.fit_p >= WORST
 
     @property
@@ -123,16 +123,16 @@ class ThresholdEstimate:
 
 
 def given_by(stimulus: Stimulus, rows: pd.DataFrame) -> Given:
-    """Return a person's answers from rows of tracks, with levels at the mean of those delivered for each request."""
-    asked, places = np.unique(rows["level"].to_numpy(dtype=float), return_inverse=True)
-    each = rows["level_delivered"].astype("Float64").to_numpy(dtype=float, na_value=math.nan)
-    known, k = np.isfinite(each), len(asked)
-    measured = np.bincount(places[known], minlength=k)
-    delivered = np.bincount(places[known], each[known], minlength=k) / np.maximum(measured, 1)
+    """Return a participant's answers from rows of `tracks`, with mean delivered levels in the coordinate u."""
+    requested, places = np.unique(rows["level"].to_numpy(dtype=float), return_inverse=True)
+    delivered_levels = rows["level_delivered"].astype("Float64").to_numpy(dtype=float, na_value=math.nan)
+    is_known, k = np.isfinite(delivered_levels), len(requested)
+    measured = np.bincount(places[is_known], minlength=k)
+    delivered = np.bincount(places[is_known], delivered_levels[is_known], minlength=k) / np.maximum(measured, 1)
     has_place = (measured > 0) & ((delivered > 0) | (stimulus.spacing == "linear"))
-    placed = np.where(has_place & (asked != 0), delivered, asked)
+    mean_levels = np.where(has_place & (requested != 0), delivered, requested)
     return Given(
-        levels=np.array([stimulus.coordinate(float(level)) for level in placed]),
+        levels=np.array([stimulus.coordinate(float(level)) for level in mean_levels]),
         places=places,
         successes=rows["success"].to_numpy(dtype=bool),
         towards=rows["towards"].to_numpy(dtype=float),
@@ -147,9 +147,9 @@ def _ordered_answers(block: LevelBlock, opened: pd.DataFrame) -> pd.DataFrame:
     rows = rows.sort_values(["participant", "session", "trial"])
     letters = rows["arrangement"].astype("string")
     towards = np.select([letters.str.startswith("C"), letters == ""], [1.0, 0.0], -1.0)
-    said = pd.Series(np.where(rows["success"].to_numpy(dtype=bool), towards, -towards), rows.index)
+    chosen = pd.Series(np.where(rows["success"].to_numpy(dtype=bool), towards, -towards), rows.index)
     return rows.assign(
-        towards=towards, before=said.groupby([rows["participant"], rows["session"]]).shift(fill_value=0.0)
+        towards=towards, before=chosen.groupby([rows["participant"], rows["session"]]).shift(fill_value=0.0)
     )
 
 
@@ -159,33 +159,34 @@ def thresholds(block: LevelBlock, opened: pd.DataFrame) -> Iterator[ThresholdEst
     if assumed is None or stimulus is None:
         return
     for standard, at_standard in _ordered_answers(block, opened).groupby("standard", dropna=False, sort=True):
-        fits, priors = _fits(block, assumed, at_standard[at_standard["analysed"]])
-        heard = dict(list(at_standard.groupby("participant")))
-        own = [_estimate_own(block, stimulus, standard, fit, heard[fit.person]) for fit in fits]
+        fits, priors = _fit_participants(block, assumed, at_standard[at_standard["analysed"]])
+        rows_by_person = dict(list(at_standard.groupby("participant")))
+        estimates = [_estimate_participant(block, stimulus, standard, fit, rows_by_person[fit.person]) for fit in fits]
         if priors is not None:
             answers = [(fit.fit, fit.posterior) for fit in fits]
-            group = _group(stimulus, standard, own, priors)
+            group = _group_estimate(stimulus, standard, estimates, priors)
             yield replace(group, early_change=early_change(answers), error_bursts=error_bursts(answers))
-        yield from own
+        yield from estimates
 
 
 def thresholds_of(trials: pd.DataFrame, stimulus: Stimulus, design: Design) -> Iterator[ThresholdEstimate]:
-    """Yield thresholds as `thresholds` does, from trials (n rows) of one's own in their order.
+    """Yield thresholds as `thresholds` does, from a table of trials (n rows) in their order.
 
-    Columns are ``level`` and ``success``; perhaps ``participant``, ``session``, ``standard`` and ``arrangement``.
+    Columns are ``level`` and ``success``, and optionally ``participant``, ``session``, ``standard`` and
+    ``arrangement``.
     """
     block = LevelBlock("trials", "", "main", design, stimulus, ())
-    assumed: dict[str, Any] = {"participant": "P001", "session": 1, "standard": math.nan, "arrangement": ""}
-    about = {name: value for name, value in assumed.items() if name not in trials}
+    defaults: dict[str, Any] = {"participant": "P001", "session": 1, "standard": math.nan, "arrangement": ""}
+    missing = {name: value for name, value in defaults.items() if name not in trials}
     numbers = np.arange(len(trials))
     return thresholds(
-        block, trials.assign(block="trials", trial=numbers, analysed=True, level_delivered=trials["level"], **about)
+        block, trials.assign(block="trials", trial=numbers, analysed=True, level_delivered=trials["level"], **missing)
     )
 
 
 @dataclass(frozen=True, slots=True)
 class _FittedPerson:
-    """The fit to the ``rows`` of a participant at a standard; width and lapse rate are informed by all answers."""
+    """The fit to a participant's ``rows`` at a standard; ``factors`` are weights from all participants' answers."""
 
     person: Any
     rows: pd.DataFrame
@@ -197,8 +198,10 @@ class _FittedPerson:
         return self.fit.flat.reweighted(self.factors)
 
 
-def _fits(block: LevelBlock, assumed: Assumed, rows: pd.DataFrame) -> tuple[list[_FittedPerson], GroupPriors | None]:
-    """Return the fit of each participant from the analysed rows of one standard, and what the group says about it."""
+def _fit_participants(
+    block: LevelBlock, assumed: Assumed, rows: pd.DataFrame
+) -> tuple[list[_FittedPerson], GroupPriors | None]:
+    """Return the fit of each participant from the analysed rows of one standard, and the priors from the group."""
     fits, of_people = _flat_fits(block, rows), dict(list(rows.groupby("participant")))
     if not fits:
         return [], None
@@ -222,60 +225,62 @@ def thresholds_compared(
 ) -> tuple[tuple[Mapping[str, ThresholdInU], Mapping[str, ThresholdInU]], float]:
     """Return the thresholds of the participants in two blocks, and the variance that widths add to their difference.
 
-    Blocks with the same levels, design and standards have a width in common: what its prior moves, it moves in both.
-    The width of a block alone is an error that all of its thresholds share.
+    Blocks with the same levels, design and standards have a common width, whose prior shifts the thresholds in both
+    blocks alike. Otherwise, the error of a block's width is shared by all of its thresholds.
     """
-    blocks, of_blocks = (first, second), []
+    blocks, fits_by_block = (first, second), []
     for block in blocks:
         rows = _ordered_answers(block, opened)
         at_standards = rows[rows["analysed"]].groupby("standard", dropna=False, sort=True)
-        of_blocks.append([_flat_fits(block, at_standard) for _, at_standard in at_standards])
+        fits_by_block.append([_flat_fits(block, at_standard) for _, at_standard in at_standards])
     stimuli = [
         (block.stimulus and block.stimulus.model_copy(update={"condition": None}), block.assumed) for block in blocks
     ]
-    alike = stimuli[0] == stimuli[1] and first.design == second.design and len(of_blocks[0]) == len(of_blocks[1])
-    found: tuple[dict[str, list[Posterior]], ...] = ({}, {})
+    alike = (
+        stimuli[0] == stimuli[1] and first.design == second.design and len(fits_by_block[0]) == len(fits_by_block[1])
+    )
+    posteriors: tuple[dict[str, list[Posterior]], ...] = ({}, {})
     shared = 0.0
-    for place, of_block in enumerate(of_blocks):
+    for place, fits_by_standard in enumerate(fits_by_block):
         prior = blocks[place].assumed
-        for standard, people in enumerate(of_block):
-            others = of_blocks[1 - place][standard] if alike else {}
+        for standard, people in enumerate(fits_by_standard):
+            others = fits_by_block[1 - place][standard] if alike else {}
             if prior is None or not people:
                 continue
             fits = [fit.flat for fit in (*people.values(), *others.values())]
             priors = group_priors(fits, prior.width_prior)
-            shared += 0.0 if alike else priors.variance / len(of_block)
+            shared += 0.0 if alike else priors.variance / len(fits_by_standard)
             for (person, fit), factors in zip(people.items(), priors.factors, strict=False):
-                found[place].setdefault(str(person), []).append(fit.flat.reweighted(factors))
-    first_of, second_of = (
+                posteriors[place].setdefault(str(person), []).append(fit.flat.reweighted(factors))
+    first_thresholds, second_thresholds = (
         {
             person: ThresholdInU(
-                value=float(np.mean([posterior.threshold for posterior in each])),
-                variance=sum(posterior.variance for posterior in each) / len(each) ** 2,
+                value=float(np.mean([posterior.threshold for posterior in of_person])),
+                variance=sum(posterior.variance for posterior in of_person) / len(of_person) ** 2,
             )
-            for person, each in of_block.items()
+            for person, of_person in of_block.items()
         }
-        for of_block in found
+        for of_block in posteriors
     )
-    return (first_of, second_of), shared
+    return (first_thresholds, second_thresholds), shared
 
 
 def _flat_fits(block: LevelBlock, rows: pd.DataFrame) -> dict[Any, PersonFit]:
-    """Return the fit of each participant from the analysed rows of one standard, all widths being equally likely."""
+    """Return the fit of each participant from the analysed rows of one standard, with a flat prior on the width."""
     if (stimulus := block.stimulus) is None or (assumed := block.assumed) is None:
         return {}
-    two = block.design.kind == "2ifc" and block.has_correct_answer
+    two_intervals = block.design.kind == "2ifc" and block.has_correct_answer
     fits = {}
-    for person, own in rows.groupby("participant"):
-        grid = stimulus.analysis_grid(block.design, assumed, own["session"].nunique())
-        fits[person] = given_by(stimulus, own).fit(grid, two_intervals=two)
+    for person, person_rows in rows.groupby("participant"):
+        grid = stimulus.analysis_grid(block.design, assumed, person_rows["session"].nunique())
+        fits[person] = given_by(stimulus, person_rows).fit(grid, two_intervals=two_intervals)
     return fits
 
 
-def _estimate_own(
-    block: LevelBlock, stimulus: Stimulus, standard: Any, fitted: _FittedPerson, heard: pd.DataFrame
+def _estimate_participant(
+    block: LevelBlock, stimulus: Stimulus, standard: Any, fitted: _FittedPerson, all_rows: pd.DataFrame
 ) -> ThresholdEstimate:
-    """Return a participant's threshold; ``heard`` are also the rows that are not analysed."""
+    """Return a participant's threshold; ``all_rows`` includes the rows that are not analysed."""
     fit, posterior, rows = fitted.fit, fitted.posterior, fitted.rows
     given, grid = fit.given, posterior.grid
     level_of, threshold, (low, high) = stimulus.level_of, posterior.threshold, posterior.interval
@@ -303,74 +308,74 @@ def _estimate_own(
         fit_p=p_of_fit(np.bincount(cells, given.successes), np.bincount(cells), psi[first]),
         drift=drift(given.successes, psi),
         change=10.0**decades - 1.0 if fit.named else 0.0,
-        reversal_mean=_reversal_mean(block, stimulus, heard),
+        reversal_mean=_reversal_mean(block, stimulus, all_rows),
         target_percent=None if block.method is None else block.method.target_percent,
         compared=None if math.isnan(compared) else level_of(compared),
     )
 
 
-def _reversal_mean(block: LevelBlock, stimulus: Stimulus, heard: pd.DataFrame) -> float | None:
-    """Return the mean, in u, of the classical estimates of the tracks; None where none has any."""
+def _reversal_mean(block: LevelBlock, stimulus: Stimulus, all_rows: pd.DataFrame) -> float | None:
+    """Return the mean (in u) of the tracks' means of reversals, as a level; None if no track has one."""
     if block.method is None or block.method.target_percent is None:
         return None
     means = []
-    for _, rows in heard.groupby(TRACK, sort=True):
+    for _, rows in all_rows.groupby(TRACK, sort=True):
         setting = setting_of(block, rows["track"].iloc[0])
         mean = None if setting is None else block.method.reversal_mean(setting, answers_of(rows))
         means += [] if mean is None else [stimulus.coordinate(mean)]
     return stimulus.level_of(float(np.mean(means))) if means else None
 
 
-def _group(
-    stimulus: Stimulus, standard: Any, own: Sequence[ThresholdEstimate], priors: GroupPriors
+def _group_estimate(
+    stimulus: Stimulus, standard: Any, estimates: Sequence[ThresholdEstimate], priors: GroupPriors
 ) -> ThresholdEstimate:
-    """Return the random-effects mean of participants, at the published percentage too where all have theirs."""
+    """Return the random-effects mean of participants, also at the published percentage if all have a value there."""
 
     def level_of(end: float | None) -> float | None:
         return None if end is None else stimulus.level_of(end)
 
     def mean(levels: Sequence[float]) -> GroupMean:
-        variances = [estimate.variance or 0.0 for estimate in own]
+        variances = [estimate.variance or 0.0 for estimate in estimates]
         return group_mean([*map(stimulus.coordinate, levels)], variances, (priors.below, priors.above))
 
-    found = mean([estimate.threshold for estimate in own])
+    group_value = mean([estimate.threshold for estimate in estimates])
     group = ThresholdEstimate(
         participant=None,
         standard=number_or_none(standard),
-        n=len(own),
-        threshold=stimulus.level_of(found.mean),
-        low=level_of(found.low),
-        high=level_of(found.high),
-        if_many_lapses=level_of(None if priors.if_many_lapses is None else found.mean + priors.if_many_lapses),
+        n=len(estimates),
+        threshold=stimulus.level_of(group_value.mean),
+        low=level_of(group_value.low),
+        high=level_of(group_value.high),
+        if_many_lapses=level_of(None if priors.if_many_lapses is None else group_value.mean + priors.if_many_lapses),
     )
-    compared = [estimate.compared for estimate in own if estimate.compared is not None]
-    if len(compared) < len(own):
+    compared = [estimate.compared for estimate in estimates if estimate.compared is not None]
+    if len(compared) < len(estimates):
         return group
-    found = mean(compared)
+    group_value = mean(compared)
     return replace(
         group,
-        compared=stimulus.level_of(found.mean),
-        compared_low=level_of(found.low),
-        compared_high=level_of(found.high),
+        compared=stimulus.level_of(group_value.mean),
+        compared_low=level_of(group_value.low),
+        compared_high=level_of(group_value.high),
     )
 
 
-_PLACES: Final = 40
+_BAND_POINTS: Final = 40
 
 
 def psychometric_bands(
     block: LevelBlock, opened: pd.DataFrame, people: tuple[str, ...], ends: tuple[float, float]
 ) -> Mapping[str, Array]:
-    """Return the band of each participant, shape (3, k): u, and the ends of the pointwise band there.
+    """Return the psychometric band of each participant (3, k): u, and the ends of the pointwise band at u.
 
     The block has one standard; ``ends`` are the smallest and the largest u.
     """
     assumed, stimulus = block.assumed, block.stimulus
     if assumed is None or stimulus is None:
         return {}
-    u = np.linspace(*ends, _PLACES)
+    u = np.linspace(*ends, _BAND_POINTS)
     rows = _ordered_answers(block, opened)
-    fits, _ = _fits(block, assumed, rows[rows["analysed"]])
+    fits, _ = _fit_participants(block, assumed, rows[rows["analysed"]])
     return {str(fit.person): np.array([u, *fit.posterior.band(u)]) for fit in fits if fit.person in people}
 
 
@@ -381,8 +386,8 @@ Flags = NDArray[np.bool_]
 class TrackCourse:
     """The answers of one participant at one standard in trial order, shape (n,) each.
 
-    ``levels`` are requested levels; ``tracks`` are numbered from 1; ``catches`` are catch trials, ``noises``
-    presentations of the standard alone, neither with a level chosen by a track; ``low`` and ``high`` are the ends, as
+    ``levels`` are requested levels; ``tracks`` are numbered from 1. ``catches`` marks catch trials and ``noises``
+    presentations of the standard alone; tracks did not choose their levels. ``low`` and ``high`` are the ends, as
     levels, of the 95 % interval of the threshold from the answers so far, without the correction for changes over the
     session.
     """
@@ -399,7 +404,7 @@ class TrackCourse:
     high: Array
 
 
-def courses(block: LevelBlock, opened: pd.DataFrame, most: int) -> Iterator[TrackCourse]:
+def track_courses(block: LevelBlock, opened: pd.DataFrame, most: int) -> Iterator[TrackCourse]:
     """Yield the first ``most`` courses of a block by participant and standard, from the rows of `tracks`."""
     assumed, stimulus = block.assumed, block.stimulus
     if assumed is None or stimulus is None:
@@ -407,23 +412,25 @@ def courses(block: LevelBlock, opened: pd.DataFrame, most: int) -> Iterator[Trac
     rows = _ordered_answers(block, opened)
     at_standards = rows[rows["analysed"]].groupby("standard", dropna=False, sort=True)
     fits: list[tuple[Any, _FittedPerson]] = [
-        (standard, person) for standard, own in at_standards for person in _fits(block, assumed, own)[0]
+        (standard, person)
+        for standard, person_rows in at_standards
+        for person in _fit_participants(block, assumed, person_rows)[0]
     ]
     for standard, fitted in sorted(fits, key=lambda fit: fit[1].person)[:most]:
-        own, ends = fitted.rows, []
-        for n in range(1, len(own) + 1):
-            so_far = fitted.fit.after(n).reweighted(fitted.factors)
-            ends.append([stimulus.level_of(end) for end in so_far.interval])
+        person_rows, ends = fitted.rows, []
+        for n in range(1, len(person_rows) + 1):
+            posterior = fitted.fit.after(n).reweighted(fitted.factors)
+            ends.append([stimulus.level_of(end) for end in posterior.interval])
         low, high = np.array(ends).T
         yield TrackCourse(
             participant=str(fitted.person),
             standard=None if pd.isna(standard) else float(standard),
-            tracks=np.array([int(name.rpartition("/")[2]) for name in own["track"]], np.int64),
-            levels=own["level"].to_numpy(dtype=float),
+            tracks=np.array([int(name.rpartition("/")[2]) for name in person_rows["track"]], np.int64),
+            levels=person_rows["level"].to_numpy(dtype=float),
             successes=fitted.fit.given.successes,
-            reversals=own["reversal"].astype("boolean").to_numpy(dtype=bool, na_value=False),
-            catches=own["catch"].fillna(False).to_numpy(dtype=bool),
-            noises=~own["arrangement"].str.contains("C").to_numpy(dtype=bool),
+            reversals=person_rows["reversal"].astype("boolean").to_numpy(dtype=bool, na_value=False),
+            catches=person_rows["catch"].fillna(False).to_numpy(dtype=bool),
+            noises=~person_rows["arrangement"].str.contains("C").to_numpy(dtype=bool),
             low=low,
             high=high,
         )
@@ -433,13 +440,13 @@ def percent_compared(result: LevelsResult) -> float | None:
     """Return the percentage correct at which thresholds are compared with published ones, or None."""
     return (
         compared_percent(result.published)
-        if any(threshold.compared is not None for threshold in Thresholds.of(result))
+        if any(threshold.compared is not None for threshold in Thresholds.rows_in(result))
         else None
     )
 
 
-def _with_device(result: LevelsResult, estimate: ThresholdEstimate) -> float | None:
-    """Return a Weber fraction of damping with the device's own in the standard, ΔB/(B + b); None where unknown."""
+def _device_weber_fraction(result: LevelsResult, estimate: ThresholdEstimate) -> float | None:
+    """Return the Weber fraction of damping relative to standard plus device damping, ΔB/(B + b); None if unknown."""
     if (
         result.device is None
         or estimate.standard is None
@@ -449,17 +456,19 @@ def _with_device(result: LevelsResult, estimate: ThresholdEstimate) -> float | N
     return estimate.threshold * estimate.standard / (estimate.standard + result.device.damping_nspm)
 
 
-def _named_people(found: LevelsResult, own: Sequence[ThresholdEstimate], some: Sequence[ThresholdEstimate]) -> str:
-    """Return a phrase on whose thresholds are meant, with at most `_MOST_NAMED` participants by name."""
-    if len(some) > _MOST_NAMED:
-        return f"{len(some)} of {len(own)} thresholds"
-    several = len({estimate.standard for estimate in own}) > 1
+def _participants_phrase(
+    result: LevelsResult, estimates: Sequence[ThresholdEstimate], selected: Sequence[ThresholdEstimate]
+) -> str:
+    """Return a phrase that names the participants of ``selected`` estimates, or counts them if there are many."""
+    if len(selected) > _MOST_NAMED:
+        return f"{len(selected)} of {len(estimates)} thresholds"
+    several = len({estimate.standard for estimate in estimates}) > 1
     return listed(
         [
-            f"{estimate.participant} at {with_unit(found, estimate.standard)}"
+            f"{estimate.participant} at {with_unit(result, estimate.standard)}"
             if several and estimate.standard is not None
             else str(estimate.participant)
-            for estimate in some
+            for estimate in selected
         ]
     )
 
@@ -474,8 +483,8 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
 
     compute = staticmethod(lambda block, opened, _study, _found: thresholds(block, opened))
 
-    def shown(self) -> Sequence[Shown]:
-        result, percent, compared = self.found, self._target_percent(), percent_compared(self.found)
+    def table_columns(self) -> Sequence[TableColumn]:
+        result, percent, compared = self.result, self._target_percent(), percent_compared(self.result)
 
         def fit(estimate: ThresholdEstimate) -> str:
             if estimate.error_bursts is not None:
@@ -502,16 +511,16 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
             )
 
         return (
-            self.standard(),
-            *OF_WHOM,
+            self.standard_column(),
+            *PARTICIPANT_COLUMNS,
             (
                 "threshold" + (" (Weber fraction)" if result.level_kind == "weber" else unit(result)),
                 lambda row: f"{BEYOND[row.beyond]}{row.threshold:.3g}",
             ),
             ("95 % interval", interval),
             None if compared is None else (f"at {compared:g} %", lambda row: digits(row.compared)),
-            ("with device damping", lambda row: digits(_with_device(result, row)))
-            if any(_with_device(result, row) is not None for row in self.rows)
+            ("with device damping", lambda row: digits(_device_weber_fraction(result, row)))
+            if any(_device_weber_fraction(result, row) is not None for row in self.rows)
             else None,
             (f"width [{_WIDTH_UNITS[result.spacing]}]", lambda row: digits(row.width, 2)),
             ("flat width prior", lambda row: digits(row.flat_width)),
@@ -523,12 +532,12 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
         )
 
     def _target_percent(self) -> float | None:
-        return next((estimate.target_percent for estimate in self.own(self.found)), None)
+        return next((estimate.target_percent for estimate in self.participant_rows(self.result)), None)
 
-    def explained(self) -> str:
-        result, percent, compared = self.found, self._target_percent(), percent_compared(self.found)
+    def explanation(self) -> str:
+        result, percent, compared = self.result, self._target_percent(), percent_compared(self.result)
         at = "" if result.guess_rate is None else f" ({50 * (1 + result.guess_rate):.3g} % {result.counts})"
-        catch = ", including answers to catch trials" if any(answer.catch for answer in Answers.of(result)) else ""
+        catch = ", including answers to catch trials" if any(answer.catch for answer in Answers.rows_in(result)) else ""
         reversals = (
             ""
             if percent is None
@@ -561,11 +570,11 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
             f"answers{catch}." + (f" {REMOVED.format('is')}" if result.design == "2ifc" else "")
         )
 
-    def compares(self, measure: str) -> bool:
+    def is_comparable_with(self, measure: str) -> bool:
         return measure != "exponent"
 
     def sentences(self) -> Iterator[str]:
-        result = self.found
+        result = self.result
         for row in self.rows:
             if row.participant is None:
                 where = "" if row.standard is None else f", standard {with_unit(result, row.standard)}"
@@ -580,18 +589,18 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
                 )
 
     def limits(self) -> Iterator[str]:
-        own, title = self.own(self.found), self.found.title
-        if not own:
+        estimates, title = self.participant_rows(self.result), self.result.title
+        if not estimates:
             return
 
-        def shifted(estimate: ThresholdEstimate) -> bool:
+        def is_shifted(estimate: ThresholdEstimate) -> bool:
             return estimate.flat_width is not None and abs(estimate.flat_width - estimate.threshold) > _SHIFT * abs(
                 estimate.threshold
             )
 
         kinds: tuple[tuple[Callable[[ThresholdEstimate], bool], str], ...] = (
             (
-                shifted,
+                is_shifted,
                 f"because there are few answers, the prior on the width shifts the threshold by more than "
                 f"{100 * _SHIFT:.0f} %",
             ),
@@ -613,43 +622,44 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
             ),
         )
         yield from self._limits_of_lapses()
-        for applies, words in kinds:
-            if some := [estimate for estimate in own if applies(estimate)]:
-                yield f"{title}: {words} ({_named_people(self.found, own, some)})."
-        if some := [estimate for estimate in own if estimate.open_end]:
+        for applies, reason in kinds:
+            if affected := [estimate for estimate in estimates if applies(estimate)]:
+                yield f"{title}: {reason} ({_participants_phrase(self.result, estimates, affected)})."
+        if affected := [estimate for estimate in estimates if estimate.open_end]:
             yield (
                 f"{title}: the answers do not determine one or both ends of the 95 % interval, marked “<” or “>” in "
-                f"the table ({_named_people(self.found, own, some)})."
+                f"the table ({_participants_phrase(self.result, estimates, affected)})."
             )
         for row in self.rows:
             if row.participant is None and row.learned:
-                where = "" if row.standard is None else f" at standard {with_unit(self.found, row.standard)}"
+                where = "" if row.standard is None else f" at standard {with_unit(self.result, row.standard)}"
                 yield (
                     f"{title}: thresholds {'rose' if (row.early_change or 0.0) > 0 else 'fell'} by "
                     f"{abs(row.early_change or 0.0):.1f} standard errors after the first trials{where}. The group's "
                     "threshold may be biased, because the analysis assumes that thresholds are constant or change at "
                     "a constant rate."
                 )
-        if some := [estimate for estimate in own if estimate.drifts]:
+        if affected := [estimate for estimate in estimates if estimate.drifts]:
             sizes = listed(
-                [f"{100 * (estimate.change or 0.0):+.0f} %".replace("-", "−") for estimate in some[:_MOST_NAMED]]
+                [f"{100 * (estimate.change or 0.0):+.0f} %".replace("-", "−") for estimate in affected[:_MOST_NAMED]]
             )
             yield (
-                f"{title}: the threshold changed over the trials ({_named_people(self.found, own, some)}: {sizes} from "
-                "the first trial to the last); the interval allows for this."
+                f"{title}: the threshold changed over the trials "
+                f"({_participants_phrase(self.result, estimates, affected)}: {sizes} from the first trial to the "
+                "last); the interval allows for this."
             )
-        if (people := len({estimate.participant for estimate in own})) < FEWEST:
+        if (people := len({estimate.participant for estimate in estimates})) < FEWEST:
             yield (
                 f"{title}: a group interval needs at least {FEWEST} participants, because differences between people "
                 f"cannot be estimated from fewer. This block has {people}."
             )
-        if self.found.level_kind == "weber":
+        if self.result.level_kind == "weber":
             yield self._limit_of_device()
         yield f"{title}: {MOTORS}"
 
     def _limits_of_lapses(self) -> Iterator[str]:
         groups = [
-            (row, "" if row.standard is None else f" at standard {with_unit(self.found, row.standard)}")
+            (row, "" if row.standard is None else f" at standard {with_unit(self.result, row.standard)}")
             for row in self.rows
             if row.participant is None
         ]
@@ -657,7 +667,7 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
             f"{group.error_bursts:.1f} standard errors{where}" for group, where in groups if group.clustered
         ]:
             yield (
-                f"{self.found.title}: errors are more clustered than the fitted functions predict, by "
+                f"{self.result.title}: errors are more clustered than the fitted functions predict, by "
                 f"{listed(clusters)}. Participants may have answered at random for several trials in a row, so the "
                 "group's threshold may be too high."
             )
@@ -667,14 +677,14 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
             if group.if_many_lapses is not None
         ]:
             yield (
-                f"{self.found.title}: the answers do not rule out a mean lapse rate of {100 * MANY_LAPSES:g} %, at "
+                f"{self.result.title}: the answers do not rule out a mean lapse rate of {100 * MANY_LAPSES:g} %, at "
                 f"which the group's threshold would be {listed(thresholds)}. The more catch trials far above the "
                 "threshold a block has, the better the lapse rate can be estimated."
             )
 
     def _limit_of_device(self) -> str:
         """Return the sentence on the limitation due to the device's own dynamics."""
-        result, own = self.found, self.found.device
+        result, own = self.result, self.result.device
         if own is None:
             return (
                 f"{result.title}: the device's own damping, friction and mass are unknown, because they were not "
@@ -690,7 +700,7 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
         shares = [
             f"{share:.3g} instead of {row.threshold:.3g} at {row.standard:g} {result.unit}"
             for row in self.rows
-            if row.participant is None and (share := _with_device(result, row)) is not None
+            if row.participant is None and (share := _device_weber_fraction(result, row)) is not None
         ]
         if not shares:
             return f"{words}."
@@ -713,7 +723,7 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
 
     @classmethod
     def common_methods(cls, blocks: Sequence[LevelsResult]) -> Iterator[str]:
-        if any(map(cls.of, blocks)):
+        if any(map(cls.rows_in, blocks)):
             yield (
                 "Thresholds are posterior medians, computed on a grid, with equal-tailed 95 % intervals, based on all "
                 "analysed answers at the levels delivered to the hand. The deviance was compared with the deviances "

@@ -88,7 +88,7 @@ def test_answers_to_levels_are_counted_by_hand() -> None:
     assert [result.block for result in results] == list(BLOCKS)
     for result in results:
         trials = opened[(opened["block"] == result.block) & opened["analysed"]]
-        answers = Answers.of(result)
+        answers = Answers.rows_in(result)
         assert answers
         assert sum(row.n for row in answers if row.participant is None) == len(trials)
         for row in answers:

@@ -125,8 +125,8 @@ def test_tables_of_levels_hold_measures_and_results_in_every_format(opened_level
     about = {"study": "levels", "simulated": True, "pilot": False, "group": None}
     expected: dict[str, list[Any]] = {"tracks": [], "responses": []}
     for result, statistic in product(level_results(study), statistics()):
-        if statistic.exported_in(study):
-            expected.setdefault(statistic.table, []).extend(about | row for row in statistic(result).exported())
+        if statistic.is_exported_in(study):
+            expected.setdefault(statistic.table, []).extend(about | row for row in statistic(result).export_rows())
     assert expected.keys() == {path.stem.partition("tion-")[2].removesuffix("_data") for path in to.glob("*.sav")} - {
         "wide"
     }

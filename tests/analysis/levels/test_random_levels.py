@@ -237,8 +237,8 @@ def lines_of(number: int) -> Iterator[str]:
     around = study(delays([0, 50]), list(everybody(delays([0, 50]), 3, lambda *_: 4)))
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(figure_style, "file_bytes", stub_png)
-        drawable = not Thresholds.own(found) or (
-            len({one.standard for one in Answers.of(found)}) > 1 and not found.adaptive
+        drawable = not Thresholds.participant_rows(found) or (
+            len({one.standard for one in Answers.rows_in(found)}) > 1 and not found.adaptive
         )
         pictures = list(draw_figures(level_figure_tasks(around, [found], ("png",)), failures)) if drawable else []
     assert not failures.found, str(failures.found)
@@ -285,13 +285,13 @@ def test_each_column_of_a_table_of_levels_shows_its_number() -> None:
     for number in range(36):
         found = filled(number)[1]
         for statistic in statistics():
-            has_table = statistic.of(found) and statistic.shown is not LevelStatistic.shown
-            shown = statistic(found).shown() if has_table else ()
+            has_table = statistic.rows_in(found) and statistic.table_columns is not LevelStatistic.table_columns
+            shown = statistic(found).table_columns() if has_table else ()
             for title, cell_of in (column for column in shown if column is not None):
                 heading = re.sub(r" [\[(].*| [\d.]+ %$", "", title)
                 if (heading in OTHER_CELLS or heading[0] == "“") and heading not in CELLS.get(statistic.key, ()):
                     continue
-                for row in statistic.of(found):
+                for row in statistic.rows_in(found):
                     values = [
                         row[name] if isinstance(row, dict) else getattr(row, name)
                         for name in CELLS[statistic.key][heading].split()
@@ -306,7 +306,7 @@ def test_the_answers_at_a_level_are_percentages_only_if_they_are_proportions() -
     checked = set()
     for number in range(24):
         found = filled(number)[1]
-        answers = [row for row in Answers.of(found) if row.participant is None and not row.catch]
+        answers = [row for row in Answers.rows_in(found) if row.participant is None and not row.catch]
         if found.adaptive or not answers:
             continue
         page = "".join(Answers(found).section())

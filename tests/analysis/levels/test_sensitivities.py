@@ -145,10 +145,10 @@ def test_what_is_said_of_abx_names_its_assumption_and_where_the_other_model_is()
     of_block = SimpleNamespace(
         block="b", design="abx", vary="damping", summary="share", statistics={Sensitivities.key: (one,)}
     )
-    told = Sensitivities(cast("Any", of_block)).explained()
+    told = Sensitivities(cast("Any", of_block)).explanation()
     assert "assuming that participants do not have a response bias" in told
     assert "exported thresholds table" in told
-    (row,) = Sensitivities(cast("Any", of_block)).exported()
+    (row,) = Sensitivities(cast("Any", of_block)).export_rows()
     assert "d_prime_other" in row
     assert Sensitivities.table == "thresholds"
 
@@ -159,7 +159,7 @@ def test_k_of_same_different_is_explained_only_if_the_table_shows_it(settings: A
     people = list(sensitivities(block("samedifferent", settings=settings), frame))
     statistics = {Sensitivities.key: people}
     of_block = SimpleNamespace(title="Pairs", design="samedifferent", vary="damping", summary="", statistics=statistics)
-    note = Sensitivities(cast("Any", of_block)).explained()
+    note = Sensitivities(cast("Any", of_block)).explanation()
     assert ("k is the perceived difference" in note) is has_k
 
 

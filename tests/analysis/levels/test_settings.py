@@ -12,7 +12,7 @@ import pytest
 from study_app import figure_style as style
 from study_app.analysis.data.blocks import LevelBlock
 from study_app.analysis.figures.level_figures import _draw_settings
-from study_app.analysis.levels.answers import SettingEstimate, Settings, settings
+from study_app.analysis.levels.answers import SettingEstimate, Settings, setting_estimates
 from study_app.analysis.page_layout import Look
 from study_app.analysis.report.write_report import report
 from study_app.analysis.results import LevelsResult
@@ -46,7 +46,7 @@ def test_settings_that_do_not_count_and_trials_without_one_are_left_out() -> Non
     table = rows(("A", 3.0, 5.0), ("A", 17.0, 7.0), ("A", 3.0, 18.0), ("A", 17.0, math.nan))
     table.loc[2, "analysed"] = False
     table["setting"] = table["setting"].astype("Float64").where(table["setting"].notna())
-    _, a = settings(block(), table)
+    _, a = setting_estimates(block(), table)
     assert a.levels == (5.0, 7.0)
 
 

@@ -278,7 +278,7 @@ def test_a_report_marks_open_ends_and_says_so() -> None:
         ),
     ]
     shown = Thresholds(replace(found, statistics={"thresholds": tuple(estimates)}))
-    cells = dict(column for column in shown.shown() if column is not None)
+    cells = dict(column for column in shown.table_columns() if column is not None)
     assert [cells["95 % interval"](one) for one in estimates] == ["0.3 – 0.9", "0.2 – > 0.95"]
     assert cells["drift"](estimates[0]) == "−3.1 SE!"
     assert [cells["fit (p)"](one) for one in estimates] == ["+1.5 SE!", "0.500"]
