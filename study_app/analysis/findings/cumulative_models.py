@@ -1,4 +1,4 @@
-"""Cumulative mixed models of the primary statements, which need neither equal steps nor complete participants."""
+"""Cumulative mixed models of the primary statements, which require neither equal steps nor complete answers."""
 
 from collections.abc import Iterator
 from functools import partial
@@ -19,8 +19,9 @@ from study_app.analysis.wording import counted, interval, number, p_value
 class _CumulativeModels(StatementTests):
     """An exploratory cumulative mixed model of each primary statement.
 
-    Over delays it is fitted to all individual answers, with effects of the delay that differ between participants; over
-    liquids and views to the participants' medians, since its test rejected too often with repeated answers.
+    For delays, it is fitted to all individual answers, and the effect of the delay varies between participants. For
+    liquids and views, it is fitted to the participants' medians, because with repeated answers its test rejects too
+    often.
     """
 
     key = "cumulative"
@@ -53,16 +54,16 @@ class _CumulativeModels(StatementTests):
         fitted = [test for test in self.value if test.outcome.p is not None]
         if not fitted:
             return
-        delays = bool(self.found.delays_ms)
-        effects = ["per 100 ms"] if delays else [f"{name} − {self.found.names[0]}" for name in self.found.names[1:]]
+        delays = bool(self.result.delays_ms)
+        effects = ["per 100 ms"] if delays else [f"{name} − {self.result.names[0]}" for name in self.result.names[1:]]
         yield heading(3, self.title)
         yield table_of(
             fitted,
-            ("Statement", lambda test: short_text(self.found, test.item)),
+            ("Statement", lambda test: short_text(self.result, test.item)),
             ("n", lambda test: f"{test.outcome.n}"),
             ("incomplete", lambda test: f"{self._model(test).incomplete}"),
             ("answers", lambda test: f"{self._model(test).answers}"),
-            *[(effect, partial(self._effect, place)) for place, effect in enumerate(effects)],
+            *[(effect, partial(self._effect_cell, place)) for place, effect in enumerate(effects)],
             (
                 "SDs (intercept, delay)" if delays else "SD",
                 lambda test: ", ".join(number(sd) for sd in self._model(test).sds),
@@ -76,8 +77,8 @@ class _CumulativeModels(StatementTests):
         methods = method_words(test.outcome.method for test in fitted)
         unit, sign = ("per 100 ms of delay", "answers rise") if delays else ("", "the first of the two is rated higher")
         yield paragraph(
-            f"A cumulative logit mixed model was fitted to {self._answers()} to each primary statement, including the "
-            f"answers of participants with missing answers. Effects are log odds ratios {unit}".rstrip()
+            f"A cumulative logit mixed model was fitted to {self._answers_noun()} to each primary statement, including "
+            f"the answers of participants with missing answers. Effects are log odds ratios {unit}".rstrip()
             + f" and are positive if {sign}; their 95 % intervals are Wald intervals. The SDs describe the "
             f"participants' intercepts{' and delay effects' if delays else ''}. "
             f"LR is the likelihood-ratio statistic; p values are based on {methods}. Adjusted p values are corrected "
@@ -86,27 +87,27 @@ class _CumulativeModels(StatementTests):
         )
         for test in self.value:
             if test.outcome.p is None:
-                what = f"{short_text(self.found, test.item)}: the model could not be fitted"
-                yield paragraph(f"{what} because {test.outcome.note}.", "soft")
+                failure = f"{short_text(self.result, test.item)}: the model could not be fitted"
+                yield paragraph(f"{failure} because {test.outcome.note}.", "soft")
 
-    def _answers(self) -> str:
-        return "all individual answers" if self.found.delays_ms else "the participants' median answers"
+    def _answers_noun(self) -> str:
+        return "all individual answers" if self.result.delays_ms else "the participants' median answers"
 
     @staticmethod
     def _model(test: Tested) -> CumulativeModel:
         return cast("CumulativeModel", test.outcome)
 
-    def _effect(self, place: int, test: Tested) -> str:
+    def _effect_cell(self, place: int, test: Tested) -> str:
         model = self._model(test)
         return f"{number(model.log_odds_ratios[place])} {interval(model.intervals[place])}"
 
     def methods(self) -> Iterator[str]:
         fitted = sum(test.outcome.p is not None for test in self.value)
         if fitted:
-            slopes = " and delay effects" if self.found.delays_ms else ""
+            slopes = " and delay effects" if self.result.delays_ms else ""
             yield (
                 f"In an exploratory analysis, a cumulative logit mixed model with random intercepts{slopes} was fitted "
-                f"to {self._answers()} to {counted(fitted, 'primary statement')}, including the answers of "
+                f"to {self._answers_noun()} to {counted(fitted, 'primary statement')}, including the answers of "
                 "participants who did not answer in all conditions; effects were tested with likelihood-ratio tests, "
                 "and the false discovery rate was controlled (Benjamini–Hochberg)."
             )

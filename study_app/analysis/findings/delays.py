@@ -1,4 +1,4 @@
-"""Comparisons over delays: each with the shortest, the lowest that shows, the detection threshold, and reaching."""
+"""Findings about delays: equivalence to the shortest, the shortest with a trend, detection threshold, and reaching."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -22,8 +22,8 @@ from study_app.analysis.findings.finding import (
     Finding,
     Row,
     codes_of,
-    rows_alone,
     test_row,
+    uncorrected_entries,
 )
 from study_app.analysis.findings.statement_tests import ONE_DELAY, DelayTrend
 from study_app.analysis.html_page import ends_of, heading, paragraph, table, table_of
@@ -91,8 +91,8 @@ def equivalent_up_to(against: tuple[ContrastWithControl, ...]) -> dict[str, floa
     return longest
 
 
-def _about_against(against: Sequence[ContrastWithControl]) -> Iterator[str]:
-    """Yield sentences on how the comparisons with the shortest delay were made, and on their limits."""
+def _comparison_notes(against: Sequence[ContrastWithControl]) -> Iterator[str]:
+    """Yield sentences on the method and the limitations of the comparisons with the shortest delay."""
     first = against[0].found
     yield (
         f"Each comparison uses two one-sided t tests with equivalence bounds of {bound_text(first.bound)}, and a "
@@ -114,28 +114,30 @@ def _about_against(against: Sequence[ContrastWithControl]) -> Iterator[str]:
 _VERDICTS: Final = ("equivalent", "not equivalent", "inconclusive", "out of reach")
 
 
-def by_delay(result: BlockResult) -> list[list[str]]:
-    """Return one table row per delay: the statements with each verdict, and a concluding sentence."""
+def rows_by_delay(result: BlockResult) -> list[list[str]]:
+    """Return one table row for each delay: the delay, the statements with each verdict, and a concluding sentence."""
     rows = []
-    for delay_ms in dict.fromkeys(tested.delay_ms for tested in ContrastsWithControl.of(result)):
-        here = [tested for tested in ContrastsWithControl.of(result) if tested.delay_ms == delay_ms]
+    for delay_ms in dict.fromkeys(tested.delay_ms for tested in ContrastsWithControl.value_in(result)):
+        at_delay = [tested for tested in ContrastsWithControl.value_in(result) if tested.delay_ms == delay_ms]
         cells = [
-            ", ".join(short_text(result, tested.item) for tested in here if tested.verdict == verdict) or "–"
+            ", ".join(short_text(result, tested.item) for tested in at_delay if tested.verdict == verdict) or "–"
             for verdict in _VERDICTS
         ]
-        rows.append([ms(delay_ms), *cells, _said_of(result, delay_ms, here)])
+        rows.append([ms(delay_ms), *cells, _delay_conclusion(result, delay_ms, at_delay)])
     return rows
 
 
-def _said_of(result: BlockResult, delay_ms: float, here: Sequence[ContrastWithControl]) -> str:
-    if all(tested.verdict == "equivalent" for tested in here):
-        not_excluded = _not_excluded([tested.found for tested in here])
+def _delay_conclusion(result: BlockResult, delay_ms: float, comparisons: Sequence[ContrastWithControl]) -> str:
+    if all(tested.verdict == "equivalent" for tested in comparisons):
+        not_excluded = _minority_phrase([tested.found for tested in comparisons])
         return f"The mean answers to these statements stay within the bounds, but {not_excluded}."
     reasons = _evidence_up_to(result, delay_ms)
     if not reasons:
         return f"These data neither support nor refute the claim that delays of up to {ms(delay_ms)} do not matter."
     unclear = [
-        f"“{short_text(result, tested.item)}”" for tested in here if tested.verdict in ("inconclusive", "out of reach")
+        f"“{short_text(result, tested.item)}”"
+        for tested in comparisons
+        if tested.verdict in ("inconclusive", "out of reach")
     ]
     limit = (
         f" For {listed(unclear)}, the data do not show whether the mean difference at {ms(delay_ms)} exceeds the bound."
@@ -146,19 +148,19 @@ def _said_of(result: BlockResult, delay_ms: float, here: Sequence[ContrastWithCo
 
 
 def _evidence_up_to(result: BlockResult, delay_ms: float) -> tuple[str, ...]:
-    """Return the evidence that delays up to this one change answers.
+    """Return phrases with the evidence that delays up to this one change answers.
 
-    This is a trend up to this delay or a shorter one, with the error rate controlled over all statements, or an
-    interval beyond the bound.
+    Evidence is a trend up to this delay or a shorter one, with the error rate controlled over all statements, or an
+    interval outside the bound.
     """
-    exploratory = {trend.item for trend in DelayTrend.of(result) if not trend.primary}
+    exploratory = {trend.item for trend in DelayTrend.value_in(result) if not trend.primary}
     trends: dict[float, list[str]] = {}
-    for lowest in LowestDelay.of(result):
+    for lowest in LowestDelay.value_in(result):
         if (shown_ms := lowest.over_all_ms) is not None and shown_ms <= delay_ms:
             note = " (exploratory)" if lowest.item in exploratory else ""
             trends.setdefault(shown_ms, []).append(f"“{short_text(result, lowest.item)}”{note}")
     beyond: dict[str, list[str]] = {}
-    for tested in ContrastsWithControl.of(result):
+    for tested in ContrastsWithControl.value_in(result):
         if tested.verdict == "not equivalent" and tested.delay_ms <= delay_ms:
             beyond.setdefault(tested.item, []).append(ms(tested.delay_ms))
     differing = [f"“{short_text(result, item)}” (at {listed(delays)})" for item, delays in beyond.items()]
@@ -176,10 +178,10 @@ def _evidence_up_to(result: BlockResult, delay_ms: float) -> tuple[str, ...]:
 
 
 def common_ms(result: BlockResult) -> float | None:
-    """Return the longest delay up to which all statements are equivalent at all delays."""
-    delays = list(equivalent_up_to(ContrastsWithControl.of(result)).values())
-    known = [delay for delay in delays if delay is not None]
-    return min(known) if known and len(known) == len(delays) else None
+    """Return the longest delay up to which all statements are equivalent, or None."""
+    delays = list(equivalent_up_to(ContrastsWithControl.value_in(result)).values())
+    equivalent_delays = [delay for delay in delays if delay is not None]
+    return min(equivalent_delays) if equivalent_delays and len(equivalent_delays) == len(delays) else None
 
 
 class ContrastsWithControl(Finding[tuple[ContrastWithControl, ...]]):
@@ -216,21 +218,21 @@ class ContrastsWithControl(Finding[tuple[ContrastWithControl, ...]]):
 
     @classmethod
     def entries(cls, result: BlockResult) -> Mapping[str, Any]:
-        against = cls.of(result)
+        against = cls.value_in(result)
         up_to = equivalent_up_to(against) if cls.key in result.findings else None
         return {cls.key: against, "equivalent_up_to": up_to}
 
     def rows(self) -> Iterator[Row]:
         for against in self.value:
-            row = test_row(self.found, "a delay is equivalent", against.found)
+            row = test_row(self.result, "a delay is equivalent", against.found)
             yield (
                 row
-                | rows_alone(self.found, f"{against.item} at {against.delay_ms:g} ms")
+                | uncorrected_entries(self.result, f"{against.item} at {against.delay_ms:g} ms")
                 | {
                     "item": against.item,
                     "comparison": f"{against.delay_ms:g} ms − {against.control_ms:g} ms",
                     "verdict": against.verdict,
-                    "codes": codes_of(self.found, against.delay_ms, against.control_ms),
+                    "codes": codes_of(self.result, against.delay_ms, against.control_ms),
                 }
             )
 
@@ -242,7 +244,7 @@ class ContrastsWithControl(Finding[tuple[ContrastWithControl, ...]]):
         yield heading(3, f"Comparison of each delay with {control}")
         yield table_of(
             self.value,
-            ("Statement", lambda tested: short_text(self.found, tested.item)),
+            ("Statement", lambda tested: short_text(self.result, tested.item)),
             ("Comparison", lambda tested: f"{ms(tested.delay_ms)} − {control}"),
             ("n", lambda tested: str(tested.found.n)),
             ("mean difference", lambda tested: number(tested.found.effect)),
@@ -254,12 +256,12 @@ class ContrastsWithControl(Finding[tuple[ContrastWithControl, ...]]):
             words=2,
             last=1,
         )
-        yield paragraph(" ".join(_about_against(self.value)), "soft")
+        yield paragraph(" ".join(_comparison_notes(self.value)), "soft")
         head = ("Delay", *(f"{verdict} in" for verdict in _VERDICTS), "Conclusion")
-        yield table(head, by_delay(self.found), words=len(head), folded=True)
+        yield table(head, rows_by_delay(self.result), words=len(head), folded=True)
 
     def limits(self) -> Iterator[str]:
-        against, result = self.value, self.found
+        against, result = self.value, self.result
         if not against:
             return
         first, lead, control = against[0].found, lead_phrase(result), ms(against[0].control_ms)
@@ -270,10 +272,10 @@ class ContrastsWithControl(Finding[tuple[ContrastWithControl, ...]]):
                 f"{counted(result.n, 'participant')}"
                 f"{', so it can show only that a mean answer differs by more' if result.n > 1 else ''}."
             )
-        open_ones = sum(tested.verdict in ("inconclusive", "out of reach") for tested in against)
-        if open_ones:
+        undecided = sum(tested.verdict in ("inconclusive", "out of reach") for tested in against)
+        if undecided:
             yield (
-                f"{lead}: in {open_ones} of {number_text.counted(len(against), 'comparison')} with {control} (one "
+                f"{lead}: in {undecided} of {number_text.counted(len(against), 'comparison')} with {control} (one "
                 f"for each statement and delay), the data show neither that the mean answer stays within "
                 f"{bound_text(first.bound)} nor that it differs by more."
             )
@@ -294,11 +296,11 @@ class ContrastsWithControl(Finding[tuple[ContrastWithControl, ...]]):
 
 
 @dataclass(frozen=True, slots=True)
-class Lowest:
+class LowestTrend:
     """The shortest delay with a trend in one statement, found by stepping down.
 
-    The error rate of ``steps`` is controlled within the statement; that of ``over_all_ms``, the lowest delay whose
-    steps all have p ≤ alpha / ``members``, over all statements of the family.
+    ``steps`` control the error rate within the statement. ``over_all_ms``, the lowest delay whose steps all have
+    p ≤ alpha / ``members``, controls it over all statements of the family.
     """
 
     item: str
@@ -307,7 +309,7 @@ class Lowest:
 
     @property
     def over_all_ms(self) -> float | None:
-        """The lowest delay with the error rate controlled over all statements; None if there is none."""
+        """The lowest delay with a trend, with the error rate controlled over all statements; None without a trend."""
         lowest = None
         for step in self.steps.steps:
             if step.trend.p is None or step.trend.p > self.steps.alpha / self.members:
@@ -320,7 +322,7 @@ class Lowest:
         return next(step.trend for step in self.steps.steps if step.longest_ms == longest_ms)
 
 
-class LowestDelay(Finding[tuple[Lowest, ...]]):
+class LowestDelay(Finding[tuple[LowestTrend, ...]]):
     """The shortest delay with a trend, stepping down from the longest."""
 
     key = "lowest"
@@ -332,15 +334,15 @@ class LowestDelay(Finding[tuple[Lowest, ...]]):
     empty = ()
 
     @classmethod
-    def test(cls, answers: BlockAnswers, result: BlockResult) -> tuple[tuple[Lowest, ...], Absent]:
+    def test(cls, answers: BlockAnswers, result: BlockResult) -> tuple[tuple[LowestTrend, ...], Absent]:
         """Step down in the statements that show a trend over all delays."""
-        trends, lowest = DelayTrend.of(result), []
-        showing = [trend for trend in trends if trend.verdict in FOUND]
-        for test in showing:
+        trends, lowest = DelayTrend.value_in(result), []
+        significant = [trend for trend in trends if trend.verdict in FOUND]
+        for test in significant:
             direction, alpha = answers.decided.direction(test.item), answers.decided.alpha
             steps = step_down(answers.values[test.item], answers.block.delays_ms, direction, alpha=alpha)
-            lowest.append(Lowest(test.item, steps, test.members))
-        if trends and not showing:
+            lowest.append(LowestTrend(test.item, steps, test.members))
+        if trends and not significant:
             why = "no statement shows a trend across all delays, but participants may still notice the delays"
             return (), (NotTested(cls.what, why),)
         return tuple(lowest), ()
@@ -348,8 +350,8 @@ class LowestDelay(Finding[tuple[Lowest, ...]]):
     def rows(self) -> Iterator[Row]:
         for lowest in self.value:
             for step in lowest.steps.steps:
-                row = test_row(self.found, "answers change with the delay, step-down test", step.trend)
-                row |= rows_alone(self.found, f"stepping down within {lowest.item}") | {
+                row = test_row(self.result, "answers change with the delay, step-down test", step.trend)
+                row |= uncorrected_entries(self.result, f"stepping down within {lowest.item}") | {
                     "members": len(lowest.steps.steps)
                 }
                 row |= {
@@ -365,7 +367,7 @@ class LowestDelay(Finding[tuple[Lowest, ...]]):
         yield heading(3, "The shortest delay with a trend")
         yield table_of(
             self.value,
-            ("Statement", lambda lowest: short_text(self.found, lowest.item)),
+            ("Statement", lambda lowest: short_text(self.result, lowest.item)),
             ("shortest", lambda row: "–" if row.over_all_ms is None else f"≤ {ms(row.over_all_ms)}"),
             ("uncorrected", lambda row: "–" if row.steps.lowest_ms is None else f"≤ {ms(row.steps.lowest_ms)}"),
             (
@@ -405,7 +407,9 @@ class DetectionThreshold(Finding[Threshold | None]):
         if item is None or item not in answers.values:
             return None, (NotTested(cls.what, "the protocol does not specify a detection question (analysis.noticed)"),)
         rising = [
-            test.item for test in DelayTrend.of(result) if test.verdict in FOUND and (test.outcome.effect or 0.0) > 0
+            test.item
+            for test in DelayTrend.value_in(result)
+            if test.verdict in FOUND and (test.outcome.effect or 0.0) > 0
         ]
         if item not in rising:
             return None, (NotTested(cls.what, "the tests do not show that agreement increases with the delay"),)
@@ -414,10 +418,10 @@ class DetectionThreshold(Finding[Threshold | None]):
     def rows(self) -> Iterator[Row]:
         threshold = self.value
         if threshold is not None:
-            yield test_row(self.found, "a delay is noticed", threshold)
+            yield test_row(self.result, "a delay is noticed", threshold)
 
     def section(self) -> Iterator[str]:
-        """Yield the detection threshold, or why there is none."""
+        """Yield the detection threshold, or the reason why there is none."""
         threshold = self.value
         if threshold is None:
             return
@@ -430,29 +434,29 @@ class DetectionThreshold(Finding[Threshold | None]):
             yield paragraph(
                 f"No threshold could be estimated: {threshold.note}. Answers that express agreement (5 to 7): {counts}."
             )
-            yield from self.drawn()
+            yield from self.figure_html()
             return
         yield paragraph(
             f"Detection threshold: {number(threshold.effect, 0)} ms, {_threshold_interval(threshold)}, n = "
-            f"{threshold.n}. {_half_way(threshold)} Answers that express agreement (5 to 7): {counts}. "
+            f"{threshold.n}. {_threshold_definition(threshold)} Answers that express agreement (5 to 7): {counts}. "
             f"{threshold.note[:1].upper()}{threshold.note[1:]}. Fit: {threshold.method}. Agreement is not the same as "
             "answering “yes”: a participant who “somewhat agrees” may have noticed little difference."
         )
-        yield from self.drawn()
+        yield from self.figure_html()
 
     def figure(self, drawing: Drawing) -> Picture | None:
         threshold = self.value
         if threshold is None or not any(threshold.asked) or drawing.study.split == EACH_GROUP:
             return None  # each group has its own figure
         lowest = min(
-            (lowest.over_all_ms for lowest in LowestDelay.of(drawing.found) if lowest.over_all_ms is not None),
+            (lowest.over_all_ms for lowest in LowestDelay.value_in(drawing.result) if lowest.over_all_ms is not None),
             default=None,
         )
         curve = f"There is no curve, because {threshold.note}."
         if threshold.effect is not None:
             curve = (
                 f"Curve: {threshold.method}; diamond: the detection threshold, {number(threshold.effect, 0)} ms "
-                f"({_threshold_interval(threshold)}). {_half_way(threshold)}"
+                f"({_threshold_interval(threshold)}). {_threshold_definition(threshold)}"
             )
         dashed = (
             ""
@@ -474,10 +478,10 @@ class DetectionThreshold(Finding[Threshold | None]):
         """Return, for each participant, the share of answers that agree, by delay."""
         answers = drawing.study.answers(drawing.block)
         rows = answers[(answers["item"] == self.results.decided.noticed) & answers["response"].notna()]
-        delays_ms = {setting.code: setting.delay_ms or 0.0 for setting in drawing.found.settings}
+        delays_ms = {setting.code: setting.delay_ms or 0.0 for setting in drawing.result.settings}
         rows = rows.assign(delay=rows["code"].map(delays_ms).astype(float), agrees=rows["response"].isin(AGREEMENT))
         people = rows.groupby("participant", sort=True)
-        return {str(who): dict(own.groupby("delay")["agrees"].mean()) for who, own in people}
+        return {str(person): dict(person_rows.groupby("delay")["agrees"].mean()) for person, person_rows in people}
 
     def methods(self) -> Iterator[str]:
         if self.value is not None:
@@ -496,7 +500,7 @@ def _threshold_interval(threshold: Threshold) -> str:
     return f"95 % interval {interval(threshold.interval, 0)} ms"
 
 
-def _half_way(threshold: Threshold) -> str:
+def _threshold_definition(threshold: Threshold) -> str:
     """Return a sentence that defines a detection threshold and gives the share of agreement there."""
     return (
         "The threshold is the delay at which the fitted function lies halfway between the guess rate "
@@ -505,7 +509,7 @@ def _half_way(threshold: Threshold) -> str:
     )
 
 
-class _NoticedFrom(Finding[None]):
+class _FirstNoticedDelay(Finding[None]):
     """The first page's answer: the delay from which participants notice a difference."""
 
     key = "noticed from"
@@ -516,10 +520,10 @@ class _NoticedFrom(Finding[None]):
 
     def answer(self) -> Answer:
         """Return the shortest delay with a change, from primary statements or else from exploratory ones."""
-        decided, threshold = self.results.decided, DetectionThreshold.of(self.found)
+        decided, threshold = self.results.decided, DetectionThreshold.value_in(self.result)
         fitted = decided.noticed if threshold is not None and threshold.effect is not None else None
         for primary, verdict in ((True, "shown"), (False, "suggested")):
-            text = self._shortest([item.id for item in self.found.items if decided.is_primary(item.id) == primary])
+            text = self._shortest([item.id for item in self.result.items if decided.is_primary(item.id) == primary])
             is_fitted = fitted is not None and decided.is_primary(fitted) == primary
             if not text and is_fitted:
                 text = (
@@ -527,53 +531,55 @@ class _NoticedFrom(Finding[None]):
                     "particular delay."
                 )
             if text:
-                return self.answered(verdict, f"{self._threshold_words() if is_fitted else ''}{text}", claims=True)
-        return self.answered("not shown", f"We could not show that participants noticed any delay. {NO_EVIDENCE}")
+                return self.make_answer(verdict, f"{self._threshold_words() if is_fitted else ''}{text}", claims=True)
+        return self.make_answer("not shown", f"We could not show that participants noticed any delay. {NO_EVIDENCE}")
 
     def _shortest(self, items: Sequence[str]) -> str:
         """Return a sentence on the shortest delay that changes one of these statements, or ""."""
         lowest = [
-            lowest for lowest in LowestDelay.of(self.found) if lowest.over_all_ms is not None and lowest.item in items
+            lowest
+            for lowest in LowestDelay.value_in(self.result)
+            if lowest.over_all_ms is not None and lowest.item in items
         ]
         if not lowest:
             return ""
-        at = min(one.over_all_ms or 0.0 for one in lowest)
+        at = min(row.over_all_ms or 0.0 for row in lowest)
         rated = [
-            f"{'higher' if correlation > 0 else 'lower'} on “{short_text(self.found, one.item)}” "
+            f"{'higher' if correlation > 0 else 'lower'} on “{short_text(self.result, row.item)}” "
             f"(mean rank correlation {number(correlation)}, {p_equals(trend.p)}, n = {trend.n})"
-            for one in lowest
-            if one.over_all_ms == at
-            and (trend := one.trend_up_to(at)).p is not None
-            and (correlation := self._correlation(one, trend))
+            for row in lowest
+            if row.over_all_ms == at
+            and (trend := row.trend_up_to(at)).p is not None
+            and (correlation := self._correlation(row, trend))
         ]
         members, alpha = lowest[0].members, lowest[0].steps.alpha
         criterion = f"{significant(alpha / members)} ({significant(alpha)} / {members})"
         corrected = f" With {counted(members, 'statement')} tested, p ≤ {criterion} is significant."
         return (
-            f"Over delays of {self.found.delays_ms[0]:g} to {ms(at)}, participants tended to rate longer delays "
+            f"Over delays of {self.result.delays_ms[0]:g} to {ms(at)}, participants tended to rate longer delays "
             f"{listed(rated)}.{corrected * (members > 1)} Participants may also notice shorter delays. The test "
             "compares ranks, not mean ratings."
         )
 
     def _threshold_words(self) -> str:
         """Return a sentence on the detection threshold, with a leading space."""
-        threshold = DetectionThreshold.of(self.found)
+        threshold = DetectionThreshold.value_in(self.result)
         if threshold is None or threshold.effect is None:
             return ""
-        item = short_text(self.found, self.results.decided.noticed or "")
+        item = short_text(self.result, self.results.decided.noticed or "")
         return (
             f"The detection threshold is {number(threshold.effect, 0)} ms ({_threshold_interval(threshold)}, n = "
             f"{threshold.n}); at this delay, {percent(threshold.half_way or 0.0)} of answers express agreement with "
             f"“{item}”. "
         )
 
-    def _correlation(self, lowest: Lowest, trend: Trend) -> float:
+    def _correlation(self, lowest: LowestTrend, trend: Trend) -> float:
         """Return the mean rank correlation of a trend, negative if answers fall with the delay."""
         falling = self.results.decided.direction(lowest.item) == "decreasing"
         return (trend.effect or 0.0) * (-1 if falling else 1)
 
 
-class _UnchangedUpTo(Finding[None]):
+class _EquivalentDelays(Finding[None]):
     """The first page's answer: the delay up to which answers do not change by a relevant amount."""
 
     key = "unchanged up to"
@@ -583,26 +589,26 @@ class _UnchangedUpTo(Finding[None]):
     answer_figures = ("effects",)
 
     def answer(self) -> Answer:
-        """Return the longest delay up to which mean answers are equivalent to those at the shortest."""
-        against = ContrastsWithControl.of(self.found)
+        """Return the longest delay up to which mean answers are equivalent to those at the shortest delay."""
+        against = ContrastsWithControl.value_in(self.result)
         if not against:
             why = next(
-                (not_tested.why for not_tested in self.found.absent if "equivalence" in not_tested.what),
+                (not_tested.why for not_tested in self.result.absent if "equivalence" in not_tested.what),
                 "there was no comparison",
             )
-            return self.answered("not tested", f"This was not tested, because {why}.")
-        at, within = common_ms(self.found), _within(against[0])
+            return self.make_answer("not tested", f"This was not tested, because {why}.")
+        at, within = common_ms(self.result), _bounds_phrase(against[0])
         if at is None:
             fewest = fewest_participants(against[0].found.alpha, against[0].found.bound)
-            needed = f" (at least {fewest} participants are needed)" if self.found.n < fewest else ""
-            return self.answered(
+            needed = f" (at least {fewest} participants are needed)" if self.result.n < fewest else ""
+            return self.make_answer(
                 "inconclusive",
-                f"{_NO_DELAY.format(within + needed)} {_largest_words(self.found, against)}{_beyond_words(against)}",
+                f"{_NO_DELAY.format(within + needed)} {_largest_words(self.result, against)}{_beyond_words(against)}",
             )
         statements = all_of(len(equivalent_up_to(against)), "statement")
-        share = _not_excluded([tested.found for tested in against if tested.delay_ms <= at])
+        share = _minority_phrase([tested.found for tested in against if tested.delay_ms <= at])
         text = f"Up to {ms(at)}, mean answers to {statements} stay {within}, but {share}."
-        return self.answered("equivalent", text)
+        return self.make_answer("equivalent", text)
 
 
 _NO_DELAY: Final = "We could not show for any delay that the mean answers to all statements stay {}."
@@ -610,19 +616,21 @@ _NO_DELAY: Final = "We could not show for any delay that the mean answers to all
 
 def _largest_words(result: BlockResult, against: Sequence[ContrastWithControl]) -> str:
     """Return a sentence on the largest mean difference with its interval, with a leading space, or ""."""
-    known = [tested for tested in against if tested.found.effect is not None and tested.found.interval is not None]
-    if not known:
+    comparisons = [
+        tested for tested in against if tested.found.effect is not None and tested.found.interval is not None
+    ]
+    if not comparisons:
         return ""
-    most = max(known, key=lambda one: abs(one.found.effect or 0.0))
+    largest = max(comparisons, key=lambda tested: abs(tested.found.effect or 0.0))
     return (
-        f"The largest mean difference is {number(most.found.effect)} points (“{short_text(result, most.item)}” at "
-        f"{ms(most.delay_ms)}, {percent(1 - 2 * most.found.alpha)} confidence interval "
-        f"{interval(most.found.interval)}, n = {most.found.n}). "
+        f"The largest mean difference is {number(largest.found.effect)} points (“{short_text(result, largest.item)}” "
+        f"at {ms(largest.delay_ms)}, {percent(1 - 2 * largest.found.alpha)} confidence interval "
+        f"{interval(largest.found.interval)}, n = {largest.found.n}). "
     )
 
 
 def _beyond_words(against: Sequence[ContrastWithControl]) -> str:
-    """Return a sentence on the comparisons that are not equivalent and their delays, or on their absence."""
+    """Return a sentence on the comparisons that are not equivalent, with their delays, or that there are none."""
     beyond = [tested.delay_ms for tested in against if tested.verdict == "not equivalent"]
     if not beyond:
         return "Failing to show equivalence is not evidence that answers change."
@@ -633,15 +641,15 @@ def _beyond_words(against: Sequence[ContrastWithControl]) -> str:
     )
 
 
-def _not_excluded(tested: Sequence[Equivalence]) -> str:
-    """Return a phrase for the share of participants that may differ by more than the bound."""
+def _minority_phrase(tested: Sequence[Equivalence]) -> str:
+    """Return a phrase on the share of people who may differ by more than the bound."""
     most = max(
         (equivalence.beyond.interval.high for equivalence in tested if equivalence.beyond is not None), default=1.0
     )
     return f"the data do not rule out the possibility that up to {100 * most:.0f} % of people show a larger difference"
 
 
-def _within(against: ContrastWithControl) -> str:
+def _bounds_phrase(against: ContrastWithControl) -> str:
     return f"within {bound_text(against.found.bound)} of those at {ms(against.control_ms)}"
 
 
@@ -651,8 +659,8 @@ _MEASURES: Final = ("Movement time, s", "Path, mm", "Overshoot, mm", "Submovemen
 
 def _limits_sentence(block: Block, results: Results) -> str:
     """Return a sentence on the number of trials within the limits."""
-    here = [delivered for delivered in results.delivered if delivered.block == block.id]
-    judged, valid = sum(delivered.judged for delivered in here), sum(one.valid for one in here)
+    deliveries = [delivered for delivered in results.delivered if delivered.block == block.id]
+    judged, valid = sum(delivered.judged for delivered in deliveries), sum(delivered.valid for delivered in deliveries)
     if not judged:
         return "No data are available on whether trials met the protocol's limits."
     return f"{valid} of {judged} trials met the protocol's limits; all trials are included."
@@ -667,30 +675,30 @@ class Movement(Finding[None]):
     figure_title = "Reaching as a function of added delay"
 
     def section(self) -> Iterable[str]:
-        return self.drawn()
+        return self.figure_html()
 
     def figure(self, drawing: Drawing) -> Picture | None:
         block, measured = drawing.block, drawing.results.performance
-        if not drawing.found.delays_ms or measured is None or not measured.recorded_in(block.id):
+        if not drawing.result.delays_ms or measured is None or not measured.recorded_in(block.id):
             return None
         medians = measured.medians(block.id).reset_index()
         medians = medians[medians["participant"].isin(drawing.study.people)]
 
-        def of(people: Sequence[str], measure: str) -> Any:
+        def values_of(people: Sequence[str], measure: str) -> Any:
             rows = medians[medians["participant"].isin(people)]
             return rows.pivot(index="participant", columns="code", values=measure)[list(block.codes)].to_numpy()
 
         measures = [*zip(_MEASURES, OF_REACHES, strict=True)]
         groups = groups_shown(drawing.study)
         plots = [
-            (with_group(title, group), of(part.people, measure))
+            (with_group(title, group), values_of(part.people, measure))
             for group, part in groups
             for title, measure in measures
         ]
-        scales = [of(drawing.study.people, measure) for _, measure in measures] * len(groups)
+        scales = [values_of(drawing.study.people, measure) for _, measure in measures] * len(groups)
         people = medians["participant"].nunique()
         n = counted(people, "participant")
-        foot = (
+        footnote = (
             "Added delay in ms. Each point is a participant's median across the reaches in a trial, excluding the "
             "first reach."
         )
@@ -701,6 +709,6 @@ class Movement(Finding[None]):
             f"last time. The axes do not start at zero. {_limits_sentence(block, drawing.results)}"
         )
         delays_ms = [setting.delay_ms or 0.0 for setting in block.settings]
-        draw = partial(answer_figures.draw_answers, plots, delays_ms, [None] * len(plots), foot, own_scales=scales)
+        draw = partial(answer_figures.draw_answers, plots, delays_ms, [None] * len(plots), footnote, own_scales=scales)
         numbers = tab_separated(drawing.study, medians)
         return drawing.picture(self.figure_title, caption, draw, (f"{n} with recordings", n), numbers)

@@ -1,7 +1,4 @@
-"""What tests of a block's answers share: the answers, families and verdicts, rows of tests.csv, and the base class.
-
-Which tests apply, in which families, and what may be said of them; the p that decide stand in the sections that follow.
-"""
+"""The base class of findings, and what all tests of a block's answers share: families, verdicts, rows of tests.csv."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -25,10 +22,10 @@ _T = TypeVar("_T")
 _U = TypeVar("_U")
 
 MANY: Final = DRAWN_UP_TO
-"""Above so many participants p of single statements is approximated."""
+"""The most participants with an exact or permutation p of single statements; for more, p is approximated."""
 
 _FEWER_DRAWS: Final = 1999
-"""So many rearrangements are drawn for the test over all statements above ``MANY``, which has no approximation."""
+"""Permutations in the test over all statements above ``MANY`` participants; it has no approximation."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,10 +34,10 @@ class BlockAnswers:
 
     ``values`` (participants, settings) are the medians of ``single`` answers (participants, settings, presentations);
     ``sessions`` of the same shape are the sessions of these answers. ``sites`` are those of the participants of a
-    merged study. ``verdicts_only`` omits results that decide no verdict, for thousands of simulated studies.
+    merged study. ``verdicts_only`` omits results that do not affect verdicts, for thousands of simulated studies.
     ``over_all`` is the global test over all statements, or its failure, ``gate`` its p value with Holm's correction
-    over the blocks of the study: no adjusted p of a statement is below it, so that in a study without any difference
-    the probability of any finding is at most alpha.
+    over the blocks of the study. No adjusted p of a statement is below it, so that the probability of any finding is at
+    most alpha in a study without any difference.
     """
 
     block: Block
@@ -74,15 +71,15 @@ class BlockAnswers:
     def draws(self) -> int:
         """The number of random permutations for one statement if full enumeration is too expensive.
 
-        It is large enough that it never decides whether significance can be reached.
+        It is large enough that it never prevents a significant result.
         """
         return draws_for(self.decided.alpha, DRAWS, len(self.block.items))
 
     def verdict(self, p: float | None, least: float | None, *, primary: bool) -> Verdict:
-        """Return the verdict on a test of one statement, see `verdict`; the gate can only make it weaker."""
+        """Return the verdict on a test of one statement (see `verdict`), which the gate can only weaken."""
         smallest = self.over_all.smallest_p if isinstance(self.over_all, Outcome) else None
-        bounds = None if least is None else max(least, smallest or 0.0)
-        return verdict(None if p is None else max(p, self.gate), bounds, self.decided.alpha, primary=primary)
+        lower_bound = None if least is None else max(least, smallest or 0.0)
+        return verdict(None if p is None else max(p, self.gate), lower_bound, self.decided.alpha, primary=primary)
 
     @property
     def draws_over_all(self) -> int:
@@ -91,20 +88,20 @@ class BlockAnswers:
 
 
 def block_answers(study: Study, block: Block, seed: int, failures: Failures) -> BlockAnswers:
-    """Collect a block's answers."""
+    """Return the valid answers of a block as arrays."""
     answers = study.answers(block)
     people = tuple(sorted(map(str, answers["participant"].unique())))
     by_item = dict(iter(answers.groupby("item", sort=False)))
     empty = answers.iloc[:0]
-    given = {
+    tables = {
         item.id: presentations(by_item.get(item.id, empty), people, block.columns, item.id) for item in block.items
     }
-    single = {item: answers_ for item, (answers_, _) in given.items()}
-    sessions = {item: numbers for item, (_, numbers) in given.items()}
-    return of_tables(block, study.decided, people, single, sessions, seed=seed, failures=failures)
+    single = {item: answers_ for item, (answers_, _) in tables.items()}
+    sessions = {item: numbers for item, (_, numbers) in tables.items()}
+    return answers_from_tables(block, study.decided, people, single, sessions, seed=seed, failures=failures)
 
 
-def of_tables(
+def answers_from_tables(
     block: Block,
     decided: Decided,
     people: tuple[str, ...],
@@ -176,8 +173,8 @@ def empty_result(block: Block, *absent: NotTested) -> BlockResult:
 def _presentation_range(single: Iterable[Array]) -> tuple[int, int]:
     """Return the least and greatest number of answers by a participant to one statement in one condition."""
     counts = np.concatenate([(~np.isnan(values)).sum(axis=2).ravel() for values in single] or [np.zeros(0)])
-    given = counts[counts > 0]
-    return (int(given.min()), int(given.max())) if len(given) else (0, 0)
+    positive = counts[counts > 0]
+    return (int(positive.min()), int(positive.max())) if len(positive) else (0, 0)
 
 
 Correct: TypeAlias = Callable[[Sequence[float | None]], tuple[float | None, ...]]
@@ -210,13 +207,13 @@ def in_family(
     *,
     primary: bool | Sequence[bool],
 ) -> tuple[Tested, ...]:
-    """Return tests that are corrected together; ``primary`` is one value for all, or one for each."""
-    of_primary = [primary] * len(outcomes) if isinstance(primary, bool) else primary
+    """Return tests that are corrected together; ``primary`` is one flag for all tests, or one for each."""
+    primary_flags = [primary] * len(outcomes) if isinstance(primary, bool) else primary
     ps = [outcome.p for outcome in outcomes.values()]
     members = []
     for place, ((item, outcome), p) in enumerate(zip(outcomes.items(), correct(ps), strict=True)):
         least = correct([*ps[:place], outcome.smallest_p, *ps[place + 1 :]])[place]
-        said = answers.verdict(p, least, primary=of_primary[place])
+        test_verdict = answers.verdict(p, least, primary=primary_flags[place])
         adjusted = None if p is None else max(p, answers.gate)
         members.append(
             Tested(
@@ -226,8 +223,8 @@ def in_family(
                 members=len(ps),
                 correction=correction,
                 p_adjusted=adjusted,
-                primary=of_primary[place],
-                verdict=said,
+                primary=primary_flags[place],
+                verdict=test_verdict,
             )
         )
     return tuple(members)
@@ -236,8 +233,8 @@ def in_family(
 def verdict(p: float | None, least: float | None, alpha: float, *, primary: bool) -> Verdict:
     """Return the verdict on a test.
 
-    ``p`` is adjusted; ``least`` is the smallest adjusted p that these participants could have produced (None: no
-    bound), given the other tests of the family.
+    ``p`` is adjusted. ``least`` is the smallest adjusted p that these participants could have produced, given the other
+    tests of the family; None if there is no lower bound.
     """
     if p is None:
         return "not tested"
@@ -314,7 +311,7 @@ def codes_of(result: BlockResult, *delays_ms: float) -> str:
     )
 
 
-def judged_row(result: BlockResult, question: str, test: Tested) -> dict[str, Any]:
+def verdict_row(result: BlockResult, question: str, test: Tested) -> dict[str, Any]:
     """Return the row of a test of one statement, with its family and verdict."""
     return test_row(result, question, test.outcome) | {
         "item": test.item,
@@ -327,8 +324,8 @@ def judged_row(result: BlockResult, question: str, test: Tested) -> dict[str, An
     }
 
 
-def rows_alone(result: BlockResult, what: str) -> dict[str, Any]:
-    """Return the family entries of a test that is not corrected with others."""
+def uncorrected_entries(result: BlockResult, what: str) -> dict[str, Any]:
+    """Return the entries about the family in the row of a test that is not corrected with others."""
     return {"family": f"{result.id}: {what}", "members": 1, "correction": ALONE}
 
 
@@ -358,10 +355,10 @@ Row: TypeAlias = dict[str, Any]
 
 
 class Finding(Generic[_R]):
-    """A finding of the analysis; an instance says what outputs state of it in one block.
+    """A finding of the analysis; an instance provides its parts of all outputs for one block.
 
-    A subclass with a ``key`` in a module of this folder is in every output. It overrides what it has to say; the others
-    say nothing. ``_R`` is the type of its value.
+    All outputs include every subclass with a ``key`` in the modules of this folder. A subclass overrides the methods of
+    the outputs that it adds to; by default, these return nothing. ``_R`` is the type of its value.
 
     Attributes
     ----------
@@ -375,9 +372,9 @@ class Finding(Generic[_R]):
         Its name if it fails or is missing; empty if nothing is tested, so that there is no value.
     kinds, sealed, waits : tuple of str
         The kinds of blocks in which it is tested once the key is open, in which it is tested while the key is sealed,
-        and in which it is named as waiting for the key.
+        and in which it is listed as missing until the key is open.
     statements : bool
-        Whether the value is tests of single statements whose verdicts belong to the limits of the study.
+        Whether the value consists of tests of single statements whose verdicts the study's limitations mention.
     empty : _R
         The value if nothing was tested.
     figure_name, figure_title : str
@@ -409,14 +406,14 @@ class Finding(Generic[_R]):
                 raise StudyError(f"{cls.__name__} has the {name} {value!r}: specify a number")
 
     def __init__(self, result: BlockResult, results: Results, pictures: Mapping[str, Picture] | None = None) -> None:
-        self.found = result
+        self.result = result
         self.results = results
-        self.value = self.of(result)
+        self.value = self.value_in(result)
         self._pictures = pictures or {}
 
     @classmethod
-    def of(cls, result: BlockResult) -> _R:
-        """Return its value in a block's result."""
+    def value_in(cls, result: BlockResult) -> _R:
+        """Return the finding's value in a block's result."""
         return cast("_R", result.findings.get(cls.key, cls.empty))
 
     @classmethod
@@ -426,13 +423,13 @@ class Finding(Generic[_R]):
 
     @classmethod
     def test(cls, answers: BlockAnswers, result: BlockResult) -> tuple[_R, Absent]:
-        """Return the value computed from a block's answers and the findings with lower places, and untested parts."""
+        """Compute the value from a block's answers and the findings with lower places; return it and untested parts."""
         raise NotImplementedError
 
     @classmethod
     def entries(cls, result: BlockResult) -> Mapping[str, Any]:
         """Return the entries of report.json."""
-        return {cls.key: cls.of(result)}
+        return {cls.key: cls.value_in(result)}
 
     @classmethod
     def common_methods(cls, blocks: Sequence[BlockResult]) -> Iterable[str]:
@@ -444,7 +441,7 @@ class Finding(Generic[_R]):
         return ()
 
     def section(self) -> Iterable[str]:
-        """Return its HTML parts of the block's section in the report, made with `analysis.html_page`."""
+        """Return its part of the block's section in the report as HTML, made with `analysis.html_page`."""
         return ()
 
     def limits(self) -> Iterable[str]:
@@ -459,16 +456,16 @@ class Finding(Generic[_R]):
         """Draw its figure; None if it has none."""
         raise NotImplementedError
 
-    def drawn(self) -> Iterable[str]:
-        """Return the HTML of its figure, if it was drawn."""
+    def figure_html(self) -> Iterable[str]:
+        """Return the HTML of its figure; nothing if it was not drawn."""
         return drawn_figure(self._pictures, self.figure_name)
 
     def answer(self) -> Answer:
-        """Return the answer to its question on the first page once the key is open, also for a negative result."""
+        """Return the answer to its question on the first page, once the key is open; also if nothing was shown."""
         raise NotImplementedError
 
-    def answered(self, verdict: str, text: str, *, claims: bool = False) -> Answer:
+    def make_answer(self, verdict: str, text: str, *, claims: bool = False) -> Answer:
         """Return an answer to its question for this block."""
         return Answer(
-            question=self.key, block=self.found.id, title=self.found.title, verdict=verdict, text=text, claims=claims
+            question=self.key, block=self.result.id, title=self.result.title, verdict=verdict, text=text, claims=claims
         )

@@ -1,4 +1,4 @@
-"""Recognition of liquids by the statement rated highest, and the first page's answer to which were distinguished."""
+"""Recognition of liquids by the statement with the highest rating, and the first page's answer about it."""
 
 from collections.abc import Container, Iterator
 from dataclasses import dataclass
@@ -19,8 +19,8 @@ from study_app.analysis.findings.finding import (
     BlockAnswers,
     Finding,
     Row,
-    rows_alone,
     test_row,
+    uncorrected_entries,
 )
 from study_app.analysis.findings.statement_tests import Effects, Pairs, SettingsDiffer
 from study_app.analysis.html_page import ends_of, heading, paragraph, table_of
@@ -37,7 +37,7 @@ _NO_SINGLE_LIQUID: Final = "We could not show for any single liquid that it was 
 
 @dataclass(frozen=True, slots=True)
 class RecognitionResult:
-    """The recognition of liquids: the items that name one, and the correct item for each setting (code)."""
+    """The result of the recognition test: the items that name a liquid, and the correct item of each setting (code)."""
 
     labels: tuple[str, ...]
     settings: tuple[str, ...]
@@ -62,54 +62,56 @@ class LiquidRecognition(Finding[RecognitionResult | None]):
     def test(cls, answers: BlockAnswers, result: BlockResult) -> tuple[RecognitionResult | None, Absent]:
         """Test whether settings were named correctly more often than by chance."""
         labels = answers.decided.names
-        right = tuple(setting.label for setting in answers.block.settings)
-        if not labels or not set(labels) <= answers.values.keys() or not any(right):
+        correct_labels = tuple(setting.label for setting in answers.block.settings)
+        if not labels or not set(labels) <= answers.values.keys() or not any(correct_labels):
             return None, (NotTested(cls.what, "the protocol does not specify which statements name these liquids"),)
         if not 2 <= answers.k <= MOST_NAMED or len(labels) < 2:
             return None, (NotTested(cls.what, f"the test needs 2 to {MOST_NAMED} conditions and at least two names"),)
         ratings = np.stack([answers.values[label] for label in labels], axis=2)
-        truth = [None if label is None else labels.index(label) for label in right]
-        tested = recognition(named_labels(ratings), truth, len(labels), seed=answers.intervals)
-        said = answers.verdict(tested.p, tested.smallest_p, primary=answers.decided.binding)
-        return RecognitionResult(labels, answers.block.codes, right, tested, said), ()
+        correct_indices = [None if label is None else labels.index(label) for label in correct_labels]
+        tested = recognition(named_labels(ratings), correct_indices, len(labels), seed=answers.intervals)
+        verdict = answers.verdict(tested.p, tested.smallest_p, primary=answers.decided.binding)
+        return RecognitionResult(labels, answers.block.codes, correct_labels, tested, verdict), ()
 
     def rows(self) -> Iterator[Row]:
-        named = self.value
-        if named is not None:
-            row = test_row(self.found, "liquids are recognised", named.found) | rows_alone(self.found, "recognition")
-            yield row | {"verdict": named.verdict}
+        recognition_result = self.value
+        if recognition_result is not None:
+            row = test_row(self.result, "liquids are recognised", recognition_result.found) | uncorrected_entries(
+                self.result, "recognition"
+            )
+            yield row | {"verdict": recognition_result.verdict}
 
     def section(self) -> Iterator[str]:
-        named = self.value
-        if named is None:
+        recognition_result = self.value
+        if recognition_result is None:
             return
         yield heading(3, "Were the liquids recognised?")
-        yield from self.drawn()
+        yield from self.figure_html()
         yield table_of(
-            sorted(named.found.rates, key=lambda rate: rate.setting),
-            ("Liquid", lambda rate: self.found.names[rate.setting]),
+            sorted(recognition_result.found.rates, key=lambda rate: rate.setting),
+            ("Liquid", lambda rate: self.result.names[rate.setting]),
             ("correct", lambda rate: str(rate.hits)),
             ("n", lambda rate: str(rate.n)),
-            ("undecided", lambda rate: str(named.found.table[rate.setting][_UNDECIDED_COLUMN])),
+            ("undecided", lambda rate: str(recognition_result.found.table[rate.setting][_UNDECIDED_COLUMN])),
             ("proportion", lambda rate: number(rate.rate)),
             *ends_of(lambda rate: rate.interval),
-            ("closest other liquid", lambda rate: "–" if rate.rival is None else self.found.names[rate.rival]),
+            ("closest other liquid", lambda rate: "–" if rate.rival is None else self.result.names[rate.rival]),
             ("p", lambda rate: p_value(rate.p)),
             ("adjusted p", lambda rate: p_value(rate.p_adjusted)),
         )
-        outcome = named.found
+        outcome = recognition_result.found
         if outcome.p is None:
             yield paragraph(f"Not tested: {outcome.note}.")
             return
         yield paragraph(
             f"Correct names: {number(outcome.statistic, 0)}; {number(outcome.expected, 1)} expected by chance; "
             f"{p_equals(outcome.p)} ({outcome.method}; smallest attainable {p_equals(outcome.smallest_p or 0.0)}): "
-            f"{named.verdict}. {_kappa_words(outcome)} {_undecided_words(outcome)}This is a single test, so its p "
-            "value is not corrected."
+            f"{recognition_result.verdict}. {_kappa_words(outcome)} {_undecided_words(outcome)}This is a single test, "
+            "so its p value is not corrected."
         )
-        how = "" if outcome.interval is None else f" Confidence interval for kappa: {outcome.interval.method}."
+        kappa_note = "" if outcome.interval is None else f" Confidence interval for kappa: {outcome.interval.method}."
         yield paragraph(
-            f"Confidence intervals for proportions are Clopper–Pearson intervals.{how} For each liquid, a "
+            f"Confidence intervals for proportions are Clopper–Pearson intervals.{kappa_note} For each liquid, a "
             "within-participant test (McNemar's exact test, one-sided) shows whether its name was used more often for "
             "it than for each of the others. The table shows the largest of these p values and the liquid for which "
             "it was obtained (the closest other liquid). Adjusted p values are Holm-corrected across the liquids.",
@@ -117,29 +119,31 @@ class LiquidRecognition(Finding[RecognitionResult | None]):
         )
 
     def figure(self, drawing: Drawing) -> Picture | None:
-        study, block, named = drawing.study, drawing.block, self.value
-        if named is None or study.split == EACH_GROUP:  # each group has its own figure
+        study, block, recognition_result = drawing.study, drawing.block, self.value
+        if recognition_result is None or study.split == EACH_GROUP:  # each group has its own figure
             return None
-        shorts = {item.id: item.short for item in self.found.items}
-        right = [None if label is None else named.labels.index(label) for label in named.right]
-        hits, expected = named.found.statistic, named.found.expected
+        shorts = {item.id: item.short for item in self.result.items}
+        right = [
+            None if label is None else recognition_result.labels.index(label) for label in recognition_result.right
+        ]
+        hits, expected = recognition_result.found.statistic, recognition_result.found.expected
         chance = ""
-        if hits is not None and expected is not None and named.found.p is not None:
+        if hits is not None and expected is not None and recognition_result.found.p is not None:
             chance = (
                 f" Correct: {hits:g}; {number(expected, 1)} expected by chance (liquids permuted within each "
-                f"participant; exact, one-sided, {p_equals(named.found.p)})."
+                f"participant; exact, one-sided, {p_equals(recognition_result.found.p)})."
             )
         caption = (
             "The name that was rated highest for each liquid "
             f"({drawing.simulated}{answer_figures.counts(study, block)[0]}). Cells show counts and row percentages; "
             f"correct names are outlined. Undecided: two or more names were tied for the highest rating.{chance}"
         )
-        labels = [shorts[label] for label in named.labels]
-        table = pd.DataFrame(named.found.table, self.found.names, [*labels, "undecided", "unanswered"])
+        labels = [shorts[label] for label in recognition_result.labels]
+        table = pd.DataFrame(recognition_result.found.table, self.result.names, [*labels, "undecided", "unanswered"])
         return drawing.picture(
             self.figure_title,
             caption,
-            partial(answer_figures.draw_recognition, named.found.table, self.found.names, labels, right),
+            partial(answer_figures.draw_recognition, recognition_result.found.table, self.result.names, labels, right),
             answer_figures.counts(study, block),
             tab_separated(study, table.rename_axis("liquid").reset_index()),
         )
@@ -156,11 +160,11 @@ class LiquidRecognition(Finding[RecognitionResult | None]):
 
 
 _UNDECIDED_COLUMN: Final = -2
-"""Of the table of names, see `Recognition`."""
+"""The index of the column of undecided answers in `Recognition.table`."""
 
 
 def _kappa_words(outcome: Recognition) -> str:
-    """Return a sentence with kappa, its interval and the number of answers."""
+    """Return a sentence on kappa, with its interval and the number of answers."""
     if outcome.effect is None:
         return f"Cohen's kappa could not be calculated ({outcome.no_interval.removeprefix('no interval: ')})."
     ends = outcome.no_interval if outcome.interval is None else f"95 % confidence interval {interval(outcome.interval)}"
@@ -174,15 +178,15 @@ def _undecided_words(outcome: Recognition) -> str:
     """Return a sentence on the treatment of undecided answers, with a leading space, or ""."""
     if not outcome.undecided:
         return ""
-    one = outcome.undecided == 1
+    is_single = outcome.undecided == 1
     return (
-        f"{number_text.counted(outcome.undecided, 'undecided answer')} {'counts' if one else 'count'} as incorrect "
-        f"and {'is' if one else 'are'} not included in kappa. "
+        f"{number_text.counted(outcome.undecided, 'undecided answer')} {'counts' if is_single else 'count'} as "
+        f"incorrect and {'is' if is_single else 'are'} not included in kappa. "
     )
 
 
 def _hits_words(named: RecognitionResult) -> str:
-    """Return how many liquids were named correctly, and how many are expected by chance; the test was possible."""
+    """Return a sentence on the number of correct names and the number expected by chance, if there is a p value."""
     tested = named.found
     hits = f"named {number(tested.statistic, 0)} of {sum(rate.n for rate in tested.rates)} liquids correctly"
     chance = f"given how often each name was used; {p_equals(tested.p or 0.0)}"
@@ -196,8 +200,8 @@ def _hits_words(named: RecognitionResult) -> str:
 def recognised(named: RecognitionResult, alpha: float) -> tuple[int, ...]:
     """Return the indices of the settings that were recognised.
 
-    Only if names are correct more often than by chance overall; then those settings whose name is used more often for
-    them than for each other setting.
+    There are none unless names are correct more often than by chance overall. A setting is recognised if its name is
+    used more often for it than for each other setting.
     """
     if named.verdict not in FOUND:
         return ()
@@ -218,24 +222,27 @@ class _Distinguished(Finding[None]):
 
         Exploratory tests are used only if no primary one is significant.
         """
-        result, named = self.found, LiquidRecognition.of(self.found)
-        known = () if named is None else recognised(named, self.results.decided.alpha)
-        differing = [test for test in SettingsDiffer.of(result) if test.verdict in FOUND]
-        pairs = [((pair.first, pair.second), pair.tested) for pair in Pairs.of(result) if pair.tested.verdict in FOUND]
+        result, named = self.result, LiquidRecognition.value_in(self.result)
+        recognised_settings = () if named is None else recognised(named, self.results.decided.alpha)
+        differing = [test for test in SettingsDiffer.value_in(result) if test.verdict in FOUND]
+        pairs = [
+            ((pair.first, pair.second), pair.tested) for pair in Pairs.value_in(result) if pair.tested.verdict in FOUND
+        ]
         if len(result.settings) == 2:
             pairs = [((result.settings[0].code, result.settings[1].code), test) for test in differing]
         verdicts = {test.verdict for test in (*differing, *(tested for _, tested in pairs))}
-        verdicts |= {named.verdict} if named is not None and known else set()
+        verdicts |= {named.verdict} if named is not None and recognised_settings else set()
         verdict = "shown" if "shown" in verdicts else "suggested"
-        apart: dict[str, list[str]] = {}
+        statements_by_pair: dict[str, list[str]] = {}
         for (first, second), test in pairs:
             if test.verdict == verdict:
-                one, other = (name_in_sentence(name(result, code)) for code in (first, second))
-                pair = f"between {one} and {other}"
-                apart.setdefault(pair, []).append(f"“{short_text(result, test.item)}”")
-        items = [f"“{short_text(result, one.item)}”" for one in differing if one.verdict == verdict]
-        if apart:
-            text = f"Ratings differed {listed([f'{pair} ({listed(texts)})' for pair, texts in apart.items()])}."
+                first_name, second_name = (name_in_sentence(name(result, code)) for code in (first, second))
+                pair = f"between {first_name} and {second_name}"
+                statements_by_pair.setdefault(pair, []).append(f"“{short_text(result, test.item)}”")
+        items = [f"“{short_text(result, test.item)}”" for test in differing if test.verdict == verdict]
+        if statements_by_pair:
+            differences = [f"{pair} ({listed(texts)})" for pair, texts in statements_by_pair.items()]
+            text = f"Ratings differed {listed(differences)}."
         elif items:
             text = (
                 f"The {result.kind} were rated differently on {listed(items)}, but the tests do not show which ones "
@@ -245,26 +252,27 @@ class _Distinguished(Finding[None]):
             text = f"No statement showed a difference between any two {result.kind}."
         text += self._largest_words({test.item for test in differing if test.verdict == verdict})
         if named is not None and named.found.p is not None:
-            names = listed([name_in_sentence(result.names[place]) for place in known])
+            names = listed([name_in_sentence(result.names[place]) for place in recognised_settings])
             single = f"Recognised above chance: {names}." if names else _NO_SINGLE_LIQUID
             if named.verdict not in FOUND:
                 single = _NONE_RECOGNISED
             hits = f"{_hits_words(named)} {single}"
-            text = f"{hits} {text}" if known or not verdicts else f"{text} {hits}"  # what was shown comes first
+            # Significant results come first.
+            text = f"{hits} {text}" if recognised_settings or not verdicts else f"{text} {hits}"
         if not verdicts:
-            return self.answered("not shown", f"{text} {NO_EVIDENCE}")
-        return self.answered(verdict, text, claims=True)
+            return self.make_answer("not shown", f"{text} {NO_EVIDENCE}")
+        return self.make_answer(verdict, text, claims=True)
 
     def _largest_words(self, items: Container[str]) -> str:
         """Return a sentence on the largest mean difference from the first setting in ``items``, with a space."""
-        result = self.found
-        known = [effect for effect in Effects.of(result) if effect.item in items and effect.low is not None]
-        if not known:
+        result = self.result
+        effects = [effect for effect in Effects.value_in(result) if effect.item in items and effect.low is not None]
+        if not effects:
             return ""
-        most = max(known, key=lambda effect: abs(effect.mean or 0.0))
-        first, other = (name_in_sentence(name(result, code)) for code in (result.settings[0].code, most.code))
-        ends = f"[{number(most.low)}, {number(most.high)}]"
+        largest = max(effects, key=lambda effect: abs(effect.mean or 0.0))
+        first, other = (name_in_sentence(name(result, code)) for code in (result.settings[0].code, largest.code))
+        ends = f"[{number(largest.low)}, {number(largest.high)}]"
         return (
-            f" The largest mean difference from {first} is {number(most.mean)} points "
-            f"(“{short_text(result, most.item)}” for {other}, 95 % confidence interval {ends}, n = {most.n})."
+            f" The largest mean difference from {first} is {number(largest.mean)} points "
+            f"(“{short_text(result, largest.item)}” for {other}, 95 % confidence interval {ends}, n = {largest.n})."
         )

@@ -23,9 +23,9 @@ from study_app.analysis.findings.finding import (
     Row,
     corrected_tests,
     in_family,
-    judged_row,
-    rows_alone,
     test_row,
+    uncorrected_entries,
+    verdict_row,
 )
 from study_app.analysis.html_page import ends_of, heading, paragraph, table_of
 from study_app.analysis.page_layout import Drawing, Picture
@@ -68,7 +68,7 @@ def table_of_tests(
     compared: Sequence[str] = (),
     *more: tuple[str, Callable[[Tested], str]] | None,
 ) -> Iterator[str]:
-    """Yield a table of tests with ``more`` columns; ``compared`` names what each of them compares."""
+    """Yield a table of tests with ``more`` columns; ``compared`` are the names of the compared settings."""
     if not tests:
         return
     first, outcomes = tests[0], [test.outcome for test in tests]
@@ -91,17 +91,17 @@ def table_of_tests(
         ("p", lambda test: p_value(test.outcome.p)),
         ("adjusted p", lambda test: p_value(test.p_adjusted)),
         ("smallest attainable p", lambda test: p_value(test.outcome.smallest_p))
-        if _has(outcomes, "smallest_p")
+        if _any_has(outcomes, "smallest_p")
         else None,
         (effect if len(effect) <= _MOST_NAME else "effect size", lambda test: number(test.outcome.effect))
-        if _has(outcomes, "effect")
+        if _any_has(outcomes, "effect")
         else None,
         *(ends_of(lambda test: test.outcome.interval) if intervals else ()),
         *more,
-        ("Verdict", _verdict),
+        ("Verdict", _verdict_cell),
         last=1,
     )
-    size = f" Effect size: {effect}{above}." if _has(outcomes, "effect") else ""
+    size = f" Effect size: {effect}{above}." if _any_has(outcomes, "effect") else ""
     ends = f" Confidence intervals (95 %): {'; '.join(intervals)}." if intervals else ""
     yield paragraph(f"Test: {test_name(first.outcome)}{exact}; {'; '.join(family)}.{l_words}{size}{ends}", "soft")
     if reasons and size and not intervals:
@@ -109,11 +109,11 @@ def table_of_tests(
 
 
 _MOST_NAME: Final = 16
-"""A heading names an effect size of so many letters; longer names are below the table."""
+"""The most letters of an effect size in a heading; longer names are below the table."""
 
 
 def _adjustment(test: Tested) -> str:
-    """Return how the p value was adjusted for other tests: within its family, and by the test over all statements."""
+    """Return a phrase on the adjustment of a p value: within its family, or by the test over all statements."""
     if test.members > 1:
         return f"p adjusted ({test.correction}) across {test.members} tests"
     if test.outcome.p is not None and test.p_adjusted is not None and test.p_adjusted > test.outcome.p:
@@ -123,33 +123,33 @@ def _adjustment(test: Tested) -> str:
 
 def _freedom(outcome: Outcome) -> str:
     """Return the degrees of freedom of t or F, "" if there are none."""
-    given = re.match(r"[tF]\(([^)]*)\)", outcome.method)
-    return given[1] if given else ""
+    match = re.match(r"[tF]\(([^)]*)\)", outcome.method)
+    return match[1] if match else ""
 
 
-def _has(outcomes: Sequence[Outcome], field: str) -> bool:
+def _any_has(outcomes: Sequence[Outcome], field: str) -> bool:
     return any(getattr(outcome, field) is not None for outcome in outcomes)
 
 
-def _verdict(test: Tested) -> str:
+def _verdict_cell(test: Tested) -> str:
     return test.verdict + (f" ({test.outcome.note})" if test.verdict == "not tested" and test.outcome.note else "")
 
 
 def families(tests: Sequence[Tested]) -> str:
-    """Return the description of the families: primary statements, and separately exploratory ones."""
-    each = sorted({(not test.primary, test.members, test.correction) for test in tests})
-    several = len(each) > 1
+    """Return a phrase on the families in which p values are adjusted: primary and exploratory statements."""
+    groups = sorted({(not test.primary, test.members, test.correction) for test in tests})
+    several = len(groups) > 1
     return "with p values adjusted " + listed(
         [
             f"by the {correction} method across {counted(members, f'{kind} statement')}"
-            for exploratory, members, correction in each
+            for exploratory, members, correction in groups
             for kind in [("exploratory" if exploratory else "primary") if several else ""]
         ]
     ).replace("  ", " ")
 
 
 def test_differences(answers: BlockAnswers) -> tuple[tuple[Tested, ...], Absent]:
-    """Test for every statement whether the settings receive the same answers."""
+    """Test for each statement whether answers differ between settings."""
     if answers.k < 2:
         return (), (NotTested(SettingsDiffer.what, "the block has only one condition, so there is nothing to compare"),)
     outcomes = {item: _test_difference(answers, values) for item, values in answers.values.items()}
@@ -173,7 +173,7 @@ def slope_tests(answers: BlockAnswers) -> dict[str, SlopeTest]:
 
 
 class StatementTests(Finding[tuple[Tested, ...]]):
-    """One test per statement; texts may contain {noun}, the term for settings."""
+    """A finding with one test per statement; ``title`` may contain {noun}, the noun for settings."""
 
     empty = ()
     asks: ClassVar[str]
@@ -184,13 +184,13 @@ class StatementTests(Finding[tuple[Tested, ...]]):
         return ()
 
     def rows(self) -> Iterator[Row]:
-        return (judged_row(self.found, self.asks, test) for test in self.value)
+        return (verdict_row(self.result, self.asks, test) for test in self.value)
 
     def section(self) -> Iterator[str]:
-        return table_of_tests(self._said(self.title), self.found, self.value, self.compared_names())
+        return table_of_tests(self._with_noun(self.title), self.result, self.value, self.compared_names())
 
-    def _said(self, words: str) -> str:
-        return words.format(noun=settings_noun(self.found))
+    def _with_noun(self, words: str) -> str:
+        return words.format(noun=settings_noun(self.result))
 
 
 class SettingsDiffer(StatementTests):
@@ -211,7 +211,7 @@ class SettingsDiffer(StatementTests):
         return test_differences(answers)
 
     def compared_names(self) -> Sequence[str]:
-        return self.found.names
+        return self.result.names
 
     def methods(self) -> Iterator[str]:
         if tests := self.value:
@@ -283,7 +283,7 @@ class _SessionsDiffer(StatementTests):
     title = "Do sessions differ?"
 
     def compared_names(self) -> Sequence[str]:
-        return [f"session {number}" for number in self.found.sessions]
+        return [f"session {number}" for number in self.result.sessions]
 
     @classmethod
     def test(cls, answers: BlockAnswers, result: BlockResult) -> tuple[tuple[Tested, ...], Absent]:
@@ -293,11 +293,11 @@ class _SessionsDiffer(StatementTests):
             return (), ()
         outcomes = {}
         for item in answers.block.items:
-            single, of = answers.single[item.id], answers.sessions[item.id]
-            each = np.stack([medians(np.where(of == one, single, np.nan)) for one in numbers], axis=2)
-            common = np.asarray(~np.isnan(each).any(axis=2))
+            single, sessions = answers.single[item.id], answers.sessions[item.id]
+            by_session = np.stack([medians(np.where(sessions == number, single, np.nan)) for number in numbers], axis=2)
+            in_all_sessions = np.asarray(~np.isnan(by_session).any(axis=2))
             outcomes[item.id] = _test_difference(
-                answers, medians(np.where(common[..., None], each, np.nan).transpose(0, 2, 1))
+                answers, medians(np.where(in_all_sessions[..., None], by_session, np.nan).transpose(0, 2, 1))
             )
         ungated = replace(answers, gate=0.0)  # sessions may differ even if settings do not
         tested = in_family(outcomes, ungated, f"{answers.block.id}: sessions", false_discovery, FDR, primary=False)
@@ -306,10 +306,11 @@ class _SessionsDiffer(StatementTests):
         return tested, ()
 
 
-def with_gates(blocks: Sequence[BlockAnswers], draws: int | None = None) -> tuple[BlockAnswers, ...]:
-    """Return the answers of a study's blocks, each with its global test over all statements and the resulting gate.
+def add_gates(blocks: Sequence[BlockAnswers], draws: int | None = None) -> tuple[BlockAnswers, ...]:
+    """Return the answers of a study's blocks with the global test over all statements and the resulting gate.
 
-    ``draws`` overrides the usual number of random permutations. If the test fails, the gate is closed.
+    ``draws`` overrides the usual number of random permutations. If the test fails or has no p value, the gate is 1, so
+    that nothing is significant.
     """
 
     def test(answers: BlockAnswers) -> Outcome | None:
@@ -343,8 +344,8 @@ class OverAll(Finding[Outcome | None]):
 
     def rows(self) -> Iterator[Row]:
         if (overall := self.value) is not None:
-            row = test_row(self.found, "conditions differ, all statements", overall)
-            yield row | rows_alone(self.found, "all statements at once")
+            row = test_row(self.result, "conditions differ, all statements", overall)
+            yield row | uncorrected_entries(self.result, "all statements at once")
 
     def section(self) -> Iterator[str]:
         if (overall := self.value) is None:
@@ -361,8 +362,8 @@ class OverAll(Finding[Outcome | None]):
     def methods(self) -> Iterator[str]:
         if self.value is not None:
             yield (
-                f"First, the {settings_noun(self.found)}s were compared across "
-                f"{all_of(len(self.found.items), 'statement')} with a within-participant permutation test; the "
+                f"First, the {settings_noun(self.result)}s were compared across "
+                f"{all_of(len(self.result.items), 'statement')} with a within-participant permutation test; the "
                 "statistic was the sum of the statements' Friedman statistics."
             )
 
@@ -383,7 +384,7 @@ class Effect:
 
 
 def _scale_words(labels: Sequence[str]) -> str:
-    """Return the title of a scale, with its ends if there is room."""
+    """Return the title of a scale, with the names of its ends if there is space."""
     words = f"Points from {LEVELS[0]} ({labels[0]}) to {LEVELS[-1]} ({labels[-1]})"
     return words if len(words) <= MOST_LETTERS else "Points on the scale"
 
@@ -406,19 +407,19 @@ class Effects(Finding[tuple[Effect, ...]]):
         effects = []
         for item, values in answers.values.items():
             for column in range(1, answers.k):
-                away = values[:, column] - values[:, 0]
-                away = away[~np.isnan(away)]
-                low, high = student_interval(away)
-                mean = float(away.mean()) if len(away) else None
-                effects.append(Effect(item=item, code=codes[column], n=len(away), mean=mean, low=low, high=high))
+                differences = values[:, column] - values[:, 0]
+                differences = differences[~np.isnan(differences)]
+                low, high = student_interval(differences)
+                mean = float(differences.mean()) if len(differences) else None
+                effects.append(Effect(item=item, code=codes[column], n=len(differences), mean=mean, low=low, high=high))
         return tuple(effects), ()
 
     def section(self) -> Iterator[str]:
-        yield from self.drawn()
+        yield from self.figure_html()
 
     def figure(self, drawing: Drawing) -> Picture | None:
         """Draw every participant's answers to each statement; for delays, the differences from the shortest."""
-        result, study = self.found, drawing.study
+        result, study = self.result, drawing.study
         if not self.value:
             return None
         over_delay = bool(result.delays_ms)
@@ -431,13 +432,13 @@ class Effects(Finding[tuple[Effect, ...]]):
         panels = []
         for item in result.items:
             values = by_participant(answers, people, drawing.block.columns, item.id)
-            shown = values[:, 1:] - values[:, :1] if over_delay else values
+            shown_values = values[:, 1:] - values[:, :1] if over_delay else values
             columns = []
-            for place in range(shown.shape[1]):
-                numbers = dict(zip(people, shown[:, place].tolist(), strict=True))
-                numbers = {who: value for who, value in numbers.items() if not math.isnan(value)}
-                words = name(result, codes[place + over_delay]).removesuffix(" ms")
-                columns.append(Column(name=words, values=numbers, mean=mean_of(numbers.values(), level)))
+            for place in range(shown_values.shape[1]):
+                numbers = dict(zip(people, shown_values[:, place].tolist(), strict=True))
+                numbers = {person: value for person, value in numbers.items() if not math.isnan(value)}
+                column_name = name(result, codes[place + over_delay]).removesuffix(" ms")
+                columns.append(Column(name=column_name, values=numbers, mean=mean_of(numbers.values(), level)))
             panels.append(
                 Panel(
                     title=item.short,
@@ -450,12 +451,12 @@ class Effects(Finding[tuple[Effect, ...]]):
                 )
             )
         first = name(result, result.settings[0].code)
-        what = f"Difference between each participant's answers and those at {first}" if over_delay else (
+        subject = f"Difference between each participant's answers and those at {first}" if over_delay else (
             f"Each participant's answers about each {settings_noun(result)}"
         )  # fmt: skip
         caption = (
-            f"{what} ({drawing.simulated}n = {result.n}). Diamonds: means with {percent(level)} confidence intervals "
-            "(Student's t), not corrected for the number of intervals. Conclusions are based on the tests."
+            f"{subject} ({drawing.simulated}n = {result.n}). Diamonds: means with {percent(level)} confidence "
+            "intervals (Student's t), not corrected for the number of intervals. Conclusions are based on the tests."
             + (f" Band: equivalence bounds of {bound_text(bound)}." if bound else "")
         )
         return people_picture(
@@ -487,9 +488,10 @@ def _smallest_of_pairs(settings: int, participants: int) -> float:
 
 
 def pairs_of(answers: BlockAnswers, omnibus: tuple[Tested, ...]) -> tuple[tuple[Pair, ...], Absent]:
-    """Compare settings pairwise in the statements that differ at all, as one Holm family.
+    """Compare settings pairwise for statements with a significant difference, as one Holm family.
 
-    If one liquid differs from all others, every statement is included, and each has pairs that do not differ.
+    One family is needed because even if only one liquid differs, so that all statements are included, each statement
+    has pairs that do not differ.
     """
     n, k, alpha, codes = answers.n, answers.k, answers.decided.alpha, answers.block.codes
     if k < 3:
@@ -501,26 +503,26 @@ def pairs_of(answers: BlockAnswers, omnibus: tuple[Tested, ...]) -> tuple[tuple[
             f"for {math.comb(k, 2)} pairs, which is above {significant(alpha)}"
         )
         return (), (NotTested(Pairs.what, why),)
-    opened = [test.item for test in omnibus if test.verdict in ("shown", "suggested")]
-    if not opened:
+    differing_items = [test.item for test in omnibus if test.verdict in ("shown", "suggested")]
+    if not differing_items:
         return (), (NotTested(Pairs.what, "no statement shows a difference between the conditions"),)
-    each = [(item, *two) for item in opened for two in combinations(range(k), 2)]
+    comparisons = [(item, *two) for item in differing_items for two in combinations(range(k), 2)]
     outcomes = {
         f"{item} {first} {second}": signed_rank_test(
             answers.values[item][:, first], answers.values[item][:, second], alpha=alpha
         )
-        for item, first, second in each
+        for item, first, second in comparisons
     }
-    primary = [answers.decided.is_primary(item) for item, *_ in each]
+    primary = [answers.decided.is_primary(item) for item, *_ in comparisons]
     tested = in_family(outcomes, answers, f"{answers.block.id}: all pairs of conditions", holm, HOLM, primary=primary)
     return tuple(
         Pair(codes[first], codes[second], replace(test, item=item))
-        for (item, first, second), test in zip(each, tested, strict=True)
+        for (item, first, second), test in zip(comparisons, tested, strict=True)
     ), ()
 
 
 class Pairs(Finding[tuple[Pair, ...]]):
-    """Pairwise comparisons of settings in the statements that differ at all."""
+    """Pairwise comparisons of settings for statements with a significant difference."""
 
     key = "pairs"
     place = 3
@@ -532,23 +534,23 @@ class Pairs(Finding[tuple[Pair, ...]]):
 
     @classmethod
     def test(cls, answers: BlockAnswers, result: BlockResult) -> tuple[tuple[Pair, ...], Absent]:
-        return pairs_of(answers, SettingsDiffer.of(result))
+        return pairs_of(answers, SettingsDiffer.value_in(result))
 
     def rows(self) -> Iterator[Row]:
         for pair in self.value:
-            compared = f"{name(self.found, pair.first)} − {name(self.found, pair.second)}"
-            row = judged_row(self.found, "two conditions differ", pair.tested)
+            compared = f"{name(self.result, pair.first)} − {name(self.result, pair.second)}"
+            row = verdict_row(self.result, "two conditions differ", pair.tested)
             yield row | {"comparison": compared, "codes": f"{pair.first} {pair.second}"}
 
     def section(self) -> Iterator[str]:
         if not (pairs := self.value):
             return
-        yield heading(3, f"Which {settings_noun(self.found)}s differ?")
+        yield heading(3, f"Which {settings_noun(self.result)}s differ?")
         yield table_of(
             pairs,
-            ("Statement", lambda pair: short_text(self.found, pair.tested.item)),
-            ("Pair", lambda pair: f"{name(self.found, pair.first)} − {name(self.found, pair.second)}"),
-            ("n", lambda pair: f"{pair.tested.outcome.n} ({_differing(pair)} differ)"),
+            ("Statement", lambda pair: short_text(self.result, pair.tested.item)),
+            ("Pair", lambda pair: f"{name(self.result, pair.first)} − {name(self.result, pair.second)}"),
+            ("n", lambda pair: f"{pair.tested.outcome.n} ({_differing_participants(pair)} differ)"),
             ("V", lambda pair: number(pair.tested.outcome.statistic, 1)),
             ("p", lambda pair: p_value(pair.tested.outcome.p)),
             ("adjusted p", lambda pair: p_value(pair.tested.p_adjusted)),
@@ -562,9 +564,9 @@ class Pairs(Finding[tuple[Pair, ...]]):
         yield paragraph(
             "Test: Wilcoxon's signed-rank test (V: sum of the ranks of the positive differences), only for statements "
             "that show a difference between the "
-            f"{settings_noun(self.found)}s ({pairs[0].tested.outcome.method}); p values are Holm-adjusted across the "
+            f"{settings_noun(self.result)}s ({pairs[0].tested.outcome.method}); p values are Holm-adjusted across the "
             f"{pairs[0].tested.members} pairs in this table. A rank-biserial correlation above 0 means that the first "
-            f"{settings_noun(self.found)} in the pair was rated higher. Nominal 95 % confidence intervals use "
+            f"{settings_noun(self.result)} in the pair was rated higher. Nominal 95 % confidence intervals use "
             "Fisher's z; with up to 24 participants, their coverage is about 90 %. There is no interval if all "
             "differences have the same sign (the correlation is then −1 or 1), or if fewer than six participants "
             "answered differently about the two.",
@@ -580,8 +582,8 @@ class Pairs(Finding[tuple[Pair, ...]]):
             )
 
 
-def _differing(pair: Pair) -> int:
-    """Return the number of participants with different answers to the two, who alone enter the test."""
+def _differing_participants(pair: Pair) -> int:
+    """Return the number of participants with different answers about the two settings; only these are tested."""
     outcome = pair.tested.outcome
     return outcome.n - (outcome.zeros if isinstance(outcome, SignedRanks) else 0)
 
@@ -597,7 +599,7 @@ class _Difference(NamedTuple):
     interval: Interval
 
 
-def _spread(test: Tested, field: str) -> str:
+def _sd_cell(test: Tested, field: str) -> str:
     """Return the standard deviation between participants of their slopes or intercepts."""
     sds = getattr(test.outcome, field)
     return number((sds[0] if sds else None) if isinstance(sds, tuple) else sds)
@@ -620,7 +622,7 @@ class MeanTests(StatementTests):
                 NotTested(cls.what, ONE_DELAY if answers.block.kind == "delays" else "there is only one condition"),
             )
         if answers.block.kind == "delays" and answers.decided.trends == "slopes":
-            return (), ()  # it is the test of trends
+            return (), ()  # the trend test is the same test
         family = f"{answers.block.id}: means"
         return in_family(slope_tests(answers), answers, family, false_discovery, FDR, primary=False), ()
 
@@ -628,10 +630,10 @@ class MeanTests(StatementTests):
         if not any(isinstance(test.outcome, SlopeTest) and test.outcome.slopes for test in self.value):
             yield from super().section()
             return
-        over_delay, first, others = bool(self.found.delays_ms), self.found.names[0], self.found.names[1:]
-        slopes = ("slope SD", lambda test: _spread(test, "sds")) if over_delay else None
-        intercepts = ("intercept SD", lambda test: _spread(test, "intercept_sd"))
-        yield from table_of_tests(self._said(self.title), self.found, self.value, (), slopes, intercepts)
+        over_delay, first, others = bool(self.result.delays_ms), self.result.names[0], self.result.names[1:]
+        slopes = ("slope SD", lambda test: _sd_cell(test, "sds")) if over_delay else None
+        intercepts = ("intercept SD", lambda test: _sd_cell(test, "intercept_sd"))
+        yield from table_of_tests(self._with_noun(self.title), self.result, self.value, (), slopes, intercepts)
         if over_delay:
             yield paragraph(
                 "Slopes are in points per 100 ms of delay. SDs are the standard deviations between participants of "
@@ -640,10 +642,10 @@ class MeanTests(StatementTests):
             )
             return
         rows = [
-            _Difference(test.item, other, it.n, mean, sd, ends)
+            _Difference(test.item, other, outcome.n, mean, sd, ends)
             for test in self.value
-            if isinstance(it := test.outcome, SlopeTest) and it.slopes
-            for other, mean, sd, ends in zip(others, it.slopes, it.sds, it.intervals, strict=True)
+            if isinstance(outcome := test.outcome, SlopeTest) and outcome.slopes
+            for other, mean, sd, ends in zip(others, outcome.slopes, outcome.sds, outcome.intervals, strict=True)
         ]
         yield paragraph(
             f"The intercept SD is the standard deviation between participants of their answers for {first}. Mean "
@@ -652,7 +654,7 @@ class MeanTests(StatementTests):
         )
         yield table_of(
             rows,
-            ("Statement", lambda row: short_text(self.found, row.item)),
+            ("Statement", lambda row: short_text(self.result, row.item)),
             ("Comparison", lambda row: f"{row.other} − {first}"),
             ("n", lambda row: str(row.n)),
             ("mean difference", lambda row: number(row.mean)),
@@ -665,17 +667,17 @@ class MeanTests(StatementTests):
     @classmethod
     def tested(cls, result: BlockResult) -> bool:
         """Return whether any statement of a block was tested."""
-        return any(test.outcome.p is not None for test in cls.of(result))
+        return any(test.outcome.p is not None for test in cls.value_in(result))
 
     @classmethod
     def common_methods(cls, blocks: Sequence[BlockResult]) -> Iterator[str]:
-        tests = {test.outcome.test for block in blocks for test in cls.of(block) if test.outcome.p is not None}
+        tests = {test.outcome.test for block in blocks for test in cls.value_in(block) if test.outcome.p is not None}
         if tests:
-            how = {
+            descriptions = {
                 HOTELLING: "differences between the conditions were tested with Hotelling's T²",
                 T_TEST: "the participants' slopes were tested with Student's t test",
             }
-            words = listed([how[test] for test in how if test in tests])
+            words = listed([descriptions[test] for test in descriptions if test in tests])
             yield (
                 f"In an exploratory analysis, the answers were treated as numbers: {words}, for the participants "
                 "who answered in all conditions; the false discovery rate was controlled (Benjamini–Hochberg)."

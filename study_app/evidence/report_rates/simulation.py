@@ -33,9 +33,9 @@ from study_app.analysis.findings import (
     OverAll,
     Pairs,
     SettingsDiffer,
+    add_gates,
+    answers_from_tables,
     common_ms,
-    of_tables,
-    with_gates,
 )
 from study_app.analysis.planning.power_curves import interval
 from study_app.analysis.planning.simulated_studies import Opinions, Plan, draw_opinions
@@ -329,7 +329,7 @@ def _simulate_study(simulation: Plan, cell: Cell, truth: _Truth, seed: int, stud
         for (name, at_most), hit in events_of(answers_by_block[index], result, cell, truth[index]):
             events[f"{name} ({block.kind})", at_most] = hit
         if cell.extent == "empty":
-            test = OverAll.of(result)
+            test = OverAll.value_in(result)
             differs = test is not None and (test.p or 1.0) <= simulation.decided.alpha
             events[f"test over all statements ({block.kind})", "at most 5 %"] = differs
     events[LOST] = bool(failures.found)
@@ -348,7 +348,7 @@ def report(
     """Return the answers of each block, and the findings that the report derives from them."""
     people = tuple(f"P{number:03d}" for number in range(len(answers[0])))
     tables = [
-        of_tables(
+        answers_from_tables(
             block,
             decided,
             people,
@@ -359,15 +359,15 @@ def report(
         )
         for block, values in zip(simulation.blocks, answers, strict=True)
     ]
-    gated = [replace(answers, seed=1) for answers in with_gates(tables, _DRAWS)]
+    gated = [replace(answers, seed=1) for answers in add_gates(tables, _DRAWS)]
     return gated, tuple(evaluate_block(None, answers) for answers in gated)
 
 
 def _claims(result: BlockResult) -> bool:
     """Return whether a block's section claims that conditions differ or that a delay is noticed."""
-    pairs = [pair.tested for pair in Pairs.of(result)]
-    tests = [*SettingsDiffer.of(result), *DelayTrend.of(result), *MeanTests.of(result), *pairs]
-    low = any(lowest.over_all_ms is not None for lowest in LowestDelay.of(result))
+    pairs = [pair.tested for pair in Pairs.value_in(result)]
+    tests = [*SettingsDiffer.value_in(result), *DelayTrend.value_in(result), *MeanTests.value_in(result), *pairs]
+    low = any(lowest.over_all_ms is not None for lowest in LowestDelay.value_in(result))
     return (
         any(test.verdict in FOUND for test in tests) or low or _is_liquid_recognised(result) or _has_threshold(result)
     )
@@ -377,7 +377,7 @@ def _mean_test_events(result: BlockResult) -> Iterator[tuple[Event, bool]]:
     """Yield, for each statement, whether the test of means finds a difference."""
     yield (
         ("difference found by the test of means", "at most 5 %"),
-        any(test.verdict in FOUND for test in MeanTests.of(result)),
+        any(test.verdict in FOUND for test in MeanTests.value_in(result)),
     )
 
 
@@ -385,23 +385,23 @@ def _liquid_events(asked: BlockAnswers, result: BlockResult, cell: Cell, _truth:
     if cell.extent in _NO_EFFECT:
         yield (
             ("conditions differ in a statement", "at most 5 %"),
-            any(test.verdict in FOUND for test in SettingsDiffer.of(result)),
+            any(test.verdict in FOUND for test in SettingsDiffer.value_in(result)),
         )
         yield ("liquids recognised", "at most 5 %"), _is_liquid_recognised(result)
         yield from _mean_test_events(result)
     equal = _equal_pairs(asked.block, cell.extent)
     if equal:
         found_equal = any(
-            pair.tested.verdict in FOUND and (pair.first, pair.second) in equal for pair in Pairs.of(result)
+            pair.tested.verdict in FOUND and (pair.first, pair.second) in equal for pair in Pairs.value_in(result)
         )
         yield ("equal liquids distinguished", "at most 5 %"), found_equal
     if cell.extent == "full":
-        yield ("some liquids distinguished", "counted"), any(pair.tested.verdict in FOUND for pair in Pairs.of(result))
+        yield ("some liquids distinguished", "counted"), any(pair.tested.verdict in FOUND for pair in Pairs.value_in(result))
         yield ("liquids recognised", "counted"), _is_liquid_recognised(result)
 
 
 def _is_liquid_recognised(result: BlockResult) -> bool:
-    recognition = LiquidRecognition.of(result)
+    recognition = LiquidRecognition.value_in(result)
     return recognition is not None and recognition.verdict in FOUND
 
 
@@ -422,13 +422,16 @@ def _delay_events(asked: BlockAnswers, result: BlockResult, cell: Cell, truth: A
     block = asked.block
     equal_delays_ms = [block.settings[index].delay_ms or 0.0 for index in _equal_settings(block, cell.extent)]
     if cell.extent in _NO_EFFECT:
-        yield ("trend in a statement", "at most 5 %"), any(test.verdict in FOUND for test in DelayTrend.of(result))
+        yield (
+            ("trend in a statement", "at most 5 %"),
+            any(test.verdict in FOUND for test in DelayTrend.value_in(result)),
+        )
         yield ("detection threshold printed", "at most 5 %"), _has_threshold(result)
         yield from _mean_test_events(result)
     if equal_delays_ms:
         low = any(
             lowest.over_all_ms is not None and lowest.over_all_ms <= max(equal_delays_ms)
-            for lowest in LowestDelay.of(result)
+            for lowest in LowestDelay.value_in(result)
         )
         yield ("stated shortest delay with a trend is too short", "at most 5 %"), low
     if cell.extent not in _NO_EFFECT:
@@ -436,20 +439,20 @@ def _delay_events(asked: BlockAnswers, result: BlockResult, cell: Cell, truth: A
     if cell.extent == "full":
         yield (
             ("shortest delay with a trend stated", "counted"),
-            any(lowest.over_all_ms is not None for lowest in LowestDelay.of(result)),
+            any(lowest.over_all_ms is not None for lowest in LowestDelay.value_in(result)),
         )
         yield ("detection threshold printed", "counted"), _has_threshold(result)
 
 
 def _has_threshold(result: BlockResult) -> bool:
-    threshold = DetectionThreshold.of(result)
+    threshold = DetectionThreshold.value_in(result)
     return threshold is not None and threshold.effect is not None
 
 
 def _equivalence(asked: BlockAnswers, result: BlockResult, truth: Array) -> Iterator[tuple[Event, bool]]:
     """Yield whether a delay is wrongly called equivalent: the delay nearest to the bound, and on the first page."""
     bound = asked.decided.equivalence_bound
-    if bound is None or not ContrastsWithControl.of(result):
+    if bound is None or not ContrastsWithControl.value_in(result):
         return
     truly_different = {
         (item.id, setting.delay_ms or 0.0): float(difference)
@@ -461,7 +464,7 @@ def _equivalence(asked: BlockAnswers, result: BlockResult, truth: Array) -> Iter
         return
     nearest = min(truly_different, key=truly_different.__getitem__)
     is_called_equivalent = {
-        (tested.item, tested.delay_ms): tested.verdict == "equivalent" for tested in ContrastsWithControl.of(result)
+        (tested.item, tested.delay_ms): tested.verdict == "equivalent" for tested in ContrastsWithControl.value_in(result)
     }
     yield ("smallest difference beyond the bound called equivalent", "at most 5 %"), is_called_equivalent[nearest]
     longest_ms = common_ms(result)

@@ -7,7 +7,13 @@ import pytest
 
 from study_app.analysis.data.blocks import NOTHING_DECIDED, Item, Setting
 from study_app.analysis.data.study_tables import load_study
-from study_app.analysis.findings.delays import ContrastsWithControl, ContrastWithControl, Lowest, LowestDelay, by_delay
+from study_app.analysis.findings.delays import (
+    ContrastsWithControl,
+    ContrastWithControl,
+    LowestDelay,
+    LowestTrend,
+    rows_by_delay,
+)
 from study_app.analysis.report.sections import limits
 from study_app.analysis.results import BlockResult
 from study_app.analysis.results import Results as Found
@@ -26,7 +32,7 @@ def against(differences: Mapping[float, list[int]]) -> tuple[ContrastWithControl
     return tuple(ContrastWithControl("different", ms, 0.0, tost(values, 1.0)) for ms, values in differences.items())
 
 
-def delays(differences: Mapping[float, list[int]], lowest: tuple[Lowest, ...] = ()) -> BlockResult:
+def delays(differences: Mapping[float, list[int]], lowest: tuple[LowestTrend, ...] = ()) -> BlockResult:
     """Return a block of delays in which answers to one statement differ so from those at 0 ms."""
     at = (0.0, *differences)
     return BlockResult(
@@ -64,20 +70,20 @@ WITHIN = "The mean answers to these statements stay within the bounds"
     [(CALM, WITHIN), (SCATTERED, UNCLEAR), (AWAY, BEYOND), ([0] * 5, UNCLEAR), ([2] * 5, BEYOND), ([2] * 12, BEYOND)],
 )
 def test_the_sentence_about_one_delay_follows_the_verdict(differences: list[int], said: str) -> None:
-    assert said in by_delay(delays({50: differences}))[0][-1]
+    assert said in rows_by_delay(delays({50: differences}))[0][-1]
 
 
 def test_a_trend_that_shows_only_within_its_statement_speaks_against_nothing() -> None:
     steps = step_down([[1, 3, 5], [1, 3, 5], [1, 3, 5], [3, 1, 5], [1, 3, 5]], [0, 50, 100], alpha=0.2)
-    alone, of_five = Lowest("different", steps), Lowest("different", steps, members=5)
+    alone, of_five = LowestTrend("different", steps), LowestTrend("different", steps, members=5)
     assert alone.over_all_ms == steps.lowest_ms == 50
     assert of_five.over_all_ms == 100  # the second step has p = .19, the first .0003
     inconclusive = (
         "Delays of up to 50 ms change the answers: agreement with “Different” shows a trend over delays of up to 50 ms."
         " For “Different”, the data do not show whether the mean difference at 50 ms exceeds the bound."
     )
-    assert by_delay(delays({50: SCATTERED}, (alone,)))[0][-1] == inconclusive
-    assert "change the answers" not in by_delay(delays({50: SCATTERED}, (of_five,)))[0][-1]
+    assert rows_by_delay(delays({50: SCATTERED}, (alone,)))[0][-1] == inconclusive
+    assert "change the answers" not in rows_by_delay(delays({50: SCATTERED}, (of_five,)))[0][-1]
 
 
 NEITHER = "(one for each statement and delay), the data show neither that the mean answer stays within ±1 point nor"
@@ -85,10 +91,10 @@ NEITHER = "(one for each statement and delay), the data show neither that the me
 
 def test_what_only_t_calls_equivalent_is_told_as_inconclusive(rek: Results) -> None:
     block = delays({50: DOUBTED})
-    assert ContrastsWithControl.of(block)[0].found.p is not None
-    assert ContrastsWithControl.of(block)[0].found.p < 0.05
-    assert ContrastsWithControl.of(block)[0].found.checks_agree is False
-    ((*told, said),) = by_delay(block)
+    assert ContrastsWithControl.value_in(block)[0].found.p is not None
+    assert ContrastsWithControl.value_in(block)[0].found.p < 0.05
+    assert ContrastsWithControl.value_in(block)[0].found.checks_agree is False
+    ((*told, said),) = rows_by_delay(block)
     assert told == ["50 ms", "–", "–", "Different", "–"]
     assert UNCLEAR in said
     rek.add("P001", lambda *_: 4)
@@ -102,12 +108,12 @@ def test_limits_do_not_call_an_interval_beyond_the_bound_inconclusive(rek: Resul
     lines = limits(load_study(rek.folder), found(delays({50: DOUBTED, 150: [2] * 17})))
     assert any(f"in 1 of 2 comparisons with 0 ms {NEITHER}" in line for line in lines)
     assert not any(NEITHER in line for line in limits(load_study(rek.folder), found(delays({150: AWAY}))))
-    (row,) = by_delay(delays({150: AWAY}))
+    (row,) = rows_by_delay(delays({150: AWAY}))
     assert row[:-1] == ["150 ms", "–", "Different", "–", "–"]
 
 
 def test_every_delay_has_its_own_sentence() -> None:
     steps = step_down(np.tile([1, 2, 2, 5], (12, 1)), [0, 50, 125, 300])
-    rows = by_delay(delays({50: CALM, 125: SCATTERED, 300: AWAY}, (Lowest("different", steps),)))
+    rows = rows_by_delay(delays({50: CALM, 125: SCATTERED, 300: AWAY}, (LowestTrend("different", steps),)))
     assert rows[0][-1].startswith(WITHIN)
     assert rows[2][-1].startswith("Delays of up to 300 ms change the answers: agreement with “Different” shows a trend")

@@ -63,7 +63,7 @@ def test_every_finding_keeps_its_contract_in_studies_of_every_shape(shape: str) 
     (found,) = results.blocks
     if shape in ("delays", "liquids"):
         due = {one.key for one in all_findings() if one.what and found.kind in one.kinds}
-        tested = {one.key for one in all_findings() if one.of(found) != one.empty}
+        tested = {one.key for one in all_findings() if one.value_in(found) != one.empty}
         assert tested == due - {"by_session"}
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from study_app.analysis.evaluate import evaluate_block
 from study_app.analysis.findings.delays import ContrastsWithControl, DetectionThreshold, LowestDelay
-from study_app.analysis.findings.finding import of_tables
+from study_app.analysis.findings.finding import answers_from_tables
 from study_app.analysis.findings.recognition import LiquidRecognition
 from study_app.analysis.findings.statement_tests import DelayTrend, MeanTests, Pairs, SettingsDiffer
 from study_app.analysis.planning.simulated_studies import Plan, plan
@@ -71,20 +71,27 @@ def test_verdicts_alone_are_those_of_the_whole_evaluation(rek: Plan, participant
         for block, values in zip(rek.blocks, given, strict=True):
             single_ = {item.id: values[:, :, [column]] for column, item in enumerate(block.items)}
             whole, quick = (
-                evaluate_block(None, of_tables(block, rek.decided, people, single_, verdicts_only=verdicts_only))
+                evaluate_block(
+                    None, answers_from_tables(block, rek.decided, people, single_, verdicts_only=verdicts_only)
+                )
                 for verdicts_only in (False, True)
             )
-            assert [one.verdict for one in ContrastsWithControl.of(quick)] == [
-                one.verdict for one in ContrastsWithControl.of(whole)
+            assert [one.verdict for one in ContrastsWithControl.value_in(quick)] == [
+                one.verdict for one in ContrastsWithControl.value_in(whole)
             ]
-            assert (SettingsDiffer.of(quick), Pairs.of(quick)) == (SettingsDiffer.of(whole), Pairs.of(whole))
-            assert [one.p_adjusted for one in DelayTrend.of(quick)] == [one.p_adjusted for one in DelayTrend.of(whole)]
-            assert (LowestDelay.of(quick), DetectionThreshold.of(quick), MeanTests.of(quick)) == (
-                LowestDelay.of(whole),
-                DetectionThreshold.of(whole),
-                MeanTests.of(whole),
+            assert (SettingsDiffer.value_in(quick), Pairs.value_in(quick)) == (
+                SettingsDiffer.value_in(whole),
+                Pairs.value_in(whole),
             )
-            recognised = LiquidRecognition.of(whole), LiquidRecognition.of(quick)
+            assert [one.p_adjusted for one in DelayTrend.value_in(quick)] == [
+                one.p_adjusted for one in DelayTrend.value_in(whole)
+            ]
+            assert (LowestDelay.value_in(quick), DetectionThreshold.value_in(quick), MeanTests.value_in(quick)) == (
+                LowestDelay.value_in(whole),
+                DetectionThreshold.value_in(whole),
+                MeanTests.value_in(whole),
+            )
+            recognised = LiquidRecognition.value_in(whole), LiquidRecognition.value_in(quick)
             assert len({None if one is None else (one.verdict, one.found.p) for one in recognised}) == 1
 
 

@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 from scipy.stats import binomtest
 
-from study_app.analysis.findings.finding import ALONE, Absent, Answer, BlockAnswers, Finding, in_family, judged_row
+from study_app.analysis.findings.finding import ALONE, Absent, Answer, BlockAnswers, Finding, in_family, verdict_row
 from study_app.analysis.findings.statement_tests import table_of_tests
 from study_app.analysis.page_layout import Drawing, Look, Picture, Sheet
 from study_app.analysis.results import BlockResult, NotTested, Tested, short_text
@@ -50,11 +50,11 @@ class HighestAnswers(Finding[tuple[Tested, ...]]):
         return tests, (NotTested("count of lowest answers", "nobody asked for it"),)
 
     def rows(self) -> Iterator[dict[str, object]]:
-        return (judged_row(self.found, "the highest answer is given", one) for one in self.value)
+        return (verdict_row(self.result, "the highest answer is given", one) for one in self.value)
 
     def section(self) -> Iterator[str]:
-        yield from table_of_tests(f"{self.figure_title}, counted", self.found, self.value)
-        yield from self.drawn()
+        yield from table_of_tests(f"{self.figure_title}, counted", self.result, self.value)
+        yield from self.figure_html()
 
     def figure(self, drawing: Drawing) -> Picture | None:
         def figure(look: Look) -> Sheet:
@@ -65,9 +65,9 @@ class HighestAnswers(Finding[tuple[Tested, ...]]):
         return drawing.picture(self.figure_title, f"{self.figure_title}, as shares.", figure)
 
     def methods(self) -> Iterator[str]:
-        yield f"The highest answers of {self.found.title} were counted."
+        yield f"The highest answers of {self.result.title} were counted."
 
     def answer(self) -> Answer:
         most = max(self.value, key=lambda one: one.outcome.effect or 0.0)
-        text = f"Most highest answers: {short_text(self.found, most.item)}."
-        return self.answered("shown", text)
+        text = f"Most highest answers: {short_text(self.result, most.item)}."
+        return self.make_answer("shown", text)
