@@ -298,7 +298,7 @@ class Drawing:
 
     study: Study
     block: Block
-    found: BlockResult
+    result: BlockResult
     results: Results
     name: str
     forms: Sequence[str]

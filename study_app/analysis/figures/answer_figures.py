@@ -1,9 +1,9 @@
-"""The figures of answers to statements, with their captions: by setting, over delay, and of recognition.
+"""Figures of answers to statements, with their captions: by setting, against delay, and of recognition.
 
-Disagreement grows left and agreement right from one line; neutral answers stand in a column of their own on the same
-scale, since splitting them over the line would make half of "neither" look like disagreement.
+Bars of disagreement extend to the left of a line and bars of agreement to the right. Neutral answers have a separate
+column on the same scale; if they were centred on the line, half of them would look like disagreement.
 
-Darker means more, and every count stands in its cell, so that nothing depends on colour alone.
+In the confusion matrix, darker cells have larger counts; every cell shows its count, so nothing depends on colour.
 """
 
 from __future__ import annotations
@@ -44,10 +44,10 @@ _ANSWERS_FOOT_PT: Final = 17.0
 _BOTTOM: Final = 0.55
 _TOP: Final = 7.5
 MOST_LINES: Final = 60
-"""Of more participants so many are drawn: more lines hide the median and the band."""
+"""The most participants drawn as lines; more lines would hide the median and the band."""
 
 _SPREAD: Final = 0.24
-"""Height over which coinciding lines of participants are drawn apart [levels]."""
+"""Total vertical offset between participants' lines, so that equal answers do not coincide [levels]."""
 
 
 @style.own_settings()
@@ -60,10 +60,10 @@ def draw_answers(
     *,
     own_scales: Sequence[Array] = (),
 ) -> Sheet:
-    """Draw answers against delay to scale: thin lines for participants (a selection of many), band, thick median.
+    """Draw answers against delay: thin lines for participants, a band of quartiles, and a thick line for the median.
 
-    ``plots`` are short texts and answers (participants, delays), ``lowest_ms`` the lowest delays with a trend. With
-    ``own_scales`` they are measures, each on the scale of the values given here.
+    ``plots`` are titles and answers (participants, delays); ``lowest_ms`` are the lowest delays with a trend. With
+    ``own_scales``, the plots show measures, each on the scale of its own array of values.
     """
     ruler = Sheet(style.PAGE_WIDTH_PT, 72, look.fonts)
     columns = min(len(plots), _PLOTS_A_ROW)
@@ -74,7 +74,7 @@ def draw_answers(
     rows = -(-len(plots) // _PLOTS_A_ROW)
     row_pt = title_pt + 6 + _ANSWERS_PT + 14
     sheet = look.sheet(_ANSWERS_TOP_PT + rows * row_pt + (rows - 1) * 6 + _ANSWERS_FOOT_PT)
-    legend(sheet)
+    _draw_line_legend(sheet)
     for place, (_, values) in enumerate(plots):
         row, column = divmod(place, _PLOTS_A_ROW)
         x = MARGIN_PT + scale_pt + column * (width + gap_pt)
@@ -84,12 +84,12 @@ def draw_answers(
         axes = sheet.axes(x, top + title_pt + 6, width, _ANSWERS_PT)
         axes.set_label(f"item{place + 1}")
         if own_scales:
-            _scale_to(sheet, axes, own_scales[place])
+            _set_scale(sheet, axes, own_scales[place])
         else:
             axes.set_ylim(_BOTTOM, _TOP)
             sheet.scale(axes, "y", LEVELS, LEVELS if column == 0 else (), lines=True)
-        over_delay(sheet, axes, values, np.asarray(delays_ms, dtype=float), 0.0 if own_scales else _SPREAD)
-        _lowest(sheet, axes, lowest_ms[place], float(np.mean(delays_ms)))
+        _draw_over_delay(sheet, axes, values, np.asarray(delays_ms, dtype=float), 0.0 if own_scales else _SPREAD)
+        _draw_lowest_delay(sheet, axes, lowest_ms[place], float(np.mean(delays_ms)))
         counts = (~np.isnan(values)).sum(axis=0)
         if (counts < len(values)).any():  # not every participant answered at every setting
             low, high = int(counts.min()), int(counts.max())
@@ -100,44 +100,44 @@ def draw_answers(
     return sheet
 
 
-def _scale_to(sheet: Sheet, axes: Axes, values: Array) -> None:
+def _set_scale(sheet: Sheet, axes: Axes, values: Array) -> None:
     """Set the axis limits to the range of all values without NaN."""
     low, high = (float(np.nanmin(values)), float(np.nanmax(values))) if not np.isnan(values).all() else (0.0, 0.0)
-    room = 0.08 * (high - low) or 0.5
-    axes.set_ylim(low - room, high + room)
-    found = MaxNLocator(nbins=4).tick_values(low, high) if high > low else [low]
-    ticks = [float(tick) for tick in found if low - room <= tick <= high + room]
+    margin = 0.08 * (high - low) or 0.5
+    axes.set_ylim(low - margin, high + margin)
+    candidates = MaxNLocator(nbins=4).tick_values(low, high) if high > low else [low]
+    ticks = [float(tick) for tick in candidates if low - margin <= tick <= high + margin]
     sheet.scale(axes, "y", ticks, [f"{tick:.3g}" for tick in ticks], lines=True)
 
 
-def over_delay(sheet: Sheet, axes: Axes, values: Array, delays_ms: Array, spread: float) -> None:
-    """Draw (participants, delays) values: thin lines at most ``spread`` apart, and band and thick median of all."""
+def _draw_over_delay(sheet: Sheet, axes: Axes, values: Array, delays_ms: Array, spread: float) -> None:
+    """Draw values (participants, delays): thin lines with offsets of ``spread`` in all, band, and thick median."""
     low, high = float(delays_ms.min()), float(delays_ms.max())
-    reach = (high - low) or 1.0
-    axes.set_xlim(low - 0.06 * reach, high + 0.06 * reach)
+    span = (high - low) or 1.0
+    axes.set_xlim(low - 0.06 * span, high + 0.06 * span)
     ticks = MaxNLocator(nbins=4, steps=[1, 2, 2.5, 5, 10]).tick_values(low, high)
     sheet.scale(axes, "x", [float(tick) for tick in ticks if low <= tick <= high])
-    shown = _lines_of(len(values))
-    offsets = np.linspace(-spread / 2, spread / 2, len(shown)) if len(shown) > 1 else np.zeros(1)
+    drawn = _drawn_participants(len(values))
+    offsets = np.linspace(-spread / 2, spread / 2, len(drawn)) if len(drawn) > 1 else np.zeros(1)
     thin: Style = {
         "alpha": 0.75 if len(values) <= 15 else 0.45,
         "linewidth": 0.45,
         "markersize": 0.9,
         "markeredgewidth": 0,
     }
-    for place, offset in zip(shown, offsets, strict=True):
+    for place, offset in zip(drawn, offsets, strict=True):
         name = f"{axes.get_label()}-participant{place + 1}"
         axes.plot(delays_ms, values[place] + offset, "o-", color=style.PARTICIPANT, zorder=2, gid=name, **thin)
     of_delays = [quartiles(column) for column in values.T]
-    q1, q3 = [it.q1 for it in of_delays], [it.q3 for it in of_delays]
+    q1, q3 = [at_delay.q1 for at_delay in of_delays], [at_delay.q3 for at_delay in of_delays]
     band = axes.fill_between(delays_ms, q1, q3, color=style.BAND, alpha=0.85, linewidth=0, zorder=1)
     band.set_gid(f"{axes.get_label()}-quartiles")
     thick: Style = {"linewidth": 1.6, "markersize": 3.6, "markerfacecolor": "white", "markeredgewidth": 1.0}
-    medians = [it.median for it in of_delays]
+    medians = [at_delay.median for at_delay in of_delays]
     axes.plot(delays_ms, medians, "o-", color=style.ACCENT, zorder=4, gid=f"{axes.get_label()}-median", **thick)
 
 
-def _lines_of(participants: int) -> list[int]:
+def _drawn_participants(participants: int) -> list[int]:
     """Return the indices of the participants drawn as lines: all if they are few, otherwise an even selection."""
     if participants <= MOST_LINES:
         return list(range(participants))
@@ -151,8 +151,8 @@ def line_words(participants: int) -> str:
     return f"{MOST_LINES} of the {participants} participants, selected at regular intervals from the sorted IDs"
 
 
-def _lowest(sheet: Sheet, axes: Axes, lowest_ms: float | None, middle_ms: float) -> None:
-    """Mark the shortest delay with a trend by a dashed line, with its value on the side that has more room."""
+def _draw_lowest_delay(sheet: Sheet, axes: Axes, lowest_ms: float | None, middle_ms: float) -> None:
+    """Mark the shortest delay with a trend by a dashed line, with its value on the side with more space."""
     if lowest_ms is None:
         return
     dashed: Style = {"linewidth": 0.9, "linestyle": (0, (3, 2)), "zorder": 3, "gid": f"{axes.get_label()}-lowest"}
@@ -162,7 +162,7 @@ def _lowest(sheet: Sheet, axes: Axes, lowest_ms: float | None, middle_ms: float)
     axes.annotate(f"≤ {lowest_ms:g}", (lowest_ms, _TOP), xytext=(across, -7), textcoords="offset points", **look)
 
 
-def legend(sheet: Sheet) -> None:
+def _draw_line_legend(sheet: Sheet) -> None:
     """Draw the legend of median, band and single lines at the right, below the heading."""
     words = ("median", "middle 50 % (IQR)", "one participant")
     y, x = 30.0, sheet.width_pt - MARGIN_PT + 12 - sum(sheet.text_width(word, SMALL) + 30 for word in words)
@@ -177,9 +177,9 @@ def legend(sheet: Sheet) -> None:
 
 
 _PLASTIC: Final = (0.7548776662, 0.5698402910)
-"""Steps that put many points evenly apart in a plane (Roberts 2018)."""
+"""Steps of a sequence that spreads points evenly in a plane (Roberts 2018)."""
 _PERSON_SPREAD: Final = 0.5
-"""How far apart the points of participants at one delay are at most, as a share of the distance of delays."""
+"""Largest distance between participants' points at one delay, as a share of the distance between delays."""
 _CURVE_LEFT_PT: Final = 30.0
 _CURVE_FOOT_PT: Final = 30.0
 _CURVE_LINE_PT: Final = 9.0
@@ -192,9 +192,9 @@ _RIGHT_PT: Final = 26.0
 def draw_threshold(
     threshold: Threshold, shares_of: Mapping[str, Mapping[float, float]], lowest_ms: float | None, look: Look
 ) -> Sheet:
-    """Draw shares, the fitted curve, its threshold with interval, and (dashed) the shortest delay with a trend.
+    """Draw shares of agreement, the fitted curve, its threshold with interval, and the shortest delay with a trend.
 
-    ``shares_of`` are each participant's shares by delay, drawn as small points.
+    ``shares_of`` has each participant's shares by delay, drawn as small points.
     """
     below = (
         "Added delay in ms.   Points: participants; circles: all participants; diamond: threshold with 95 % interval"
@@ -212,9 +212,9 @@ def draw_threshold(
     sheet.scale(axes, "y", (0.0, 0.5, 1.0), [f"{share:.0%}" for share in (0.0, 0.5, 1.0)], lines=True)
     sheet.scale(axes, "x", levels)
     step = float(np.diff(levels).min()) if len(levels) > 1 else 1.0
-    for place, (person, own) in enumerate(shares_of.items()):
+    for place, (person, shares_of_person) in enumerate(shares_of.items()):
         x, y = (_PERSON_SPREAD * ((place + 1) * golden % 1 - 0.5) for golden in _PLASTIC)
-        points = [(delay + step * x, share + 0.12 * y) for delay, share in own.items()]
+        points = [(delay + step * x, share + 0.12 * y) for delay, share in shares_of_person.items()]
         look_of_person: Style = {"color": style.PARTICIPANT, "markersize": 2.2, "markeredgewidth": 0}
         axes.plot(*zip(*points, strict=True), "o", gid=f"person-{person}", **look_of_person)
     if lowest_ms is not None:
@@ -240,10 +240,10 @@ def draw_threshold(
         at = (threshold.effect, half)
         offset: Style = {"xytext": (6 if right else -6, 5), "textcoords": "offset points"}
         axes.annotate(words, at, fontproperties=sheet.font(8.5, "bold"), color=style.TEXT, **where, **offset)
-    there = asked > 0
-    shares = np.array(threshold.yes)[there] / asked[there]
+    was_asked = asked > 0
+    shares = np.array(threshold.yes)[was_asked] / asked[was_asked]
     dots: Style = {"markersize": 4, "markerfacecolor": "white", "markeredgecolor": style.TEXT, "gid": "shares"}
-    axes.plot(levels[there], shares, "o", **dots)
+    axes.plot(levels[was_asked], shares, "o", **dots)
     sheet.text(MARGIN_PT, 28, "Proportion of answers expressing agreement", size=SMALL, colour=style.TEXT_SOFT)
     middle = sheet.height_pt - 5 - _CURVE_LINE_PT * (len(lines) - 1) / 2
     sheet.lines(MARGIN_PT, middle, lines, _CURVE_LINE_PT, size=SMALL, colour=style.TEXT_SOFT)
@@ -258,19 +258,19 @@ def title(block: Block) -> str:
     """Return the title of a block's figure."""
     if block.kind == "delays":
         return "Answers as a function of added delay" if block.revealed else "Answers by condition"
-    return f"Agreement for each {_noun(block)}" if block.revealed else "Agreement by condition"
+    return f"Agreement for each {_setting_noun(block)}" if block.revealed else "Agreement by condition"
 
 
 def counts(study: Study, block: Block) -> list[str]:
     """Return texts on n and missing ratings for a block's figure, longest first."""
-    people = set(people_a_setting(study, block).values())
+    people = set(people_by_setting(study, block).values())
     n = len(set(study.answers(block)["participant"]))
     table = study.aggregate(block)
     asked = int(table["presented"].sum())
     lacking = asked - int(table["n"].sum())
     words = f"n = {counted(n, 'participant')}"
     if people != {n}:
-        words = f"n = {_range_text(people)} of {n} participants per {_noun(block)}"
+        words = f"n = {_range_text(people)} of {n} participants per {_setting_noun(block)}"
     missing = f", {lacking} of {asked} ratings missing" if lacking else ""
     return [f"{words}{missing}", f"n = {_range_text(people)}{missing}"]
 
@@ -280,21 +280,21 @@ def _range_text(values: set[int]) -> str:
     return str(low) if low == high else f"{low} to {high}"
 
 
-def people_a_setting(study: Study, block: Block) -> dict[str, int]:
-    """Return the number of participants to whom each setting of a block was presented."""
+def people_by_setting(study: Study, block: Block) -> dict[str, int]:
+    """Return the number of participants to whom each setting of a block was presented, by code."""
     rows = _counted_trials(study, block)
     return {code: int(rows.loc[rows["code"] == code, "participant"].nunique()) for code in block.codes}
 
 
 def _caption(study: Study, block: Block) -> str:
-    return " ".join(_sentences(study, block))
+    return " ".join(_caption_sentences(study, block))
 
 
-def _sentences(study: Study, block: Block) -> Iterator[str]:
+def _caption_sentences(study: Study, block: Block) -> Iterator[str]:
     simulated = "simulated participants, not people; " if study.simulated else ""
     yield (
         f"{'Pilot. ' if study.pilot else ''}Agreement with {counted(len(block.items), 'statement')} about "
-        f"{counted(len(block.settings), _noun(block))} ({simulated}{counts(study, block)[0]})."
+        f"{counted(len(block.settings), _setting_noun(block))} ({simulated}{counts(study, block)[0]})."
     )
     over_delay = block.kind == "delays" and block.revealed
     yield from _marks_of_delays(study, block) if over_delay else _marks_of_bars(block)
@@ -348,7 +348,7 @@ def _counted_trials(study: Study, block: Block) -> pd.DataFrame:
     return study.trials[study.trials["counted"] & (study.trials["block"] == block.id)]
 
 
-def _noun(block: Block) -> str:
+def _setting_noun(block: Block) -> str:
     return block.kind.removesuffix("s") if block.revealed else "condition"
 
 
@@ -370,7 +370,7 @@ _AGREEMENT: Final = (5, 6, 7)
 
 @style.own_settings()
 def draw_agreement(study: Study, block: Block, look: Look) -> Sheet:
-    """Draw one panel per setting with a common statement axis; one answer has the same width everywhere."""
+    """Draw one panel per setting with a common axis of statements; one answer has the same width in all panels."""
     tables = [(group, part.aggregate(block)) for group, part in groups_shown(study)]
     panels = [
         (
@@ -385,17 +385,17 @@ def draw_agreement(study: Study, block: Block, look: Look) -> Sheet:
     wrapped = [ruler.wrap(item.short, 118, _LABEL_SIZE) for item in block.items]
     label_pt = max(ruler.text_width(line, _LABEL_SIZE) for lines in wrapped for line in lines)
     label_pt = max(label_pt, ruler.text_width(_COUNTED, SMALL))
-    most = _PANELS_A_ROW - _PANELS_A_ROW % len(tables) or _PANELS_A_ROW  # the groups of a setting share a row
+    most = _PANELS_A_ROW - _PANELS_A_ROW % len(tables) or _PANELS_A_ROW  # the groups of a setting are in one row
     columns = min(len(panels), most)
     panel_pt = (style.PAGE_WIDTH_PT - 2 * MARGIN_PT - label_pt - 6) / columns
-    widths = _widths([counts for *_, counts in panels], panel_pt - 2 * _PANEL_PADDING_PT)
+    widths = _panel_widths([counts for *_, counts in panels], panel_pt - 2 * _PANEL_PADDING_PT)
 
     rows = -(-len(panels) // columns)
     plot_pt = len(block.items) * _ROW_PT
     row_pt = _HEADER_PT + plot_pt + _FOOT_PT
     sheet = look.sheet(_TOP_PT + rows * row_pt + (rows - 1) * 12)
     left_pt = MARGIN_PT + label_pt + 6
-    _legend(sheet, block.labels, left_pt)
+    _draw_level_legend(sheet, block.labels, left_pt)
     for place, (code, name, counts) in enumerate(panels):
         row, column = divmod(place, columns)
         top, x = _TOP_PT + row * (row_pt + 12) + _HEADER_PT, left_pt + column * panel_pt
@@ -406,13 +406,13 @@ def draw_agreement(study: Study, block: Block, look: Look) -> Sheet:
         else:
             sheet.line((x, x), (top - 14, top + plot_pt + 10), color=style.BORDER, linewidth=0.5)
         x += (panel_pt - widths.total) / 2
-        _agreement_panel(sheet, code, name, counts, widths, x, top)
+        _draw_agreement_panel(sheet, code, name, counts, widths, x, top)
     return sheet
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Widths:
-    """Common widths of all panels [pt]: one answer, both sides of the centre line, neutral column, and n column."""
+class _PanelWidths:
+    """Widths that all panels have [pt]: one answer, both sides of the centre line, neutral column, and n column."""
 
     answer: float
     left: float
@@ -425,29 +425,31 @@ class _Widths:
         return self.left + self.right + _NEUTRAL_GAP_PT + self.neutral + self.n
 
 
-def _widths(tables: Sequence[pd.DataFrame], room: float) -> _Widths:
-    """Return the largest common width per answer that fits, and the room for labels."""
-    most = [
+def _panel_widths(tables: Sequence[pd.DataFrame], room: float) -> _PanelWidths:
+    """Return the widths with the largest width of an answer that fits into ``room``."""
+    largest_counts = [
         max(int(table[[f"count_{level}" for level in levels]].sum(axis=1).max()) for table in tables)
         for levels in (_DISAGREEMENT, _AGREEMENT, (NEUTRAL,))
     ]
     n = 17.0 if any(_lacks_answers(table).any() for table in tables) else 0.0
     answer = _WIDEST_ANSWER_PT
-    while sum(sides := [max(answer * count, least) for count, least in zip(most, (32.0, 26.0, 27.0), strict=True)]) > (
-        room - (_NEUTRAL_GAP_PT + n)
-    ):
+    while sum(
+        side_widths := [
+            max(answer * count, least) for count, least in zip(largest_counts, (32.0, 26.0, 27.0), strict=True)
+        ]
+    ) > (room - (_NEUTRAL_GAP_PT + n)):
         answer *= 0.99
-    left, right, neutral = sides
-    return _Widths(answer=answer, left=left, right=right, neutral=neutral, n=n)
+    left, right, neutral = side_widths
+    return _PanelWidths(answer=answer, left=left, right=right, neutral=neutral, n=n)
 
 
 def _lacks_answers(counts: pd.DataFrame) -> pd.Series[bool]:
-    """Return for each row whether an answer is missing, including those of excluded trials."""
+    """Return for each row whether an answer is missing, including answers of excluded trials."""
     return counts["n"] < counts["presented"] + counts["presented_excluded"]
 
 
-def _legend(sheet: Sheet, labels: Sequence[str], x: float) -> None:
-    """Draw the legend of the levels in order, with the neutral one apart as in the panels."""
+def _draw_level_legend(sheet: Sheet, labels: Sequence[str], x: float) -> None:
+    """Draw the legend of the levels in order, followed by the neutral level as in the panels."""
     short = _legend_labels(labels)
     order = [*_DISAGREEMENT[::-1], *_AGREEMENT, NEUTRAL]
     size, swatch, gap = SMALL, 7.0, 9.0
@@ -478,10 +480,10 @@ def _legend_labels(labels: Sequence[str]) -> list[str]:
     return short if len(set(short[:3])) == 3 and len(set(short[4:])) == 3 else list(labels)
 
 
-def _agreement_panel(
-    sheet: Sheet, name: str, title: str, counts: pd.DataFrame, widths: _Widths, x: float, top: float
+def _draw_agreement_panel(
+    sheet: Sheet, name: str, title: str, counts: pd.DataFrame, widths: _PanelWidths, x: float, top: float
 ) -> None:
-    """Draw one panel; the unit of the axes is one answer, and SVG elements are named ``name``."""
+    """Draw one panel; the unit of the axes is one answer, and the IDs of SVG elements begin with ``name``."""
     plot_pt = len(counts) * _ROW_PT
     zero = x + widths.left
     base = zero + widths.right + _NEUTRAL_GAP_PT
@@ -494,26 +496,28 @@ def _agreement_panel(
     axes.set_label(name)
     axes.set_xlim(-widths.left / widths.answer, (widths.total - widths.left) / widths.answer)
     axes.set_ylim(len(counts) - 0.5, -0.5)
-    apart = (base - zero) / widths.answer
-    lacking = _lacks_answers(counts)
+    neutral_edge = (base - zero) / widths.answer
+    has_missing = _lacks_answers(counts)
     for y, (_, row) in enumerate(counts.iterrows()):
-        of = {level: int(row[column]) for level, column in enumerate(COUNT_COLUMNS, start=1)}
-        edge = -sum(of[level] for level in _DISAGREEMENT)
+        level_counts = {level: int(row[column]) for level, column in enumerate(COUNT_COLUMNS, start=1)}
+        edge = -sum(level_counts[level] for level in _DISAGREEMENT)
         lefts: dict[int, float] = {}
         for level in (*_DISAGREEMENT[::-1], *_AGREEMENT):
             lefts[level] = edge
-            edge += of[level]
-        lefts[NEUTRAL] = apart
+            edge += level_counts[level]
+        lefts[NEUTRAL] = neutral_edge
         for level in (*_DISAGREEMENT, *_AGREEMENT, NEUTRAL):
-            _segment(sheet, axes, lefts[level], y, level, of[level], widths.answer)
-        if lacking.iloc[y]:
+            _draw_answers_of_level(sheet, axes, lefts[level], y, level, level_counts[level], widths.answer)
+        if has_missing.iloc[y]:
             place = (x + widths.total, top + (y + 0.5) * _ROW_PT + 2)
             sheet.text(*place, f"n {row['n']}", size=SMALL, colour=style.TEXT_SOFT, ha="right")
     axes.axvline(0, color=style.TEXT_SOFT, linewidth=0.9, zorder=3)
-    axes.axvline(apart, color=style.AXIS, linewidth=0.5, zorder=3)
+    axes.axvline(neutral_edge, color=style.AXIS, linewidth=0.5, zorder=3)
 
 
-def _segment(sheet: Sheet, axes: Axes, left: float, y: int, level: int, count: int, answer_pt: float) -> None:
+def _draw_answers_of_level(
+    sheet: Sheet, axes: Axes, left: float, y: int, level: int, count: int, answer_pt: float
+) -> None:
     """Draw ``count`` answers of one level from ``left``, with the number inside if it fits."""
     if count == 0:
         return
@@ -552,31 +556,31 @@ def answers_picture(
             f"{study.folder}: no completed session contains answers to {block.id!r} yet ({states}). Figures "
             "require completed sessions, but an export contains all available data"
         )
-    words = _caption(study, block)
+    caption = _caption(study, block)
     if lowest:
-        words += (
+        caption += (
             " Dashed line: shortest delay with a trend (step-down test, error rate controlled across all statements); "
             "it is an upper bound for the shortest noticeable delay."
         )
     draw = partial(draw_block, study, block, lowest)
     table = pd.concat(part.aggregate(block).assign(group=group or part.split) for group, part in groups_shown(study))
     numbers = tab_separated(study, table if study.split else table.drop(columns="group"))
-    return picture_of(study, block.id, name, title(block), words, draw, forms, counts(study, block), numbers)
+    return picture_of(study, block.id, name, title(block), caption, draw, forms, counts(study, block), numbers)
 
 
 def draw_block(study: Study, block: Block, lowest: Mapping[str, float], look: Look) -> Sheet:
-    """Draw the answers of a block; against delay, a participant's repeated answers are drawn as their median."""
+    """Draw the answers of a block; against delay, the median of a participant's repeated answers is drawn."""
     if block.kind != "delays" or not block.revealed:
         return draw_agreement(study, block, look)
-    plots, marked = [], []
+    plots, lowest_delays = [], []
     for group, part in groups_shown(study):
-        own = part.answers(block)
-        people = sorted(own["participant"].unique())
+        answers = part.answers(block)
+        people = sorted(answers["participant"].unique())
         for item in block.items:
-            plots.append((with_group(item.short, group), by_participant(own, people, block.columns, item.id)))
-            marked.append(None if group else lowest.get(item.id))
-    foot = f"Added delay in ms.   1 = {block.labels[0]}, 7 = {block.labels[-1]}."
-    return draw_answers(plots, block.delays_ms, marked, foot, look)
+            plots.append((with_group(item.short, group), by_participant(answers, people, block.columns, item.id)))
+            lowest_delays.append(None if group else lowest.get(item.id))
+    footnote = f"Added delay in ms.   1 = {block.labels[0]}, 7 = {block.labels[-1]}."
+    return draw_answers(plots, block.delays_ms, lowest_delays, footnote, look)
 
 
 _CELL_PT: Final = (52.0, 26.0)
@@ -585,7 +589,7 @@ _MATRIX_TOP_PT: Final = 30.0
 _MATRIX_FOOT_PT: Final = 18.0
 _GROUND: Final = (0.043, 0.396, 0.639)  # style.ACCENT
 _DARKEST: Final = 0.6
-"""Opacity of the ground under all of a row: the counts, always dark, keep a contrast of at least 5."""
+"""Opacity of a cell with all answers of a row, at which the dark counts have a contrast of at least 5."""
 
 
 @style.own_settings()
@@ -601,15 +605,15 @@ def draw_recognition(
     ``right`` are the columns of the correct names. The last two columns are undecided and unanswered.
     """
     names = [*labels, "undecided", "unanswered"]
-    kept = [place for place in range(len(names)) if place <= len(labels) or any(row[place] for row in table)]
+    shown_columns = [place for place in range(len(names)) if place <= len(labels) or any(row[place] for row in table)]
     ruler = Sheet(style.PAGE_WIDTH_PT, 72, look.fonts)
     first_pt = max(ruler.text_width(name, 7.5) for name in settings) + 10
     width, height = _CELL_PT
-    names_wrapped = [ruler.wrap(names[place], width - 4, SMALL) for place in kept]
+    names_wrapped = [ruler.wrap(names[place], width - 4, SMALL) for place in shown_columns]
     top = _MATRIX_TOP_PT + _NAMES_PT + 8.5 * (max(map(len, names_wrapped)) - 1)
     sheet = look.sheet(top + height * len(settings) + _MATRIX_FOOT_PT)
     left = MARGIN_PT + first_pt
-    for column, place in enumerate(kept):
+    for column, place in enumerate(shown_columns):
         x = left + column * width + (8.0 if place >= len(labels) else 0.0)
         colour = style.TEXT if place < len(labels) else style.TEXT_SOFT
         for number, line in enumerate(reversed(names_wrapped[column])):
@@ -619,15 +623,15 @@ def draw_recognition(
         axes.set_xlim(0, 1)
         axes.set_ylim(len(table), 0)
         for row, counts in enumerate(table):
-            _cell(sheet, axes, row, counts[place], sum(counts), right=right[row] == place)
+            _draw_cell(sheet, axes, row, counts[place], sum(counts), right=right[row] == place)
     for number, name in enumerate(settings):
         sheet.text(left - 6, top + height * (number + 0.5) + 2.6, name, size=7.5, ha="right")
-    foot = "Cells show counts with row percentages; correct names are outlined."
-    sheet.text(MARGIN_PT, sheet.height_pt - 6, foot, size=SMALL, colour=style.TEXT_SOFT)
+    footnote = "Cells show counts with row percentages; correct names are outlined."
+    sheet.text(MARGIN_PT, sheet.height_pt - 6, footnote, size=SMALL, colour=style.TEXT_SOFT)
     return sheet
 
 
-def _cell(sheet: Sheet, axes: Axes, row: int, count: int, total: int, *, right: bool) -> None:
+def _draw_cell(sheet: Sheet, axes: Axes, row: int, count: int, total: int, *, right: bool) -> None:
     share = count / total if total else 0.0
     ground = (*_GROUND, _DARKEST * share) if count else style.GROUND
     edge, width = (style.TEXT, 1.6) if right else (style.BORDER, 0.5)

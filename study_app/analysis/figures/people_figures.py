@@ -1,6 +1,6 @@
-"""Figures of people: each participant's numbers as small points, and beside them the mean with its interval.
+"""Figures with a small point for each participant's value, next to the mean with its interval.
 
-A study that is split by group shows the points and the mean of each group side by side, or one group alone.
+If a study is split by group, the points and means of all groups are side by side, or only one group is shown.
 """
 
 import math
@@ -22,20 +22,20 @@ from study_app.analysis.wording import percent
 from study_app.protocol.participants import EACH_GROUP
 
 _A_ROW: Final = 3
-"""Panels side by side."""
+"""Number of panels in a row."""
 WIDTH_PT: Final = 420.0
-"""Of a figure that stands beside its answer."""
+"""Width of a figure that is next to its answer."""
 _PANEL_PT: Final = 128.0
 _SMALL_PANEL_PT: Final = 72.0
 _LEAST_PANEL_PT: Final = 52.0
-"""Of a panel in one row, in two, and in more."""
+"""Heights of panels in one row, in two rows, and in more."""
 _MOST_COLUMN_PT: Final = 120.0
 _NARROW_PT: Final = 290.0
-"""Least width of a figure: its heading must fit."""
+"""Smallest width of a figure, in which its heading fits."""
 _OF_MANY_PT: Final = 300.0
-"""Most width of a column, and of one in which each participant has an interval."""
+"""Largest width of a column in which each participant has an interval; `_MOST_COLUMN_PT` is that of others."""
 MOST_LETTERS: Final = 64
-"""Of the title of a scale; a longer one would reach the legend."""
+"""The most letters of the title of a scale, which does not reach the legend."""
 _ROW_GAP_PT: Final = 6.0
 _LEFT_PT: Final = 34.0
 _GAP_PT: Final = 12.0
@@ -43,22 +43,22 @@ _TITLE_PT: Final = 10.0
 _NAME_PT: Final = 8.6
 _HEAD_PT: Final = 38.0
 _ROOM: Final = 0.07
-"""Beyond the ends of a scale, as a share of it."""
+"""Margin beyond the ends of a scale, as a share of the scale."""
 _SPREAD: Final = 0.16
-"""How far joined points of a column are apart at most, as a share of the distance of columns."""
+"""Largest distance between joined points of a column, as a share of the distance between columns."""
 _SPREAD_OF_ENDS: Final = 0.26
-"""The same where each participant has an interval: they stand in the order of their numbers."""
+"""The same if each participant has an interval; participants are then sorted by value."""
 _SPREAD_ALONE: Final = 0.2
-"""The same where points are not joined: only points that would touch are apart."""
+"""The same if points are not joined; only points that would touch are moved apart."""
 _GOLDEN: Final = 0.6180339887
-"""Steps that put many points evenly apart."""
+"""Steps of a sequence that spreads points evenly."""
 _ASIDE: Final = 0.27
-"""How far the mean is from the points that it is of."""
+"""Distance of a mean from its points, as a share of the distance between columns."""
 _GROUPS: Final = (style.ACCENT, style.SECOND, "#5d6a75", "#6d1007", "#5d8aa8", "#02256d")
 _MARKERS: Final = "osD^vP"
 _LEAST_TICKS: Final = 3
 _GROUP_STEP: Final = 0.8
-"""How far apart the first and last of many groups of a column are, as a share of the distance of columns."""
+"""Distance over which the groups of a column are spread, as a share of the distance between columns."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -72,9 +72,9 @@ class Mean:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Column:
-    """The numbers of all participants, in the same order in every column, above one name, and their mean.
+    """The values of all participants above one name, in the same order in every column, and their mean.
 
-    ``ends`` are the ends of each participant's own interval; ``group`` is the group that the column is of.
+    ``ends`` has the ends of each participant's interval; ``group`` is the group whose participants the column shows.
     """
 
     name: str
@@ -83,10 +83,14 @@ class Column:
     ends: Mapping[str, tuple[float, float]] | None = None
     group: str = ""
 
-    def of_group(self, people: Mapping[str, str], group: str, *, log: bool, level: float = 0.95) -> "Column":
-        """Return the column of one group of ``people``, with the mean of its values and Student's interval."""
+    def select_group(self, people: Mapping[str, str], group: str, *, log: bool, level: float = 0.95) -> "Column":
+        """Return the column with the values of one group; ``people`` maps participants to groups."""
         values = {person: value for person, value in self.values.items() if people.get(person) == group}
-        ends = None if self.ends is None else {who: own for who, own in self.ends.items() if who in values}
+        ends = (
+            None
+            if self.ends is None
+            else {person: interval for person, interval in self.ends.items() if person in values}
+        )
         mean = mean_of((math.log(value) if log else value for value in values.values()), level)
         if mean is not None and log:
             low, high = (None if end is None else math.exp(end) for end in (mean.low, mean.high))
@@ -101,13 +105,13 @@ class Panel:
     Parameters
     ----------
     title : its heading
-    places : positions of the columns on a numeric axis; without them columns are evenly spaced
+    places : positions of the columns on a numeric axis; by default columns are evenly spaced
     joined : whether the points of a participant are joined
     share : its width as a share of all panels of a row
-    line, bound : a number, and the ends of a range, to be marked
+    line, bound : a value and a range to mark
     log : whether the scale is logarithmic
     level : the confidence level of the intervals of means
-    ends : ends of the scale, labelled like its middle; by default from the numbers
+    ends : ends of the scale, which has labels at the ends and in the middle; by default from the values
     ticks : positions and names below the columns; by default each column's own
     """
 
@@ -134,9 +138,9 @@ class Panel:
         return self.ticks or [(x, column.name) for x, column in zip(self.xs, self.columns, strict=True)]
 
     def split(self, people: Mapping[str, str], groups: Sequence[str]) -> "Panel":
-        """Return the panel with a column for each of ``groups`` of ``people`` in place of each column."""
+        """Return the panel with a column for each group in place of each column; ``people`` maps IDs to groups."""
         columns = [
-            column.of_group(people, group, log=self.log, level=self.level)
+            column.select_group(people, group, log=self.log, level=self.level)
             for column in self.columns
             for group in groups
         ]
@@ -150,12 +154,17 @@ class Panel:
 
     @property
     def numbers(self) -> list[float]:
-        """All numbers that the scale must include."""
+        """All values that the scale must include."""
         means = [column.mean for column in self.columns if column.mean is not None]
-        of_means = [end for mean in means for end in (mean.value, mean.low, mean.high) if end is not None]
-        own = [end for column in self.columns for ends in (column.ends or {}).values() for end in ends]
+        mean_ends = [end for mean in means for end in (mean.value, mean.low, mean.high) if end is not None]
+        interval_ends = [end for column in self.columns for ends in (column.ends or {}).values() for end in ends]
         marks = [*([self.line] if self.line is not None else []), *(self.bound or ())]
-        return [*(value for column in self.columns for value in column.values.values()), *of_means, *own, *marks]
+        return [
+            *(value for column in self.columns for value in column.values.values()),
+            *mean_ends,
+            *interval_ends,
+            *marks,
+        ]
 
 
 def people_picture(
@@ -178,15 +187,15 @@ def people_picture(
         panels = [panel.split(members, groups) for panel in panels]
         caption += f" Diamonds show group means with {percent(panels[0].level)} confidence intervals (Student's t)."
     people = {person for panel in panels for column in panel.columns for person in column.values}
-    own = {person: group for person, group in members.items() if person in people}
-    shown = own if study.split in ("", EACH_GROUP) else None
-    draw = partial(draw_people, panels, above=above, below=below, members=shown, shared=shared)
+    shown_members = {person: group for person, group in members.items() if person in people}
+    coloured_members = shown_members if study.split in ("", EACH_GROUP) else None
+    draw = partial(draw_people, panels, above=above, below=below, members=coloured_members, shared=shared)
     n = (f"n = {len(people)}",)
-    return picture_of(study, block, name, title, caption, draw, forms, n, numbers_of_panels(panels, own))
+    return picture_of(study, block, name, title, caption, draw, forms, n, numbers_of_panels(panels, shown_members))
 
 
 def numbers_of_panels(panels: Sequence[Panel], members: Mapping[str, str] = MappingProxyType({})) -> str:
-    """Return the numbers of panels as tab-separated lines: one per participant, then means with intervals.
+    """Return the values of panels as tab-separated lines: one for each participant, then means with intervals.
 
     With ``members``, the second column is the group.
     """
@@ -202,14 +211,19 @@ def numbers_of_panels(panels: Sequence[Panel], members: Mapping[str, str] = Mapp
 
     rows = [["participant", *(["group"] if members else []), *columns]]
     for person in people:
-        values = (next((it.values[person] for it in same if person in it.values), None) for same in columns.values())
+        values = (
+            next((column.values[person] for column in same if person in column.values), None)
+            for same in columns.values()
+        )
         rows.append(row(person, members.get(person, ""), values))
     interval = _interval_words(panels)
     means = {"value": "mean", "low": f"lower end of the {interval}", "high": f"upper end of the {interval}"}
     for field, words in means.items():
         for group in dict.fromkeys(column.group for same in columns.values() for column in same):
-            own = (next((it.mean for it in same if it.group == group), None) for same in columns.values())
-            rows.append(row(words, group, (getattr(mean, field, None) for mean in own)))
+            group_means = (
+                next((column.mean for column in same if column.group == group), None) for same in columns.values()
+            )
+            rows.append(row(words, group, (getattr(mean, field, None) for mean in group_means)))
     return "".join("\t".join(cells) + "\n" for cells in rows)
 
 
@@ -236,7 +250,7 @@ def draw_people(
     members: Mapping[str, str] | None = None,
     shared: bool = False,
 ) -> Sheet:
-    """Draw panels, `_A_ROW` of them side by side.
+    """Draw panels in rows of `_A_ROW`.
 
     Parameters
     ----------
@@ -249,38 +263,40 @@ def draw_people(
     width_pt = WIDTH_PT
     ruler = Sheet(width_pt, 72, look.fonts)
     rows = [panels[place : place + _A_ROW] for place in range(0, len(panels), _A_ROW)]
-    inside = width_pt - MARGIN_PT
-    widths = [_widths(row, rows[0], inside, shared=shared) for row in rows]
+    available_pt = width_pt - MARGIN_PT
+    widths = [_panel_widths(row, rows[0], available_pt, shared=shared) for row in rows]
     if len(panels) == 1:
         width_pt = min(width_pt, max(_NARROW_PT, _LEFT_PT + widths[0][0] + MARGIN_PT))
     titles = [
-        [ruler.wrap(panel.title, width, SMALL, "bold") for panel, width in zip(row, wide, strict=True)]
-        for row, wide in zip(rows, widths, strict=True)
+        [ruler.wrap(panel.title, width, SMALL, "bold") for panel, width in zip(row, row_widths, strict=True)]
+        for row, row_widths in zip(rows, widths, strict=True)
     ]
     names = [
-        [_names(ruler, panel, width) for panel, width in zip(row, wide, strict=True)]
-        for row, wide in zip(rows, widths, strict=True)
+        [_wrapped_names(ruler, panel, width) for panel, width in zip(row, row_widths, strict=True)]
+        for row, row_widths in zip(rows, widths, strict=True)
     ]
-    title_pt = [_TITLE_PT * max((len(one) for one in row), default=0) * any(panel.title for panel in of)
-                for row, of in zip(titles, rows, strict=True)]  # fmt: skip
+    title_pt = [_TITLE_PT * max(map(len, lines), default=0) * any(panel.title for panel in row)
+                for lines, row in zip(titles, rows, strict=True)]  # fmt: skip
     name_pt = [_NAME_PT * max(len(lines) for panel in row for lines in panel) + 8 for row in names]
     head = _HEAD_PT + (10.0 if groups else 0.0)
     height = head + sum(title_pt) + sum(name_pt) + len(rows) * (panel_pt + _ROW_GAP_PT) + (8.0 if below else 2.0)
     sheet = look.sheet(height, width_pt)
     logarithmic = " (logarithmic scale)" if any(panel.log for panel in panels) else ""
     sheet.text(MARGIN_PT, 28, f"{above}{logarithmic}", size=SMALL, colour=style.TEXT_SOFT)
-    _legend(sheet, groups, _interval_words(panels))
+    _draw_legend(sheet, groups, _interval_words(panels))
     y = head
-    for row, wide, of_titles, of_names, title, name in zip(rows, widths, titles, names, title_pt, name_pt, strict=True):
+    for row, row_widths, row_titles, row_names, title, name in zip(
+        rows, widths, titles, names, title_pt, name_pt, strict=True
+    ):
         x = 0.0
-        for place, (panel, width) in enumerate(zip(row, wide, strict=True)):
+        for place, (panel, width) in enumerate(zip(row, row_widths, strict=True)):
             x += _LEFT_PT if place == 0 or not shared else _GAP_PT
-            for number, line in enumerate(of_titles[place]):
+            for number, line in enumerate(row_titles[place]):
                 sheet.text(x, y + _TITLE_PT * number + 5, line, size=SMALL, weight="bold")
             axes = sheet.axes(x, y + title, width, panel_pt)
-            ends = _scale(sheet, axes, panel, panels if shared else [panel], words=place == 0 or not shared)
+            ends = _draw_scale(sheet, axes, panel, panels if shared else [panel], words=place == 0 or not shared)
             axes.set_ylim(*ends)
-            _draw_panel(sheet, axes, panel, members or {}, groups, of_names[place])
+            _draw_panel(sheet, axes, panel, members or {}, groups, row_names[place])
             x += width
         y += title + panel_pt + name + _ROW_GAP_PT
     if below:
@@ -289,29 +305,29 @@ def draw_people(
 
 
 def panel_rows(panels: int) -> int:
-    """Return the number of rows in which so many panels are drawn."""
+    """Return the number of rows for a number of panels."""
     return -(-panels // _A_ROW)
 
 
-def _widths(row: Sequence[Panel], first: Sequence[Panel], inside: float, *, shared: bool) -> list[float]:
-    """Return the widths of a row's panels [pt], which are as wide as those of the ``first`` row, if this is full."""
-    room = inside - (_LEFT_PT + (len(first) - 1) * _GAP_PT if shared else len(first) * _LEFT_PT)
+def _panel_widths(row: Sequence[Panel], first: Sequence[Panel], available_pt: float, *, shared: bool) -> list[float]:
+    """Return the widths of a row's panels [pt], which correspond to those of the ``first`` row."""
+    panels_pt = available_pt - (_LEFT_PT + (len(first) - 1) * _GAP_PT if shared else len(first) * _LEFT_PT)
     total = sum(panel.share for panel in first)
-    most = [
+    limits = [
         _OF_MANY_PT if any(column.ends for column in panel.columns) else _MOST_COLUMN_PT * len(panel.columns)
         for panel in row
     ]
-    return [min(room * panel.share / total, limit) for panel, limit in zip(row, most, strict=True)]
+    return [min(panels_pt * panel.share / total, limit) for panel, limit in zip(row, limits, strict=True)]
 
 
-def _names(ruler: Sheet, panel: Panel, width: float) -> list[list[str]]:
-    """Return the names of columns, wrapped into lines."""
+def _wrapped_names(ruler: Sheet, panel: Panel, width: float) -> list[list[str]]:
+    """Return the lines of each column's name."""
     room = width / (len(panel.names) or 1) - 3
     return [ruler.wrap(name, room, SMALL) for _, name in panel.names]
 
 
-def _legend(sheet: Sheet, groups: Sequence[str], interval: str) -> None:
-    """Draw the legend of diamonds and points at the right; those of participants have the colours of their groups."""
+def _draw_legend(sheet: Sheet, groups: Sequence[str], interval: str) -> None:
+    """Draw the legend of means, and of participants or, with groups, of each group's colour and marker."""
     x = sheet.width_pt - MARGIN_PT
     marks = ((f"mean, {interval}", "D", 3.6), ("participant", "o", POINT["markersize"]))
     for words, marker, size in marks[: 1 if groups else 2]:
@@ -330,23 +346,23 @@ def _legend(sheet: Sheet, groups: Sequence[str], interval: str) -> None:
         x -= 8
 
 
-def _scale(sheet: Sheet, axes: Axes, panel: Panel, of: Sequence[Panel], *, words: bool) -> tuple[float, float]:
-    """Draw the scale of a panel; return its limits."""
+def _draw_scale(sheet: Sheet, axes: Axes, panel: Panel, common: Sequence[Panel], *, words: bool) -> tuple[float, float]:
+    """Draw the scale of a panel for the values of the panels ``common``; return its limits."""
     ends = panel.ends
     if ends is None:
-        numbers = [number for one in of for number in one.numbers if number > 0 or not panel.log]
+        numbers = [number for other in common for number in other.numbers if number > 0 or not panel.log]
         low, high = min(numbers, default=0.0), max(numbers, default=1.0)
         if panel.log:
             factor = max((high / low) ** 0.06, 1.08)
             ends = low / factor, high * factor
         else:
-            room = _ROOM * ((high - low) or 1.0)
-            ends = low - room, high + room
+            margin = _ROOM * ((high - low) or 1.0)
+            ends = low - margin, high + margin
         ticks = scale_ticks(*ends, log=panel.log)
     else:
         low, high = ends
-        room, ticks = _ROOM * (high - low), [low, (low + high) / 2, high]
-        ends = low - room, high + room
+        margin, ticks = _ROOM * (high - low), [low, (low + high) / 2, high]
+        ends = low - margin, high + margin
     if panel.log:
         axes.set_yscale("log")
         axes.minorticks_off()
@@ -389,31 +405,31 @@ def _draw_panel(
         axes.axhline(panel.line, color=style.AXIS, linewidth=0.8, linestyle=(0, (4, 3)), zorder=1)
     people = sorted({person for column in panel.columns for person in column.values})
     if sum(len(column.values) for column in panel.columns) == len(people) and panel.columns[0].ends is None:
-        offsets = _offsets_of_points(axes, panel, _SPREAD_ALONE * step)
+        offsets = _point_offsets(axes, panel, _SPREAD_ALONE * step)
     else:
-        offsets = dict(zip(people, _offsets(panel, people) * step, strict=True))
+        offsets = dict(zip(people, _joined_offsets(panel, people) * step, strict=True))
     for person in people:
-        at = [(x + offsets[person], column.values[person])
+        points = [(x + offsets[person], column.values[person])
               for x, column in zip(xs, panel.columns, strict=True) if person in column.values]  # fmt: skip
         number = groups.index(members[person]) if person in members else None
         colour = style.PARTICIPANT if number is None else _GROUPS[number % len(_GROUPS)]
-        if panel.joined and len(at) > 1:
-            axes.plot(*zip(*at, strict=True), color=colour, linewidth=0.6, alpha=0.55, zorder=2)
+        if panel.joined and len(points) > 1:
+            axes.plot(*zip(*points, strict=True), color=colour, linewidth=0.6, alpha=0.55, zorder=2)
         marker = "o" if number is None else _MARKERS[number % len(_MARKERS)]
         point = POINT | {"marker": marker, "color": colour}
-        axes.plot(*zip(*at, strict=True), **point, zorder=3, gid=f"person-{person}")
+        axes.plot(*zip(*points, strict=True), **point, zorder=3, gid=f"person-{person}")
     for x, column in zip(xs, panel.columns, strict=True):
         ink = _GROUPS[groups.index(column.group) % len(_GROUPS)] if column.group in groups else style.TEXT
         for person, ends in (column.ends or {}).items():
             axes.plot([x + offsets[person]] * 2, ends, color=style.PARTICIPANT, linewidth=0.5, zorder=2)
         if column.mean is not None:
-            aside = x + (_ASIDE * step if column.values else 0.0)
-            axes.plot([aside], [column.mean.value], "D", color=ink, markersize=4, zorder=5, gid="mean")
-            _draw_interval(axes, aside, column.mean, ink)
+            mean_x = x + (_ASIDE * step if column.values else 0.0)
+            axes.plot([mean_x], [column.mean.value], "D", color=ink, markersize=4, zorder=5, gid="mean")
+            _draw_interval(axes, mean_x, column.mean, ink)
 
 
 def _draw_interval(axes: Axes, x: float, mean: Mean, colour: str) -> None:
-    """Draw the interval of a mean; an arrow marks an end beyond the scale."""
+    """Draw the interval of a mean, with an arrow at an end beyond the scale."""
     if mean.low is None or mean.high is None:
         return
     bottom, top = axes.get_ylim()
@@ -425,8 +441,8 @@ def _draw_interval(axes: Axes, x: float, mean: Mean, colour: str) -> None:
             axes.plot([x], [end], marker, color=colour, markersize=4, markeredgewidth=0, zorder=4)
 
 
-def _offsets_of_points(axes: Axes, panel: Panel, most: float) -> dict[str, float]:
-    """Return the horizontal offset of each participant's only point."""
+def _point_offsets(axes: Axes, panel: Panel, most: float) -> dict[str, float]:
+    """Return the horizontal offset of each participant's point, if each has only one."""
     per_pt = 72 / axes.figure.dpi
     (left, _), (right, _) = axes.transData.transform([(0.0, axes.get_ylim()[0]), (1.0, axes.get_ylim()[0])])
     offsets: dict[str, float] = {}
@@ -437,11 +453,11 @@ def _offsets_of_points(axes: Axes, panel: Panel, most: float) -> dict[str, float
     return offsets
 
 
-def _offsets(panel: Panel, people: Sequence[str]) -> np.ndarray:
+def _joined_offsets(panel: Panel, people: Sequence[str]) -> np.ndarray:
     """Return the horizontal offset of each participant's points, which are joined or have intervals."""
     if len(people) < 2:
         return np.zeros(len(people))
-    first = [next(it.values[person] for it in panel.columns if person in it.values) for person in people]
+    first = [next(column.values[person] for column in panel.columns if person in column.values) for person in people]
     order = np.argsort(np.argsort(first, kind="stable"))
     if panel.columns[0].ends is not None:
         return np.asarray((order / (len(people) - 1) - 0.75) * 2 * _SPREAD_OF_ENDS)

@@ -1,4 +1,4 @@
-"""The figures of questions that no block of statements holds."""
+"""Figures of questions other than statements after trials."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -48,7 +48,7 @@ class _QuestionFigure:
     caption: str
 
 
-def rows(names: Sequence[str], ns: Sequence[int], look: Look, *, row_pt: float) -> tuple[Sheet, Axes]:
+def _draw_rows(names: Sequence[str], ns: Sequence[int], look: Look, *, row_pt: float) -> tuple[Sheet, Axes]:
     """Return a sheet and axes with one row per name; row k is at y = k, the first at the top."""
     sheet = look.sheet(_TOP_PT + row_pt * len(names) + _FOOT_PT)
     axes = sheet.axes(_LEFT_PT, _TOP_PT, sheet.width_pt - _LEFT_PT - _RIGHT_PT, row_pt * len(names))
@@ -62,8 +62,8 @@ def rows(names: Sequence[str], ns: Sequence[int], look: Look, *, row_pt: float) 
     return sheet, axes
 
 
-def _rows_of_groups(result: QuestionResult, look: Look, row_pt: float) -> tuple[Sheet, Axes]:
-    return rows(
+def _draw_group_rows(result: QuestionResult, look: Look, row_pt: float) -> tuple[Sheet, Axes]:
+    return _draw_rows(
         [group.name for group in result.groups],
         [int(group.numbers["n"]) for group in result.groups],
         look,
@@ -71,7 +71,7 @@ def _rows_of_groups(result: QuestionResult, look: Look, row_pt: float) -> tuple[
     )
 
 
-def _ends(sheet: Sheet, y: float, low: str, high: str) -> None:
+def _draw_end_labels(sheet: Sheet, y: float, low: str, high: str) -> None:
     """Label the ends of the axis."""
     sheet.text(_LEFT_PT, y, low, size=SMALL, colour=style.TEXT_SOFT)
     sheet.text(sheet.width_pt - _RIGHT_PT, y, high, size=SMALL, colour=style.TEXT_SOFT, ha="right")
@@ -80,20 +80,20 @@ def _ends(sheet: Sheet, y: float, low: str, high: str) -> None:
 _ROW_PT: Final = 30.0
 _BAND: Final = 0.22
 _MOST_PT: Final = 30.0
-"""Farthest point from the middle of a row."""
+"""Largest distance of a point from the middle of a row."""
 
 
 @style.own_settings()
-def draw_distribution(asked: PlacedQuestion, result: QuestionResult, look: Look) -> Sheet:
+def draw_distribution(question: PlacedQuestion, result: QuestionResult, look: Look) -> Sheet:
     """Draw the distribution of the answers."""
     groups = result.groups
     values = [value for group in groups for value in group.numbers["values"]]
-    low, high = asked.bounds or (min(values, default=0.0), max(values, default=1.0))
+    low, high = question.bounds or (min(values, default=0.0), max(values, default=1.0))
     span = (high - low) or 1.0
     per_value = (style.PAGE_WIDTH_PT - _LEFT_PT - _RIGHT_PT) / (1.06 * span)
     offsets = [spread_points(per_value * np.array(group.numbers["values"]), _MOST_PT) for group in groups]
-    row_pt = max(_ROW_PT, *(2 * np.abs(own).max(initial=0.0) + 10 for own in offsets))
-    sheet, axes = _rows_of_groups(result, look, row_pt)
+    row_pt = max(_ROW_PT, *(2 * np.abs(row_offsets).max(initial=0.0) + 10 for row_offsets in offsets))
+    sheet, axes = _draw_group_rows(result, look, row_pt)
     axes.set_xlim(low - 0.03 * span, high + 0.03 * span)
     for place, group in enumerate(groups):
         numbers = group.numbers
@@ -103,9 +103,9 @@ def draw_distribution(asked: PlacedQuestion, result: QuestionResult, look: Look)
         axes.fill_between([numbers["q1"], numbers["q3"]], place - _BAND, place + _BAND, color=style.BAND, linewidth=0)
         axes.plot([numbers["median"]] * 2, [place - _BAND, place + _BAND], color=style.ACCENT, linewidth=1.6)
         axes.plot(numbers["values"], place + offsets[place] / row_pt, **POINT, gid=f"{group.code}")
-    view = asked.question.view(0, asked.context)
+    view = question.question.view(0, question.context)
     ends = (f"{low:g} {getattr(view, 'low', '')}".strip(), f"{high:g} {getattr(view, 'high', '')}".strip())
-    _ends(sheet, sheet.height_pt - _FOOT_PT + 12, *ends)
+    _draw_end_labels(sheet, sheet.height_pt - _FOOT_PT + 12, *ends)
     return sheet
 
 
@@ -120,15 +120,15 @@ _OPTION_PT: Final = 20.0
 
 
 @style.own_settings()
-def draw_options(asked: PlacedQuestion, result: QuestionResult, look: Look) -> Sheet:
-    """Draw the count of each option."""
+def draw_options(question: PlacedQuestion, result: QuestionResult, look: Look) -> Sheet:
+    """Draw the count of each option as a bar."""
     several = len(result.groups) > 1
     bars = [
-        (f"{group.name}: {words}" if several else words, int(group.numbers["counts"][option]), int(group.numbers["n"]))
+        (f"{group.name}: {text}" if several else text, int(group.numbers["counts"][option]), int(group.numbers["n"]))
         for group in result.groups
-        for option, words in asked.levels.items()
+        for option, text in question.levels.items()
     ]
-    sheet, axes = rows([name for name, _, _ in bars], [n for _, _, n in bars], look, row_pt=_OPTION_PT)
+    sheet, axes = _draw_rows([name for name, _, _ in bars], [n for _, _, n in bars], look, row_pt=_OPTION_PT)
     most = max((n for _, _, n in bars), default=1) or 1
     axes.set_xlim(0, most * 1.06)
     for place, (_, count, n) in enumerate(bars):
@@ -151,46 +151,46 @@ _SWATCH_PT: Final = 18.0
 _NARROW: Final = 0.03  # share of a bar in which the value is not printed
 
 
-def colours(points: int) -> list[str]:
+def _point_colours(points: int) -> list[str]:
     """Return a colour for each point, from the palette for agreement."""
     palette = LinearSegmentedColormap.from_list("points", style.LEVEL_COLOURS)
     return [to_hex(palette(place / (points - 1))) for place in range(points)]
 
 
-def _ink(colour: str) -> str:
+def _text_colour(colour: str) -> str:
     red, green, blue = (int(colour[place : place + 2], 16) for place in (1, 3, 5))
     return "#000000" if 0.299 * red + 0.587 * green + 0.114 * blue > 130 else "#ffffff"
 
 
 @style.own_settings()
-def draw_ratings(asked: PlacedQuestion, result: QuestionResult, look: Look) -> Sheet:
-    """Draw the count of each point."""
+def draw_ratings(question: PlacedQuestion, result: QuestionResult, look: Look) -> Sheet:
+    """Draw the count of each scale point as a segment of a bar."""
     groups = result.groups
-    sheet, axes = _rows_of_groups(result, look, _RATING_PT)
+    sheet, axes = _draw_group_rows(result, look, _RATING_PT)
     axes.set_xlim(0, 1)
-    inks = colours(len(asked.levels))
+    colours = _point_colours(len(question.levels))
     for place, group in enumerate(groups):
         total = max(1, int(group.numbers["n"]))
         left = 0.0
-        for count, colour in zip(group.numbers["counts"].values(), inks, strict=True):
+        for count, colour in zip(group.numbers["counts"].values(), colours, strict=True):
             share = count / total
             axes.barh(place, share, left=left, height=2 * _HALF, color=colour, gid=f"{group.code}")
             if share > _NARROW:
-                look_of_count: Style = {"ha": "center", "va": "center", "color": _ink(colour)}
+                look_of_count: Style = {"ha": "center", "va": "center", "color": _text_colour(colour)}
                 axes.text(left + share / 2, place, str(count), fontproperties=sheet.font(SMALL), **look_of_count)
             left += share
-    _legend(sheet, list(asked.levels.values()), inks)
+    _draw_legend(sheet, list(question.levels.values()), colours)
     return sheet
 
 
-def _legend(sheet: Sheet, names: list[str], inks: list[str]) -> None:
-    """Draw the labels of the scale's ends, and between them the points in their colours."""
+def _draw_legend(sheet: Sheet, names: list[str], colours: list[str]) -> None:
+    """Draw the labels of the scale's ends, and between them the numbered scale points in their colours."""
     y = sheet.height_pt - 12
-    _ends(sheet, y, names[0], names[-1])
-    x = (_LEFT_PT + sheet.width_pt - _RIGHT_PT - _SWATCH_PT * len(inks)) / 2
-    for point, ink in enumerate(inks, start=1):
-        sheet.box(x, y - 8.5, _SWATCH_PT, 11, ink, rounding=0.5)
-        sheet.text(x + _SWATCH_PT / 2, y, str(point), size=SMALL, colour=_ink(ink), ha="center")
+    _draw_end_labels(sheet, y, names[0], names[-1])
+    x = (_LEFT_PT + sheet.width_pt - _RIGHT_PT - _SWATCH_PT * len(colours)) / 2
+    for point, colour in enumerate(colours, start=1):
+        sheet.box(x, y - 8.5, _SWATCH_PT, 11, colour, rounding=0.5)
+        sheet.text(x + _SWATCH_PT / 2, y, str(point), size=SMALL, colour=_text_colour(colour), ha="center")
         x += _SWATCH_PT
 
 
@@ -202,30 +202,32 @@ _RATINGS: Final = _QuestionFigure(
 
 
 _FIGURES: Final = {figure.id: figure for figure in (_RATINGS, _OPTIONS, _DISTRIBUTION)}
-"""Every figure by the id that a kind of question names it by."""
+"""All figures by the ID with which a kind of question selects one."""
 
 
 def question_figure_tasks(
-    study: Study, answered: Sequence[QuestionResult], forms: Sequence[str] = style.FORMATS
+    study: Study, results: Sequence[QuestionResult], forms: Sequence[str] = style.FORMATS
 ) -> Iterator[FigureTask]:
     """Yield the figure of every answered question that has one, to draw in each of ``forms``.
 
     Blocks of levels have their own figures once the key is open.
     """
-    of_levels = {block.id for block in study.levels if block.design.adjusts or study.revealed}
-    for asked, result in zip(study.others.questions, answered, strict=True):
-        if result.figure is not None and result.n and result.where not in of_levels:
+    level_blocks = {block.id for block in study.levels if block.design.adjusts or study.revealed}
+    for question, result in zip(study.others.questions, results, strict=True):
+        if result.figure is not None and result.n and result.where not in level_blocks:
             name = f"question-{result.where}-{result.item}"
-            yield result.where, name, partial(_picture, study, asked, result, forms, name)
+            yield result.where, name, partial(_picture, study, question, result, forms, name)
 
 
-def _picture(study: Study, asked: PlacedQuestion, result: QuestionResult, forms: Sequence[str], name: str) -> Picture:
+def _picture(
+    study: Study, question: PlacedQuestion, result: QuestionResult, forms: Sequence[str], name: str
+) -> Picture:
     figure = by_name(_FIGURES, result.figure or "")
     title = result.short if result.short == result.title else f"{result.title}: {result.short}"
     caption = f"{result.title}: “{result.text}” {figure.caption} {sample_words(study, study.n)}"
-    rows = study.answers_to(asked)[["participant", "session", "code", "response"]].rename(
-        columns={"response": asked.id}
+    rows = study.answers_to(question)[["participant", "session", "code", "response"]].rename(
+        columns={"response": question.id}
     )
     numbers = tab_separated(study, rows.dropna(axis="columns", how="all"))
-    draw = partial(figure.draw, asked, result)
+    draw = partial(figure.draw, question, result)
     return picture_of(study, result.where, name, title, caption, draw, forms, numbers=numbers)

@@ -1,4 +1,4 @@
-"""The figures of the first page: hypotheses, estimates of levels, ratings and scores, each with its participants."""
+"""Figures of the first page with each participant's values: hypotheses, estimates of levels, ratings and scores."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -28,10 +28,10 @@ _MEASURES: Final[tuple[tuple[type[LevelStatistic[Any]], str, str], ...]] = (
     (Exponents, "exponent", "exponent"),
     (Sensitivities, "d_prime", "d′"),
 )
-"""The statistics of a block of levels, the one that is its answer first: attribute and words."""
+"""Statistics of blocks of levels in order of preference, with the attribute and the name of the estimate."""
 
 MOST_PANELS: Final = 9
-"""Panels of a figure of scores or questions; more are in their tables."""
+"""The most panels of a figure of scores or questions; tables contain the others."""
 
 
 _CELL_PLACES: Final = (0.0, 1.0, 2.5, 3.5)
@@ -48,9 +48,9 @@ class Estimates(NamedTuple):
 
 
 class Numbers(NamedTuple):
-    """A score or a question: the name of each setting with each participant's number.
+    """The values of a score or a question: the name of each setting with each participant's value.
 
-    ``bounds`` are the ends of its answer scale, ``codes`` those of the settings.
+    ``bounds`` are the ends of the answer scale, ``codes`` the codes of the settings.
     """
 
     title: str
@@ -64,10 +64,10 @@ class Numbers(NamedTuple):
 def estimates_of(result: LevelsResult) -> Estimates | None:
     """Return the estimates that answer a block's question; None if there are none."""
     for statistic, attribute, words in _MEASURES:
-        rows = [one for one in statistic.of(result) if getattr(one, attribute) is not None]
+        rows = [row for row in statistic.rows_in(result) if getattr(row, attribute) is not None]
         if own := [row for row in rows if row.participant is not None]:
             return Estimates([row for row in rows if row.participant is None], own, attribute, words)
-    answers = [answer for answer in Answers.of(result) if not answer.catch]
+    answers = [answer for answer in Answers.rows_in(result) if not answer.catch]
     own = [answer for answer in answers if answer.participant is not None]
     words = (
         f"proportion of “{result.counts}” answers" if result.summary == "share" else f"{result.summary} of the answers"
@@ -75,9 +75,9 @@ def estimates_of(result: LevelsResult) -> Estimates | None:
     return Estimates([answer for answer in answers if answer.participant is None], own, "value", words) if own else None
 
 
-def place_of(one: Any) -> float | str | None:
+def place_of(estimate: Any) -> float | str | None:
     """Return the comparison, level or standard of an estimate."""
-    places = (getattr(one, name, None) for name in ("comparison", "level", "standard"))
+    places = (getattr(estimate, name, None) for name in ("comparison", "level", "standard"))
     return next((place for place in places if place is not None), None)
 
 
@@ -89,21 +89,23 @@ def summary_figure_tasks(
         compares_groups = contrast.contrast.groups is not None
         if any(side.values for side in contrast.sides) and not (compares_groups and _is_one_group(study)):
             name = f"hypothesis-{number}"
-            yield contrast.contrast.blocks[0], name, partial(_hypothesis, study, results, contrast, forms, name)
+            yield contrast.contrast.blocks[0], name, partial(_hypothesis_picture, study, results, contrast, forms, name)
     for level in results.levels:
         if estimates_of(level) is not None:
             name = f"estimates-{level.block}"
-            yield level.block, name, partial(_estimates, study, level, forms, name)
+            yield level.block, name, partial(_estimates_picture, study, level, forms, name)
     for where, of_place in numbers.items():
         name = f"answers-{where}"
-        yield where, name, partial(_answers, study, where, of_place[:MOST_PANELS], forms, name)
+        yield where, name, partial(_answers_picture, study, where, of_place[:MOST_PANELS], forms, name)
 
 
 def _is_one_group(study: Study) -> bool:
     return study.split not in ("", EACH_GROUP)
 
 
-def _hypothesis(study: Study, results: Results, contrast: ContrastResult, forms: Sequence[str], name: str) -> Picture:
+def _hypothesis_picture(
+    study: Study, results: Results, contrast: ContrastResult, forms: Sequence[str], name: str
+) -> Picture:
     within = contrast.contrast.groups is None
     log = contrast.ratio
     columns = tuple(
@@ -147,23 +149,24 @@ def _hypothesis(study: Study, results: Results, contrast: ContrastResult, forms:
             log=log,
         )
     )
-    band = " Band: equivalence bounds." if bound is not None else ""
+    band_note = " Band: equivalence bounds." if bound is not None else ""
     is_weighted = contrast.contrast.measure == "threshold" and not (within and study.split)
-    weighted = " Means are weighted as in the test." if is_weighted else ""
-    lines = "Each line connects a participant's two values. " if within or contrast.cells else ""
+    weights_note = " Means are weighted as in the test." if is_weighted else ""
+    lines_note = "Each line connects a participant's two values. " if within or contrast.cells else ""
     if contrast.cells:
-        lines = f"Left: each group under each condition. {lines}Middle: each participant's {kind}. "
+        lines_note = f"Left: each group under each condition. {lines_note}Middle: each participant's {kind}. "
     caption = (
-        f"{capitalised(contrast.hypothesis)}. {lines}Right: {contrast.comparison}"
-        f"{', for each participant and on average' if within else ''}; dashed line: no difference.{band}{weighted} "
-        f"{sample_words(study, len({who for side in contrast.sides for who in side.values} & {*study.people}))}"
+        f"{capitalised(contrast.hypothesis)}. {lines_note}Right: {contrast.comparison}"
+        f"{', for each participant and on average' if within else ''}; dashed line: no "
+        f"difference.{band_note}{weights_note} "
+        f"{sample_words(study, len({person for side in contrast.sides for person in side.values} & {*study.people}))}"
     )
     result = next((level for level in results.levels if level.block == contrast.contrast.blocks[0]), None)
-    title, above = capitalised(contrast.measure_name or contrast.contrast.measure_words), _scale_words(contrast, result)
+    title, above = capitalised(contrast.measure_name or contrast.contrast.measure_words), _scale_title(contrast, result)
     return people_picture(study, contrast.contrast.blocks[0], name, title, caption, panels, forms, above=above)
 
 
-def _scale_words(contrast: ContrastResult, result: LevelsResult | None) -> str:
+def _scale_title(contrast: ContrastResult, result: LevelsResult | None) -> str:
     """Return the title of a hypothesis' scale."""
     measure = contrast.measure_name or contrast.contrast.measure_words
     if contrast.contrast.form is not None:
@@ -173,38 +176,38 @@ def _scale_words(contrast: ContrastResult, result: LevelsResult | None) -> str:
     return {"d_prime": "d′", "exponent": "Exponent"}.get(contrast.contrast.measure, "Points on the scale")
 
 
-def _estimates(study: Study, result: LevelsResult, forms: Sequence[str], name: str) -> Picture | None:
+def _estimates_picture(study: Study, result: LevelsResult, forms: Sequence[str], name: str) -> Picture | None:
     estimates = estimates_of(result)
     if estimates is None:
         return None
-    own = [one for one in estimates.own if one.participant in study.people]
-    places = sorted({place_of(one) for one in own}, key=lambda place: (str(type(place)), place))
+    own = [row for row in estimates.own if row.participant in study.people]
+    places = sorted({place_of(row) for row in own}, key=lambda place: (str(type(place)), place))
     alone = len(places) == 1
     log = estimates.attribute in ("threshold", "pse") and result.spacing == "log"
 
     def column(place: float | str | None) -> Column:
-        here = [one for one in own if place_of(one) == place]
-        group = next((one for one in estimates.group if place_of(one) == place), None)
+        at_place = [row for row in own if place_of(row) == place]
+        group = next((row for row in estimates.group if place_of(row) == place), None)
         value = None if group is None else getattr(group, estimates.attribute)
-        ends = {one.participant: (one.low, one.high) for one in here if None not in (one.low, one.high)}
+        ends = {row.participant: (row.low, row.high) for row in at_place if None not in (row.low, row.high)}
         return Column(
             name="" if alone or place is None else place.replace("_", " ") if isinstance(place, str) else f"{place:g}",
-            values={one.participant: getattr(one, estimates.attribute) for one in here},
+            values={row.participant: getattr(row, estimates.attribute) for row in at_place},
             mean=None if group is None or value is None else Mean(value=value, low=group.low, high=group.high),
             ends=ends if alone and ends else None,
         )
 
     panel = Panel(columns=tuple(map(column, places)), log=log)
-    people = len({one.participant for one in own})
-    of_each = " Thin lines: each participant's 95 % interval, sorted by value." if alone else ""
+    people = len({row.participant for row in own})
+    lines_note = " Thin lines: each participant's 95 % interval, sorted by value." if alone else ""
     caption = (
-        f"{result.title}: {estimates.words} for each participant, and the mean with its 95 % interval.{of_each} "
+        f"{result.title}: {estimates.words} for each participant, and the mean with its 95 % interval.{lines_note} "
         f"{sample_words(study, people)}"
     )
     words = estimates.words if estimates.words == "d′" else capitalised(estimates.words)
     above = level_words(result) if estimates.attribute in ("threshold", "pse") else words
-    of = "Standard" if getattr(estimates.own[0], "level", None) is None else "Level"
-    below = "" if result.quantity is None or alone else f"{of}: {result.quantity} [{result.unit}]"
+    axis = "Standard" if getattr(estimates.own[0], "level", None) is None else "Level"
+    below = "" if result.quantity is None or alone else f"{axis}: {result.quantity} [{result.unit}]"
     title = f"{result.title}: {estimates.words}"
     return people_picture(study, result.block, name, title, caption, [panel], forms, above=above, below=below)
 
@@ -213,13 +216,13 @@ def numbers_of(study: Study) -> dict[str, list[Numbers]]:
     """Return scores and numeric answers by the place where they were asked, except in blocks of levels."""
     levels = {block.id for block in study.levels}
     places = dict.fromkeys(question.where.id for question in study.others.questions if question.where.id not in levels)
-    return {where: found for where in places if (found := _numbers_at(study, where))}
+    return {where: numbers for where in places if (numbers := _numbers_at(study, where))}
 
 
 def _numbers_at(study: Study, where: str) -> list[Numbers]:
     """Return the scores of a questionnaire or, if it has none, the numeric answers to its questions.
 
-    Two settings that a hypothesis compares are in its order.
+    If a hypothesis compares two settings, they are in the order of the hypothesis.
     """
     scores = [score for score in study.others.scores if score.where.id == where]
     tables: list[tuple[str, str, tuple[float, float] | None, QuestionPlace, pd.DataFrame]]
@@ -235,26 +238,26 @@ def _numbers_at(study: Study, where: str) -> list[Numbers]:
             for score in scores
         ]
     else:
-        asked = [
+        questions = [
             question
             for question in study.others.questions
             if question.where.id == where and question.bounds is not None
         ]
         tables = [
             (question.id, question.short, question.scale_ends, question.where, study.answers_to(question))
-            for question in asked
+            for question in questions
         ]
     numbers = []
     in_hypotheses = [contrast.within for contrast in study.contrasts]
     for name, title, bounds, place, rows in tables:
-        settings: list[tuple[str | None, str]] = [(it.code, place.name(it)) for it in place.settings]
-        if tuple(it.condition for it in reversed(place.settings)) in in_hypotheses:
+        settings: list[tuple[str | None, str]] = [(setting.code, place.name(setting)) for setting in place.settings]
+        if tuple(setting.condition for setting in reversed(place.settings)) in in_hypotheses:
             settings.reverse()
         by_setting = []
-        for code, words in settings or [(None, "")]:
-            here = (rows if code is None else rows[rows["code"] == code]).dropna(subset=["value"])
-            means = here.astype({"value": float}).groupby("participant")["value"].mean()
-            by_setting.append((words, {str(who): float(value) for who, value in means.items()}))
+        for code, setting_name in settings or [(None, "")]:
+            answers = (rows if code is None else rows[rows["code"] == code]).dropna(subset=["value"])
+            means = answers.astype({"value": float}).groupby("participant")["value"].mean()
+            by_setting.append((setting_name, {str(person): float(value) for person, value in means.items()}))
         if any(values for _, values in by_setting):
             codes = tuple(code for code, _ in settings if code is not None)
             numbers.append(
@@ -270,7 +273,7 @@ def _numbers_at(study: Study, where: str) -> list[Numbers]:
     return numbers
 
 
-def _answers(study: Study, where: str, shown: Sequence[Numbers], forms: Sequence[str], name: str) -> Picture:
+def _answers_picture(study: Study, where: str, shown: Sequence[Numbers], forms: Sequence[str], name: str) -> Picture:
     panels = [
         Panel(
             title=numbers.title,
@@ -281,7 +284,7 @@ def _answers(study: Study, where: str, shown: Sequence[Numbers], forms: Sequence
         )
         for numbers in shown
     ]
-    people = len({who for panel in panels for column in panel.columns for who in column.values})
+    people = len({person for panel in panels for column in panel.columns for person in column.values})
     title = next(question.where.title for question in study.others.questions if question.where.id == where)
     caption = (
         f"{title}: the value for each participant, and the mean with its 95 % confidence interval (Student's t). "

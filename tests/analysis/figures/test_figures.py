@@ -167,7 +167,7 @@ def test_an_answer_is_as_wide_as_fits_and_each_side_has_room_for_its_label(
     row = {f"count_{level}": 0 for level in range(1, 8)} | {"count_2": against, "count_6": agree, "count_4": neutral}
     row |= {"n": n, "presented": n + unanswered, "presented_excluded": excluded}
     fewer = dict.fromkeys(row, 0)
-    widths = answer_figures._widths([pd.DataFrame([fewer, row]), pd.DataFrame([fewer])], room)
+    widths = answer_figures._panel_widths([pd.DataFrame([fewer, row]), pd.DataFrame([fewer])], room)
     found = (widths.left, widths.right, widths.neutral, widths.n)
     assert found == pytest.approx(sides, rel=0.01)
     assert widths.total <= room
