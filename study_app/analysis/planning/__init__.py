@@ -8,9 +8,9 @@ from typing import Final
 
 MOST_PARTICIPANTS: Final = 1000
 SIZES: Final = (5, 8, 12, 16, 20, 24)
-"""Numbers of participants of simulated studies, beside the planned one."""
+"""Sample sizes of simulated studies, in addition to the planned one."""
 STUDIES: Final = 1000
 THRESHOLD_STUDIES: Final = 200
 """Simulated studies of each size: of statements, and of thresholds, d′, ratings or magnitude estimation."""
 WANTED: Final = 0.8
-"""The power that "smallest detectable effect" and "participants needed" are about."""
+"""The power at which detectable effects and required sample sizes are stated."""

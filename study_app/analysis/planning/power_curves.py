@@ -1,6 +1,6 @@
-"""Power by number of participants: curves, tables, figure and files, of the main kind of people and as a range.
+"""Power by number of participants, for the main kind of participants and as a range: curves, tables, figures, files.
 
-Of a study with delays the figure has a row for the lowest delay that shows and one for equivalence, a line a delay.
+For delays, a figure also has plots of the lowest delay with a trend and of equivalence, with one line for each delay.
 """
 
 import math
@@ -30,7 +30,7 @@ from study_app.analysis.planning.simulated_studies import (
     PLANNED_DRAWS,
     Counts,
     Plan,
-    Planned,
+    PlannedBlock,
     contrast_sides,
     draw_opinions,
 )
@@ -45,7 +45,7 @@ from study_app.store.files import Column, csv_bytes, optional, write_files
 Question: TypeAlias = Literal["conditions differ", "trend", "lowest delay", "equivalence", "contrast"]
 
 _MANY: Final = 200
-"""So many simulated participants tell how far people differ."""
+"""Simulated participants from which differences between people are estimated."""
 
 _OVER_ALL: Final = "all statements at once"
 
@@ -54,11 +54,11 @@ _OVER_ALL: Final = "all statements at once"
 class Curve:
     """The power of one test as a function of sample size.
 
-    ``item`` is None for tests over several statements, which ``over`` then names; ``setting`` is the delay of tests
-    about one delay. ``power`` holds shares of studies, ``alarms`` the same without any effect (for equivalence: the
-    power without any true difference). ``effect`` is the simulated effect, in scale points, between the two settings
-    whose mean answers differ most. ``detectable`` is the smallest effect in the same unit that 80 % of studies find,
-    None if it exceeds eight times the simulated one.
+    ``item`` is None for tests over several statements, whose scope is ``over``; ``setting`` is the delay of tests of
+    one delay. ``power`` has the shares of studies that detect the effect, and ``alarms`` the shares without any effect
+    (for equivalence: the power if there is no difference). ``effect`` is the simulated effect, in scale points, between
+    the two settings whose mean answers differ most. ``detectable`` is the smallest effect in the same unit that 80 % of
+    studies find, None if it exceeds eight times the simulated one.
     """
 
     block: str
@@ -77,10 +77,10 @@ class Curve:
         return self.block, self.question, self.item, self.over, self.setting
 
     def points(self, place: int) -> float | None:
-        """Return ``detectable`` at the sample size with this index."""
+        """Return the smallest detectable effect at the sample size with this index, or None."""
         return None if self.detectable is None else self.detectable[place]
 
-    def needed(self, sizes: Sequence[int]) -> int | None:
+    def needed_size(self, sizes: Sequence[int]) -> int | None:
         """Return the smallest sample size from which the power is at least 80 %."""
         enough = [share >= WANTED for share in self.power]
         for place, size in enumerate(sizes):
@@ -110,19 +110,21 @@ class Powers:
         """The curves for the main kind of participants."""
         return next(iter(self.kinds.values()))
 
-    def among_kinds(self, curve: Curve) -> tuple[Curve, ...]:
+    def curves_by_kind(self, curve: Curve) -> tuple[Curve, ...]:
         """Return the curves of a test for every kind of participants, in the order of ``kinds``."""
         none = replace(curve, power=(0.0,) * len(self.sizes), detectable=None)
-        return tuple(next((one for one in of if one.test == curve.test), none) for of in self.kinds.values())
+        return tuple(
+            next((other for other in curves if other.test == curve.test), none) for curves in self.kinds.values()
+        )
 
 
 def powers(
     plan: Plan, sizes: Sequence[int], studies: int, asked: int, seed: int, counts: Mapping[str, Counts]
 ) -> Powers:
-    """Return the power from the counts in ``studies`` of ``asked`` studies, for each kind of participants."""
+    """Return the power for each kind of participants from counts in ``studies`` of the requested ``asked`` studies."""
     kinds = {}
     for kind, counted in counts.items():
-        curves = [curve for block in plan.blocks for curve in _curves(block, counted, studies)]
+        curves = [curve for block in plan.blocks for curve in _block_curves(block, counted, studies)]
         kinds[kind] = (*curves, *_contrast_curves(plan, counted, studies))
     return Powers(plan=plan, sizes=tuple(sizes), studies=studies, asked=asked, seed=seed, kinds=kinds)
 
@@ -134,12 +136,12 @@ def interval(share: float, studies: int) -> tuple[float, float]:
     return max(0.0, middle - reach), min(1.0, middle + reach)
 
 
-def _curves(block: Planned, counts: Counts, studies: int) -> Iterator[Curve]:
+def _block_curves(block: PlannedBlock, counts: Counts, studies: int) -> Iterator[Curve]:
     question: Question = "trend" if block.kind == "delays" else "conditions differ"
     means = counts[block.id, "means"] / studies
-    for what, over in (("any", "at least one statement"), ("all", _OVER_ALL)):
-        if (block.id, what) in counts:
-            power, alarms = _shares(counts[block.id, what] / studies)
+    for scope, over in (("any", "at least one statement"), ("all", _OVER_ALL)):
+        if (block.id, scope) in counts:
+            power, alarms = _power_and_alarms(counts[block.id, scope] / studies)
             yield Curve(
                 block=block.id,
                 question=question,
@@ -152,11 +154,11 @@ def _curves(block: Planned, counts: Counts, studies: int) -> Iterator[Curve]:
                 detectable=None,
             )
     if (block.id, "found") in counts:
-        found = counts[block.id, "found"] / studies
+        shares = counts[block.id, "found"] / studies
         for place, item in enumerate(block.items):
-            effects = _effects(block, means[:, :, place])
+            effects = _effects_in_points(block, means[:, :, place])
             known = effects[FULL] - effects[0] > 0.05
-            power, alarms = _shares(found[:, :, place])
+            power, alarms = _power_and_alarms(shares[:, :, place])
             yield Curve(
                 block=block.id,
                 question=question,
@@ -166,19 +168,19 @@ def _curves(block: Planned, counts: Counts, studies: int) -> Iterator[Curve]:
                 power=power,
                 alarms=alarms,
                 effect=float(effects[FULL]),
-                detectable=tuple(_detectable(found[at, :, place], effects) for at in range(len(found)))
+                detectable=tuple(_detectable_effect(shares[size, :, place], effects) for size in range(len(shares)))
                 if known
                 else None,
             )
     yield from _lowest_curves(block, counts, studies)
     equivalence = list(_equivalence_curves(block, counts, studies))
-    yield from (*equivalence, *_truly_equal(equivalence))
+    yield from (*equivalence, *_equality_curves(equivalence))
 
 
 def _contrast_curves(plan: Plan, counts: Counts, studies: int) -> Iterator[Curve]:
     for contrast in plan.contrasts:
-        power, alarms = _shares(counts[contrast.described(), "contrast"] / studies)
-        within = None if len(contrast.blocks) == 2 else alarms  # effects are those of the settings of one block
+        power, alarms = _power_and_alarms(counts[contrast.described(), "contrast"] / studies)
+        within = None if len(contrast.blocks) == 2 else alarms  # simulated effects are within blocks
         yield Curve(
             block=contrast.blocks[0],
             question="contrast",
@@ -192,7 +194,7 @@ def _contrast_curves(plan: Plan, counts: Counts, studies: int) -> Iterator[Curve
         )
         if contrast.bound is not None:
             equal = f"{contrast.described()}, {IF_EQUAL}"
-            power, _ = _shares(counts[equal, "contrast"] / studies)
+            power, _ = _power_and_alarms(counts[equal, "contrast"] / studies)
             yield Curve(
                 block=contrast.blocks[0],
                 question="contrast",
@@ -206,31 +208,31 @@ def _contrast_curves(plan: Plan, counts: Counts, studies: int) -> Iterator[Curve
             )
 
 
-def _shares(shares: Array) -> tuple[tuple[float, ...], tuple[float, ...]]:
+def _power_and_alarms(shares: Array) -> tuple[tuple[float, ...], tuple[float, ...]]:
     return tuple(shares[:, FULL].tolist()), tuple(shares[:, 0].tolist())
 
 
-def _effects(block: Planned, means: Array) -> Array:
-    """Return the effect as a difference of mean answers (effects, settings): first to last, or the largest."""
+def _effects_in_points(block: PlannedBlock, means: Array) -> Array:
+    """Return the effects (effects,) of mean answers (effects, settings): last − first for delays, else the range."""
     if block.kind == "delays":
         return np.asarray(np.abs(means[:, -1] - means[:, 0]))
     return np.asarray(np.ptp(means, axis=1))
 
 
-def _detectable(array: Array, effects: Array) -> float | None:
+def _detectable_effect(shares: Array, effects: Array) -> float | None:
     """Return the effect that 80 % of studies find, interpolated between the simulated effects."""
-    rising = np.maximum.accumulate(array)
+    rising = np.maximum.accumulate(shares)
     reached = np.flatnonzero(rising >= WANTED)
     if not len(reached):
         return None
-    at = int(reached[0])
-    if at == 0:
+    index = int(reached[0])
+    if index == 0:
         return float(effects[0])
-    part = (WANTED - rising[at - 1]) / (rising[at] - rising[at - 1])
-    return float(effects[at - 1] + part * (effects[at] - effects[at - 1]))
+    fraction = (WANTED - rising[index - 1]) / (rising[index] - rising[index - 1])
+    return float(effects[index - 1] + fraction * (effects[index] - effects[index - 1]))
 
 
-def _lowest_curves(block: Planned, counts: Counts, studies: int) -> Iterator[Curve]:
+def _lowest_curves(block: PlannedBlock, counts: Counts, studies: int) -> Iterator[Curve]:
     if (block.id, "lowest") not in counts:
         return
     shares = counts[block.id, "lowest"] / studies
@@ -251,7 +253,7 @@ def _lowest_curves(block: Planned, counts: Counts, studies: int) -> Iterator[Cur
                 )
 
 
-def _equivalence_curves(block: Planned, counts: Counts, studies: int) -> Iterator[Curve]:
+def _equivalence_curves(block: PlannedBlock, counts: Counts, studies: int) -> Iterator[Curve]:
     if (block.id, "equivalent") not in counts:
         return
     shares = counts[block.id, "equivalent"] / studies
@@ -259,7 +261,7 @@ def _equivalence_curves(block: Planned, counts: Counts, studies: int) -> Iterato
     for place, item in enumerate(block.items):
         for delay in range(1, block.k):
             none, full = (tuple(shares[:, effect, place, delay - 1].tolist()) for effect in (0, 1))
-            away = float(means[delay, place] - means[0, place])
+            difference = float(means[delay, place] - means[0, place])
             yield Curve(
                 block=block.id,
                 question="equivalence",
@@ -268,7 +270,7 @@ def _equivalence_curves(block: Planned, counts: Counts, studies: int) -> Iterato
                 setting=block.names[delay],
                 power=full,
                 alarms=none,
-                effect=away,
+                effect=difference,
                 detectable=None,
             )
 
@@ -282,7 +284,7 @@ OF_STUDIES: Final = (
     Column("participants", "integer", "Number of participants in each simulated study.", minimum=2),
     Column("studies", "integer", "Number of simulated studies.", minimum=1),
 )
-"""Columns of all tables of power."""
+"""Columns that all tables of power have, as has `OF_BLOCK`."""
 
 COLUMNS: Final = (
     *OF_BLOCK,
@@ -369,8 +371,8 @@ def _csv_rows(power: Powers) -> Iterator[dict[str, Any]]:
 
 def power_markdown(power: Powers) -> str:
     """Return the tables in Markdown, with their assumptions and limitations."""
-    lines = [f"# Power for {power.plan.title} ({power.plan.name} {power.plan.version})", "", *_preface(power)]
-    lines += _summary(power)
+    lines = [f"# Power for {power.plan.title} ({power.plan.name} {power.plan.version})", "", *_preface_lines(power)]
+    lines += _summary_lines(power)
     for block in power.plan.blocks:
         for question, (head, first) in _HEADS.items():
             curves = [curve for curve in power.curves if (curve.block, curve.question) == (block.id, question)]
@@ -401,13 +403,13 @@ def power_markdown(power: Powers) -> str:
     return "\n".join([*lines, *_untested_contrasts(power)]) + "\n"
 
 
-def _preface(power: Powers) -> list[str]:
+def _preface_lines(power: Powers) -> list[str]:
     decided = power.plan.decided
     low, high = interval(WANTED, power.studies)
-    of_looks = ", ".join(f"{n}: {level:.2g}" for n, level in zip(decided.looks, decided.alphas, strict=False))
+    look_levels = ", ".join(f"{n}: {level:.2g}" for n, level in zip(decided.looks, decided.alphas, strict=False))
     looks = (
-        f" across all looks ({of_looks}; an effect counts as detected from the first look that detects it)"
-        if of_looks
+        f" across all looks ({look_levels}; an effect counts as detected from the first look that detects it)"
+        if look_levels
         else ""
     )
     lines = [
@@ -421,18 +423,18 @@ def _preface(power: Powers) -> list[str]:
         f"rate is controlled (Benjamini–Hochberg). Effects from {EFFECTS[1]:g} to {EFFECTS[-1]:g} times those of the "
         f"model were simulated. A power of 80 % has an uncertainty of ±{50 * (high - low):.1f} percentage points.",
         "",
-        f"The numbers are for {_people(next(iter(power.kinds)))}, with the lowest and highest values across all types "
-        "of participant in parentheses. The types are "
+        f"The numbers are for {_participants_phrase(next(iter(power.kinds)))}, with the lowest and highest values "
+        "across all types of participant in parentheses. The types are "
         + listed([f"**{kind}** ({people.described()})" for kind, people in power.plan.kinds.items()])
         + f". {_SOURCES}",
     ]
     if not power.complete:
         lines += ["", f"**Preliminary: {power.studies} of {power.asked} studies were simulated.**"]
     if power.plan.unknown:
-        named = ", ".join(power.plan.unknown)
+        items = ", ".join(power.plan.unknown)
         lines += [
             "",
-            f"The model does not assume any effects for {named}, so any effects detected for these statements are due "
+            f"The model does not assume any effects for {items}, so any effects detected for these statements are due "
             "to chance.",
         ]
     lines += [
@@ -456,20 +458,20 @@ _SOURCES: Final = (
     "SD is the SD between identical trials; the slope SD is the between-person SD of effects, relative to the mean "
     "effect."
 )
-"""Where the values of `raters.PUBLISHED` come from."""
+"""The sources of the values in `raters.PUBLISHED`."""
 _NONE: Final = "none"
 
 
-def _people(kind: str) -> str:
-    """Return a kind of people in words."""
+def _participants_phrase(kind: str) -> str:
+    """Return a kind of participants as a phrase."""
     return f"participants {kind}" if kind == STATED else f"{kind} participants"
 
 
-def _summary(power: Powers) -> Iterator[str]:
+def _summary_lines(power: Powers) -> Iterator[str]:
     """Yield the power of the primary tests at the planned sample size, for each kind of participants."""
     plan, sizes = power.plan, power.sizes
     place = sizes.index(plan.participants) if plan.participants in sizes else len(sizes) - 1
-    planned = "the planned " if plan.participants in sizes else ""
+    planned_word = "the planned " if plan.participants in sizes else ""
     main = next(iter(power.kinds))
     lines = []
     for curve in power.curves:
@@ -479,35 +481,38 @@ def _summary(power: Powers) -> Iterator[str]:
             and (not plan.decided.made or plan.decided.is_primary(curve.item))
         )
         if curve.question == "contrast" or (primary and curve.question in ("conditions differ", "trend")):
-            shares = dict(zip(power.kinds, (kind.power[place] for kind in power.among_kinds(curve)), strict=True))
-            about = "" if curve.question == "contrast" else f" ({HEADS[curve.question]})"
+            shares = dict(zip(power.kinds, (kind.power[place] for kind in power.curves_by_kind(curve)), strict=True))
+            question = "" if curve.question == "contrast" else f" ({HEADS[curve.question]})"
             lines.append(
-                f"- {_name(curve, power).strip('*')}{about}: {whole_percent(shares[CONSISTENT])} of studies detect the "
-                f"effect if participants are {CONSISTENT}, {whole_percent(shares[main])} if they are {main}, and "
-                f"{whole_percent(shares[NOISY])} if they are {NOISY}."
+                f"- {_curve_name(curve, power).strip('*')}{question}: {whole_percent(shares[CONSISTENT])} of studies "
+                f"detect the effect if participants are {CONSISTENT}, {whole_percent(shares[main])} if they are "
+                f"{main}, and {whole_percent(shares[NOISY])} if they are {NOISY}."
             )
     if lines:
-        yield from ("", f"## Power with {planned}{sizes[place]} participants", "", *lines)
+        yield from ("", f"## Power with {planned_word}{sizes[place]} participants", "", *lines)
 
 
 def _untested_contrasts(power: Powers) -> Iterator[str]:
-    """Yield a table for each contrast of a statement between groups or of a form, which have no simulated effect."""
+    """Yield tables of the contrasts without a simulated effect: between groups, and of forms."""
     plan = power.plan
     titles = {block.id: block.title for block in plan.blocks}
-    given = draw_opinions(plan, _MANY, power.seed, 0) if plan.between else ()
+    opinions = draw_opinions(plan, _MANY, power.seed, 0) if plan.between else ()
     for contrast, shares in plan.between:
         spreads = {}
         for name, kind in plan.kinds.items():
-            answers = [of_block.answers(1.0, kind)[None, None] for of_block in given]
+            answers = [block_opinions.answers(1.0, kind)[None, None] for block_opinions in opinions]
             first, second = contrast_sides(plan, answers, contrast)
             numbers = first if contrast.within is None else first - second
             spreads[name] = float(numbers.std(ddof=1))
-        of = "mean answers" if contrast.within is None else "within-participant differences"
-        said = f"SD is the standard deviation of the simulated participants' {of}, in points."
-        rows = [(f"{contrast.measure}, {_people(name)}", f"{spread:.2f}", spread) for name, spread in spreads.items()]
+        values_noun = "mean answers" if contrast.within is None else "within-participant differences"
+        description = f"SD is the standard deviation of the simulated participants' {values_noun}, in points."
+        rows = [
+            (f"{contrast.measure}, {_participants_phrase(name)}", f"{spread:.2f}", spread)
+            for name, spread in spreads.items()
+        ]
         yield from smallest_differences(
             contrast, power.sizes, plan.decided.alphas[-1], len(plan.contrasts) + plan.untested, rows, "statement",
-            said, "±{:.2f}".format, shares, contrast.bound, bounds=_bounds(plan),
+            description, "±{:.2f}".format, shares, contrast.bound, bounds=_count_bounds(plan),
             largest=equality_limits(contrast, 1.0, ratio=False)[1], planned=plan.participants, unit=" points",
             titles=titles,
         )  # fmt: skip
@@ -517,14 +522,16 @@ def _untested_contrasts(power: Powers) -> Iterator[str]:
         yield from form_differences(contrast, power.sizes, alpha, members, of_groups, planned, titles)
 
 
-def _bounds(plan: Plan) -> int:
-    """Return the number of hypotheses with an equivalence bound."""
+def _count_bounds(plan: Plan) -> int:
+    """Return the number of hypotheses that state an equivalence bound."""
     return sum(contrast.bound is not None for contrast in plan.contrasts) + plan.untested_bounds
 
 
-def _truly_equal(curves: Sequence[Curve]) -> list[Curve]:
-    """Return, for every statement, the power of equivalence without any effect of delay, averaged over delays."""
-    items = {curve.item: [one.alarms for one in curves if one.item == curve.item and one.alarms] for curve in curves}
+def _equality_curves(curves: Sequence[Curve]) -> list[Curve]:
+    """Return a curve for each statement: the power of equivalence without an effect of delay, averaged over delays."""
+    items = {
+        curve.item: [other.alarms for other in curves if other.item == curve.item and other.alarms] for curve in curves
+    }
     return [
         Curve(
             block=curves[0].block,
@@ -541,7 +548,7 @@ def _truly_equal(curves: Sequence[Curve]) -> list[Curve]:
     ]
 
 
-def _test_sentences(question: Question, found: Powers) -> list[str]:
+def _test_sentences(question: Question, powers: Powers) -> list[str]:
     match question:
         case "conditions differ":
             return [
@@ -549,21 +556,21 @@ def _test_sentences(question: Question, found: Powers) -> list[str]:
                 "there are two conditions."
             ]
         case "trend":
-            by = TRENDS[found.plan.decided.trends]
-            return [f"Trends are tested with {by}; the test is one-sided if the protocol states a direction."]
+            trend_test = TRENDS[powers.plan.decided.trends]
+            return [f"Trends are tested with {trend_test}; the test is one-sided if the protocol states a direction."]
         case "lowest delay":
             return [
                 "If there is a trend, the longest delay is dropped and the rank correlations are tested again, until "
                 "no trend remains; the result is an upper bound for the shortest noticeable delay."
             ]
         case "equivalence":
-            bound = found.plan.decided.equivalence_bound or STEPS
+            bound = powers.plan.decided.equivalence_bound or STEPS
             return [
                 f"Equivalence is tested with two one-sided t tests (bounds {bound_text(bound)}) and a bootstrap; both "
                 "must show equivalence. Equivalence also requires "
-                f"{min_sample_reason(found.plan.decided.alphas[-1], bound)}. If the difference in the model is near or "
-                "outside the bounds, few studies should find equivalence; if it is outside the bounds, such a finding "
-                "is wrong."
+                f"{min_sample_reason(powers.plan.decided.alphas[-1], bound)}. If the difference in the model is near "
+                "or outside the bounds, few studies should find equivalence; if it is outside the bounds, such a "
+                "finding is wrong."
             ]
         case "contrast":
             return [
@@ -574,28 +581,30 @@ def _test_sentences(question: Question, found: Powers) -> list[str]:
 
 
 def _markdown_table(
-    curves: list[Curve], found: Powers, first: str, cell: Callable[[Curve, int], str], *, needed: bool = False
+    curves: list[Curve], powers: Powers, first: str, cell: Callable[[Curve, int], str], *, needed: bool = False
 ) -> list[str]:
     """Return a table with one row per curve and one column per size.
 
     A cell has the range over all kinds of participants in parentheses; ``needed`` adds the size from which the power is
     at least 80 %.
     """
-    planned = found.plan.participants
+    planned = powers.plan.participants
     heads = [
         first,
-        *(f"n = {size_text(size, planned)}" for size in found.sizes),
+        *(f"n = {size_text(size, planned)}" for size in powers.sizes),
         *(["n for 80 % power"] if needed else []),
     ]
     lines = [f"| {' | '.join(heads)} |", f"|---|{'---:|' * (len(heads) - 1)}"]
     for curve in curves:
-        kinds = found.among_kinds(curve)
+        kinds = powers.curves_by_kind(curve)
         cells = [
-            _name(curve, found),
-            *(_with_range([cell(kind, at) for kind in kinds]) for at in range(len(found.sizes))),
+            _curve_name(curve, powers),
+            *(_with_range([cell(kind, at) for kind in kinds]) for at in range(len(powers.sizes))),
         ]
         if needed:
-            cells.append(_with_range([str(kind.needed(found.sizes) or f"> {found.sizes[-1]}") for kind in kinds]))
+            cells.append(
+                _with_range([str(kind.needed_size(powers.sizes) or f"> {powers.sizes[-1]}") for kind in kinds])
+            )
         lines.append(f"| {' | '.join(cells)} |")
     return lines
 
@@ -606,18 +615,18 @@ def _difference_text(points: float | None, decimals: int) -> str:
 
 
 def _with_range(numbers: Sequence[str]) -> str:
-    """Return the first number as text, with the range of all numbers in parentheses if they differ."""
-    lowest, *_, highest = sorted(numbers, key=_order)
+    """Return the first number, followed by the range of all numbers in parentheses if they differ."""
+    lowest, *_, highest = sorted(numbers, key=_range_key)
     joint = "–" if highest.removesuffix(" %").replace(".", "").isdigit() else " to "
     return numbers[0] if lowest == highest else f"{numbers[0]} ({lowest.removesuffix(' %')}{joint}{highest})"
 
 
-def _order(number: str) -> tuple[bool, float]:
+def _range_key(number: str) -> tuple[bool, float]:
     """Return the sort key of a number as text; "none" comes last."""
     return number == _NONE or ">" in number, 0.0 if number == _NONE else float(number.strip("%> "))
 
 
-def _name(curve: Curve, power: Powers) -> str:
+def _curve_name(curve: Curve, power: Powers) -> str:
     if curve.item is None:
         return f"*{curve.over}*"
     short = {item.id: item.short for block in power.plan.blocks for item in block.items}[curve.item]
@@ -632,7 +641,7 @@ HEADS: Final[dict[Question, str]] = {
     "lowest delay": "trend up to this delay",
     "equivalence": "equivalent to the control",
 }
-"""What a study shows, as the vertical axis of its plots says it."""
+"""Labels of the vertical axes of plots."""
 
 DELAYS: Final = LinearSegmentedColormap.from_list("delays", ("#9dc3de", "#02256d"))
 """Colours of delays, from the shortest to the longest."""
@@ -641,7 +650,7 @@ _Plot: TypeAlias = tuple[str, Question, tuple[Curve, ...]]
 """Title, question and curves of a plot."""
 
 
-def _plots(power: Powers, block: Planned) -> Iterator[list[_Plot]]:
+def _plot_rows(power: Powers, block: PlannedBlock) -> Iterator[list[_Plot]]:
     """Yield the rows of plots of a block: one plot per statement and one for the global test."""
     for question in HEADS:
         curves = [
@@ -650,23 +659,23 @@ def _plots(power: Powers, block: Planned) -> Iterator[list[_Plot]]:
             if (curve.block, curve.question) == (block.id, question) and curve.setting != IF_EQUAL
         ]
         plots: list[_Plot] = [
-            (item.short, question, mine)
+            (item.short, question, item_curves)
             for item in block.items
-            if (mine := tuple(curve for curve in curves if curve.item == item.id))
+            if (item_curves := tuple(curve for curve in curves if curve.item == item.id))
         ]
         plots += [(curve.over.capitalize(), question, (curve,)) for curve in curves if curve.over == _OVER_ALL]
         yield from (plots[first : first + _PLOTS_A_ROW] for first in range(0, len(plots), _PLOTS_A_ROW))
 
 
 @style.own_settings(style.PLOT_SETTINGS)
-def draw_power(power: Powers, block: Planned) -> Figure:
+def draw_power(power: Powers, block: PlannedBlock) -> Figure:
     """Draw the power of one block against the number of participants."""
-    rows = list(_plots(power, block))
+    rows = list(_plot_rows(power, block))
     figure = Figure(figsize=(style.PAGE_WIDTH_PT / 72, 0.7 + 1.45 * len(rows)), layout="constrained")
     figure.suptitle(
         f"{block.title}: proportion of {power.studies} studies with SIMULATED participants, by number of participants\n"
-        f"α = {power.plan.decided.alpha:g}; line: {_people(next(iter(power.kinds)))}; band: range across all types of "
-        "participant; dashed line: no effect",
+        f"α = {power.plan.decided.alpha:g}; line: {_participants_phrase(next(iter(power.kinds)))}; band: range across "
+        "all types of participant; dashed line: no effect",
         fontsize=7.5,
     )
     for row, plots in enumerate(rows):
@@ -687,20 +696,20 @@ def draw_power(power: Powers, block: Planned) -> Figure:
     return figure
 
 
-def _draw_curves(axes: Axes, found: Powers, curves: Sequence[Curve]) -> None:
+def _draw_curves(axes: Axes, powers: Powers, curves: Sequence[Curve]) -> None:
     """Draw a curve, its range over kinds of participants, and that without any effect; one line per delay."""
     for place, curve in enumerate(curves):
         if curve.setting is not None:
             share = place / max(len(curves) - 1, 1)
             label: Style = {"label": curve.setting, "gid": "delay", "markersize": 3}
-            axes.plot(found.sizes, curve.power, color=DELAYS(share), marker=".", **label)
+            axes.plot(powers.sizes, curve.power, color=DELAYS(share), marker=".", **label)
             continue
-        kinds = [kind.power for kind in found.among_kinds(curve)]
+        kinds = [kind.power for kind in powers.curves_by_kind(curve)]
         low, high = np.min(kinds, axis=0), np.max(kinds, axis=0)
-        axes.fill_between(found.sizes, low, high, color=style.BAND, linewidth=0)
-        axes.plot(found.sizes, curve.power, color=style.ACCENT, marker=".", markersize=3)
+        axes.fill_between(powers.sizes, low, high, color=style.BAND, linewidth=0)
+        axes.plot(powers.sizes, curve.power, color=style.ACCENT, marker=".", markersize=3)
         if curve.alarms is not None:
-            axes.plot(found.sizes, curve.alarms, color=style.PARTICIPANT, linewidth=0.9, linestyle="--")
+            axes.plot(powers.sizes, curve.alarms, color=style.PARTICIPANT, linewidth=0.9, linestyle="--")
 
 
 def write_power(power: Powers, to: Path) -> tuple[Path, ...]:

@@ -1,4 +1,4 @@
-"""The power of a study, from more and more simulated studies: statements by their tests, all else by its precision."""
+"""The power of a study from an increasing number of simulated studies: power of tests, or precision of estimates."""
 
 from __future__ import annotations
 

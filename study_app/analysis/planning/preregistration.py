@@ -1,4 +1,4 @@
-"""The preregistration of a study in Markdown, from its protocol alone, and where the study left it."""
+"""The preregistration of a study in Markdown, generated from its protocol, and the deviations of the study from it."""
 
 import json
 import re
@@ -36,7 +36,7 @@ from study_app.store.merged import DASH, folders_of
 
 FILE: Final = PREREGISTRATION
 CATCH: Final = "catch"
-"""The rule of exclusion that `unblind` applies."""
+"""The exclusion rule that `unblind` applies."""
 _BLOCK: Final = re.compile(r"^```json\n(\{.*?\})\n```$", re.MULTILINE | re.DOTALL)
 
 
@@ -69,9 +69,9 @@ def commitment(protocol: Protocol, protocol_hash: str) -> Commitment:
     )
 
 
-def commitment_lines(one: Commitment) -> str:
+def commitment_lines(committed: Commitment) -> str:
     """Return the commitments as the last lines of a preregistration."""
-    return f"```json\n{json.dumps(asdict(one), indent=1)}\n```\n"
+    return f"```json\n{json.dumps(asdict(committed), indent=1)}\n```\n"
 
 
 def read_commitment(folder: Path) -> Commitment | None:
@@ -105,23 +105,25 @@ def _title(protocol: Protocol, block: str) -> str:
 
 def _form_title(protocol: Protocol, form: str) -> str:
     title = protocol.forms[form].title
-    shown = (
+    form_title = (
         number_text.capitalised(form.replace("_", " ")) if title is None else protocol.text(title, _language(protocol))
     )
-    return f"“{shown}”"
+    return f"“{form_title}”"
 
 
 def _measure_words(protocol: Protocol, contrast: Contrast, language: str) -> str:
-    """Return the measure with the short text of its statement or question, and the form's title; "" without a text."""
+    """Return a phrase on the measure with the short text of its statement or question; "" without such a text."""
     if contrast.form is not None and contrast.measure in protocol.forms[contrast.form].scores:
         return f"{contrast.measure} score of {_form_title(protocol, contrast.form)}"
-    asked = protocol.questionnaire_of(contrast.blocks[0]) if contrast.form is None else protocol.forms[contrast.form]
-    item = next((item for item in (asked.items if asked else ()) if item.id == contrast.measure), None)
+    questionnaire = (
+        protocol.questionnaire_of(contrast.blocks[0]) if contrast.form is None else protocol.forms[contrast.form]
+    )
+    item = next((item for item in (questionnaire.items if questionnaire else ()) if item.id == contrast.measure), None)
     if item is None:
         return ""
     short = f"“{protocol.text(item.short, language)}”"
-    of = f"agreement with {short}"
-    return of if contrast.form is None else f"{short} in {_form_title(protocol, contrast.form)}"
+    agreement = f"agreement with {short}"
+    return agreement if contrast.form is None else f"{short} in {_form_title(protocol, contrast.form)}"
 
 
 def hypotheses(protocol: Protocol, language: str) -> Iterator[str]:
@@ -129,21 +131,21 @@ def hypotheses(protocol: Protocol, language: str) -> Iterator[str]:
     stimuli = {block.id: protocol.stimulus_of(block) for block in protocol.main_blocks if block.stimulus}
     for contrast in () if protocol.analysis is None else protocol.analysis.contrasts:
         titled = contrast.model_copy(update={"blocks": tuple(_title(protocol, block) for block in contrast.blocks)})
-        words = titled.words(
+        compared = titled.words(
             {_title(protocol, block): protocol.condition_of(stimulus) for block, stimulus in stimuli.items()}
         )
-        described = titled.described(words, measure=_measure_words(protocol, contrast, language))
+        described = titled.described(compared, measure=_measure_words(protocol, contrast, language))
         ratio = contrast.measure in RATIOS and all(stimuli[block].spacing == "log" for block in contrast.blocks)
         test = t_test_name(contrast, ratio=ratio)
         test += " and the degrees of freedom of the smaller group" if contrast.groups else ""
         sides = "two-sided" if contrast.expected is None else "one-sided"
-        weighted = " Participants are weighted as in the group mean." if contrast.measure == "threshold" else ""
+        weights_note = " Participants are weighted as in the group mean." if contrast.measure == "threshold" else ""
         yield (
             f"Hypothesis: {described}. We test it with a {sides} {test}, using one value per "
-            f"participant.{weighted} We also use a bootstrap that includes one hypothetical participant as extreme as "
-            "the most extreme participant in the sample (Gaffke 2005), and a t test corrected for skewness (Hall "
+            f"participant.{weights_note} We also use a bootstrap that includes one hypothetical participant as extreme "
+            "as the most extreme participant in the sample (Gaffke 2005), and a t test corrected for skewness (Hall "
             f"1992). The p value is the largest of the three, Holm-adjusted across all "
-            f"hypotheses of this kind.{_equality_of(protocol, contrast)}"
+            f"hypotheses of this kind.{_equivalence_sentences(protocol, contrast)}"
         )
     if protocol.analysis is not None and protocol.analysis.contrasts:
         yield inclusion_words(protocol.analysis.contrasts)
@@ -158,8 +160,8 @@ def hypotheses(protocol: Protocol, language: str) -> Iterator[str]:
         yield f"Published value for comparison, block {titled_value.described(stimulus.unit if stimulus else '')}."
 
 
-def _equality_of(protocol: Protocol, contrast: Contrast) -> str:
-    """Return a sentence on the equivalence test and the participants that it needs; "" without a bound."""
+def _equivalence_sentences(protocol: Protocol, contrast: Contrast) -> str:
+    """Return sentences on the equivalence test and the number of participants that it needs; "" without a bound."""
     if contrast.bound is None or protocol.analysis is None:
         return ""
     bounds = sum(contrast.bound is not None for contrast in protocol.analysis.contrasts)
@@ -179,15 +181,17 @@ def _interval_lines(protocol: Protocol, block: Block) -> Iterator[str]:
         yield f"Block {title}: how well can {listed(others)} be discriminated from {block.standard} (d′)?"
         return
     stimulus = protocol.stimulus_of(block)
-    what, unit = stimulus.quantity, stimulus.unit
-    standards = [one for one in protocol.standards_of(block) if one is not None]
+    quantity, unit = stimulus.quantity, stimulus.unit
+    standards = [standard for standard in protocol.standards_of(block) if standard is not None]
     if threshold_plan(protocol, block) is None:
-        asked = {"number": "What is the exponent of the power law for", "rating": "How do ratings change with"}
-        yield f"Block {title}: {asked.get(design.reply, 'How do answers change with')} {what}?"
+        questions = {"number": "What is the exponent of the power law for", "rating": "How do ratings change with"}
+        yield f"Block {title}: {questions.get(design.reply, 'How do answers change with')} {quantity}?"
         return
     at = f" at {listed([f'{standard:g}' for standard in standards])} {unit}".rstrip() if standards else ""
     kind = "Weber fraction" if stimulus.level_kind == "weber" else "threshold"
-    yield f"Block {title}: what is the {kind} for {what}{at}? We report an estimate with a 95 % interval but no test."
+    yield (
+        f"Block {title}: what is the {kind} for {quantity}{at}? We report an estimate with a 95 % interval but no test."
+    )
     if len(standards) > 1:
         yield (
             f"Block {title}: is the just-noticeable difference proportional to the standard (exponent 1, Weber's "
@@ -202,10 +206,10 @@ def _statement_lines(protocol: Protocol, block: Block, language: str) -> Iterato
         return
     texts = {item.id: text_in(item.text, language) for item in questionnaire.statements}
     if protocol.compared_in(block.id) == "delays":
-        for name, words in texts.items():
+        for name, text in texts.items():
             if name in decided.rising or name in decided.falling:
-                moves = "increases" if name in decided.rising else "decreases"
-                yield f"Hypothesis, block {title}: agreement with “{words}” ({name}) {moves} with the delay."
+                verb = "increases" if name in decided.rising else "decreases"
+                yield f"Hypothesis, block {title}: agreement with “{text}” ({name}) {verb} with the delay."
         if decided.noticed in texts:
             yield (
                 f"Block {title}: at what delay do participants notice a difference (answers of 5 to 7 to the "
@@ -270,7 +274,9 @@ def analyses(protocol: Protocol) -> Iterator[str]:
                 f"Block {title}: we report d′ for each participant, calculated from rates with the log-linear "
                 "correction."
             )
-    asked = [block for block in protocol.main_blocks if block.design is None and block.questionnaire is not None]
+    statement_blocks = [
+        block for block in protocol.main_blocks if block.design is None and block.questionnaire is not None
+    ]
     if protocol.forms:
         contrasts = () if protocol.analysis is None else protocol.analysis.contrasts
         forms = listed([_form_title(protocol, form) for form in protocol.forms])
@@ -281,10 +287,10 @@ def analyses(protocol: Protocol) -> Iterator[str]:
             "interval (Student's t). If a form is not scored, we report the means of its ratings and numbers. We "
             "count how often each option is chosen."
         )
-    if not asked:
+    if not statement_blocks:
         return
     decided = decisions(protocol)
-    kinds = {protocol.compared_in(block.id) for block in asked}
+    kinds = {protocol.compared_in(block.id) for block in statement_blocks}
     if "delays" in kinds:
         yield (
             f"Delays: we test for trends with {TRENDS[decided.trends]}. The test is one-sided if a direction is "
@@ -328,11 +334,11 @@ def preregistration_of(source: str, power: str | None = None) -> str:
 
 
 def preregistration(protocol: Protocol, protocol_hash: str, power: str | None = None) -> str:
-    """Return the text: hypotheses, design, sample size, exclusions, analysis, and a description of the protocol.
+    """Return a preregistration: hypotheses, design, sample size, exclusions, analysis, description of the protocol.
 
     ``power`` is the Markdown that ``liquid-study power`` wrote.
     """
-    one = commitment(protocol, protocol_hash)
+    committed = commitment(protocol, protocol_hash)
     study = protocol.study
     language = _language(protocol)
     lines = [
@@ -347,15 +353,15 @@ def preregistration(protocol: Protocol, protocol_hash: str, power: str | None = 
         "",
         "## Design",
         "",
-        *(f"- {line}" for line in _design(protocol)),
+        *(f"- {line}" for line in _design_lines(protocol)),
         "",
         "## Participants",
         "",
-        *_participants(protocol, one, power),
+        *_participant_lines(protocol, committed, power),
         "",
         "## Exclusions",
         "",
-        *(f"- {line}" for line in _exclusions(protocol)),
+        *(f"- {line}" for line in _exclusion_lines(protocol)),
         "",
         "## Analysis",
         "",
@@ -369,12 +375,12 @@ def preregistration(protocol: Protocol, protocol_hash: str, power: str | None = 
         "",
         "## Values that the report checks",
         "",
-        commitment_lines(one),
+        commitment_lines(committed),
     ]
     return "\n".join(lines)
 
 
-def _design(protocol: Protocol) -> Iterator[str]:
+def _design_lines(protocol: Protocol) -> Iterator[str]:
     study = protocol.study
     yield (
         "Conditions are identified only by codes until the key is opened. The study is "
@@ -405,29 +411,29 @@ def _design(protocol: Protocol) -> Iterator[str]:
         yield f"Block {title} {'presents' if alone else 'compares'} {compared}."
 
 
-def _participants(protocol: Protocol, one: Commitment, power: str | None) -> Iterator[str]:
+def _participant_lines(protocol: Protocol, committed: Commitment, power: str | None) -> Iterator[str]:
     """Yield sentences on the planned number of participants and its justification."""
-    planned = "The number of participants has not been decided, and there is no stopping rule."
-    if one.participants is not None:
+    sample_size = "The number of participants has not been decided, and there is no stopping rule."
+    if committed.participants is not None:
         decided = decisions(protocol)
-        planned = (
-            f"We plan to include {number_text.counted(one.participants, 'participant')}. The study ends when this "
-            "number of valid sessions is complete; only then are the data unblinded and tested."
+        sample_size = (
+            f"We plan to include {number_text.counted(committed.participants, 'participant')}. The study ends when "
+            "this number of valid sessions is complete; only then are the data unblinded and tested."
             if not decided.looks
-            else f"We plan to include {one.participants} participants. The data are unblinded and all tests are run "
-            f"when {listed([str(look) for look in decided.looks])} valid sessions are complete; adjusted p values "
+            else f"We plan to include {committed.participants} participants. The data are unblinded and all tests are "
+            f"run when {listed([str(look) for look in decided.looks])} valid sessions are complete; adjusted p values "
             f"of up to {listed([significant(level) for level in decided.alphas])} are significant at these looks "
             f"({SPENDINGS[decided.spending]} alpha spending, Lan & DeMets 1983). The study ends at the first look at "
             "which all primary statements and hypotheses are supported, or otherwise at the last look."
         )
-    wanted = (
+    precision_goal = (
         ""
-        if one.precision is None
-        else f" The goal is a 95 % interval for the group mean no wider than ±{percent(one.precision)}."
+        if committed.precision is None
+        else f" The goal is a 95 % interval for the group mean no wider than ±{percent(committed.precision)}."
     )
-    yield planned + wanted
+    yield sample_size + precision_goal
     if power is None or not power.startswith(f"# {PRECISION}"):  # otherwise the tables state the precision
-        reasons = [f"- {line}" for block in protocol.main_blocks for line in _precision_of(protocol, block)]
+        reasons = [f"- {line}" for block in protocol.main_blocks for line in _precision_lines(protocol, block)]
         yield from ("", *reasons) if reasons else ()
     if power is not None:
         yield from ("", *(f"##{line}" if line.startswith("#") else line for line in power.rstrip().splitlines()))
@@ -439,7 +445,7 @@ def _participants(protocol: Protocol, one: Commitment, power: str | None) -> Ite
         )
 
 
-def _precision_of(protocol: Protocol, block: Block) -> Iterator[str]:
+def _precision_lines(protocol: Protocol, block: Block) -> Iterator[str]:
     """Yield the expected precision of a block's estimates and how many participants the goal requires."""
     if (plan := precision_plan(protocol, block)) is None:
         return
@@ -454,7 +460,7 @@ def _precision_of(protocol: Protocol, block: Block) -> Iterator[str]:
     )
 
 
-def _exclusions(protocol: Protocol) -> Iterator[str]:
+def _exclusion_lines(protocol: Protocol) -> Iterator[str]:
     yield "Incomplete sessions are not analysed."
     for block in protocol.main_blocks:
         if block.catch is not None:
@@ -463,14 +469,16 @@ def _exclusions(protocol: Protocol) -> Iterator[str]:
                 f"catch trials of block {_title(protocol, block.id)} is excluded; the program applies this rule when "
                 "the data are unblinded."
             )
-    limits = "; ".join(f"{what} ({value})" for value, what in limit_rows(protocol))
+    limits = "; ".join(f"{limit} ({value})" for value, limit in limit_rows(protocol))
     has_intervals = any(block.design is not None for block in protocol.main_blocks)
     if has_intervals:
         attempts = protocol.limits.attempts
-        times = "" if attempts is None else f", for up to {number_text.counted(attempts, 'presentation')} in total"
+        attempts_note = (
+            "" if attempts is None else f", for up to {number_text.counted(attempts, 'presentation')} in total"
+        )
         yield (
             "If any interval in a trial exceeds one of the limits below, no question is asked and the trial is "
-            f"repeated{times}."
+            f"repeated{attempts_note}."
         )
         if (permitted := protocol.limits.missing_percent) is not None:
             yield (
@@ -506,9 +514,9 @@ class Deviations:
 
 
 def preregistration_folders(study: Study) -> dict[str, Path]:
-    """Return the folder of the preregistration for each site; for a rehearsal or pilot, it may be the study's folder.
+    """Return the folder of the preregistration by site; the only key of a study that is not merged is "".
 
-    The key is "" if the study has not been merged from sites.
+    For a rehearsal or pilot without its own file, it is the study's folder.
     """
     folders = {prefix.removesuffix(DASH): folder for prefix, folder in folders_of(study.folder).items()}
     if [*folders] == [""] and not (folders[""] / FILE).exists():
@@ -517,21 +525,21 @@ def preregistration_folders(study: Study) -> dict[str, Path]:
 
 
 def deviations(study: Study) -> Deviations | None:
-    """Return deviations from the plan; None without a preregistration or a planned number of participants."""
+    """Return the deviations from the preregistration; None without one and without a planned number of participants."""
     sites = {site: read_commitment(folder) for site, folder in preregistration_folders(study).items()}
     committed = next(filter(None, sites.values()), None)
     planned = (study.protocol.get("analysis") or {}).get("participants")
     if committed is None:
-        return None if planned is None else Deviations(None, tuple(_other_participants(study, planned)))
-    return Deviations(committed, tuple(_differences(study, sites, committed)))
+        return None if planned is None else Deviations(None, tuple(_sample_size_difference(study, planned)))
+    return Deviations(committed, tuple(_deviation_lines(study, sites, committed)))
 
 
-def _differences(study: Study, sites: Mapping[str, Commitment | None], committed: Commitment) -> Iterator[str]:
-    """Yield the differences of a study, or of a site's preregistration, from the commitments."""
-    for site, own in sites.items():
-        if own is None:
+def _deviation_lines(study: Study, sites: Mapping[str, Commitment | None], committed: Commitment) -> Iterator[str]:
+    """Yield the deviations of a study, and differences between the preregistrations of its sites, as text."""
+    for site, site_commitment in sites.items():
+        if site_commitment is None:
             yield f"site {site} does not have the file {FILE}"
-        elif own != committed:
+        elif site_commitment != committed:
             yield (f"the preregistration at site {site} differs from the one at the first site, which is used here")
     if study.name != committed.study:
         yield f"the preregistration belongs to a different study, {committed.study}"
@@ -539,14 +547,14 @@ def _differences(study: Study, sites: Mapping[str, Commitment | None], committed
     other = rows[rows["counted"] & (rows["protocol_hash"] != committed.protocol_hash)]
     if len(other):
         versions = listed(sorted(set(map(str, other["protocol_version"]))))
-        who = listed([f"{row.participant}/{row.session}" for row in other.head(_SHOWN).itertuples()])
+        sessions = listed([f"{row.participant}/{row.session}" for row in other.head(_SHOWN).itertuples()])
         more = "" if len(other) <= _SHOWN else f" and {len(other) - _SHOWN} more"
         yield (
             f"{counted(len(other), 'session')} used a protocol (version {versions}) that differs from the "
             f"preregistered protocol (version {committed.version}, SHA-256 {committed.protocol_hash[:12]}…): "
-            f"{who}{more}"
+            f"{sessions}{more}"
         )
-    yield from _other_participants(study, committed.participants)
+    yield from _sample_size_difference(study, committed.participants)
     by_person = [exclusion for exclusion in study.exclusions if exclusion.rule_or_person not in committed.rules]
     for exclusion in by_person[:_SHOWN]:
         yield (
@@ -559,7 +567,7 @@ def _differences(study: Study, sites: Mapping[str, Commitment | None], committed
         yield "the decisions about the analysis differ between sessions, so all results are exploratory"
 
 
-def _other_participants(study: Study, planned: int | None) -> Iterator[str]:
+def _sample_size_difference(study: Study, planned: int | None) -> Iterator[str]:
     if planned is not None and study.n not in (planned, *study.decided.looks):
         kind = "fewer" if study.n < planned else "more"
         yield f"there are {kind} participants than planned ({study.n} instead of {planned})"
@@ -567,29 +575,29 @@ def _other_participants(study: Study, planned: int | None) -> Iterator[str]:
 
 def deviations_section(study: Study) -> Iterator[str]:
     """Yield the report's section on deviations; nothing without a plan."""
-    compared = deviations(study)
-    if compared is None:
+    plan_deviations = deviations(study)
+    if plan_deviations is None:
         return
     yield heading(2, "Preregistration")
-    if (committed := compared.commitment) is None:
+    if (committed := plan_deviations.commitment) is None:
         missing = (
             f"The study's folder does not contain {FILE}. To create this file, use “Write preregistration” in the "
             "designer or liquid-study preregister --to. If you already have the file, copy it to the folder. "
         )
-        where = "" if study.simulated else missing
-        yield paragraph(f"{where}Only the number of participants is compared with the plan in the protocol.")
+        missing_note = "" if study.simulated else missing
+        yield paragraph(f"{missing_note}Only the number of participants is compared with the plan in the protocol.")
     else:
         yield paragraph(
             f"Preregistered: {committed.study}, version {committed.version}, protocol with SHA-256 "
             f"{committed.protocol_hash}."
         )
-    if compared.found:
+    if plan_deviations.found:
         plan = "preregistration" if committed is not None else "plan"
         yield paragraph(f"The study differs from the {plan} as follows:")
-        yield bullets(compared.found)
+        yield bullets(plan_deviations.found)
     else:
         yield paragraph(
             "The protocol, the number of participants, the exclusions and the decisions match the preregistration."
-            if compared.commitment is not None
+            if plan_deviations.commitment is not None
             else "The number of participants is as planned."
         )

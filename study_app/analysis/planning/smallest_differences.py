@@ -1,4 +1,4 @@
-"""The smallest differences that 80 % of studies detect, as tables of hypotheses, by number of participants."""
+"""Tables of the smallest difference that 80 % of studies detect, for each hypothesis and number of participants."""
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -15,7 +15,7 @@ from study_app.analysis.wording import whole_percent
 from study_app.protocol.model import Contrast
 
 MOST_SD: Final = 3.0
-"""Sample sizes that only find a larger difference, in standard deviations, are too few. [choice]"""
+"""The largest detectable difference [SD] that is reported; sample sizes that need a larger one are too few. [choice]"""
 
 
 def form_differences(
@@ -27,14 +27,14 @@ def form_differences(
     planned: int | None,
     titles: Mapping[str, str],
 ) -> Iterator[str]:
-    """Yield the table of a contrast of a form in standard deviations, which no answer model predicts.
+    """Yield the table of a contrast of a form, in standard deviations because answers to forms are not simulated.
 
-    The parameters are those of `smallest_differences`.
+    For the parameters see `smallest_differences`.
     """
-    of = "answers or scores" if contrast.within is None else "within-participant differences"
-    said = (
-        f"Answers to this form are not simulated. Differences are expressed in standard deviations (SD) of the {of}; "
-        "you can obtain the SD from pilot sessions or published data."
+    values_noun = "answers or scores" if contrast.within is None else "within-participant differences"
+    description = (
+        "Answers to this form are not simulated. Differences are expressed in standard deviations (SD) of the "
+        f"{values_noun}; you can obtain the SD from pilot sessions or published data."
     )
     rows = [(contrast.measure, "1", 1.0)]
     yield from smallest_differences(
@@ -44,7 +44,7 @@ def form_differences(
         members,
         rows,
         "question or score",
-        said,
+        description,
         "±{:.2f} SD".format,
         shares,
         planned=planned,
@@ -66,8 +66,8 @@ def smallest_differences(
     members: int,
     rows: Sequence[tuple[str, str, float]],
     first: str,
-    said: str,
-    written: Callable[[float], str],
+    description: str,
+    format_difference: Callable[[float], str],
     shares: tuple[float, float] | None = None,
     bound: float | None = None,
     *,
@@ -78,25 +78,25 @@ def smallest_differences(
     unit: str = "",
     titles: Mapping[str, str],
 ) -> Iterator[str]:
-    """Yield a Markdown table of the smallest difference in a contrast that 80 % of studies show.
+    """Yield a Markdown table of the smallest difference in a contrast that 80 % of studies detect.
 
-    It is one of ``members`` hypotheses, tested at the strictest p of Holm's correction. ``rows`` are its first cell,
-    below the heading ``first``, and the standard deviation as text and as a number; ``said`` describes it. ``shares``
-    are the shares of participants in the two groups; None: within participants. ``bound`` is the equivalence bound, on
-    the scale of the standard deviation, which ``bounds`` hypotheses state; ``largest`` is the largest difference of a
-    participant that the scale permits, None without a limit. ``planned`` participants have a verdict before the table;
-    ``assumed`` is a measure that can fall to 0 with its simulated mean; ``unit`` follows the difference in the verdict;
-    ``titles`` are those of the blocks.
+    The contrast is one of ``members`` hypotheses and is tested at the strictest alpha of Holm's correction. Each of
+    ``rows`` has the first cell, below the heading ``first``, and the standard deviation as text and as a number;
+    ``description`` explains the standard deviation. ``shares`` are the shares of participants in the two groups, None
+    within participants. ``bound`` is the equivalence bound on the scale of the standard deviation, and ``bounds`` the
+    number of hypotheses with a bound; ``largest`` is the largest difference of a participant that the scale permits,
+    None without a limit. A verdict on ``planned`` participants precedes the table. ``assumed`` is a measure that can
+    fall to 0, with its simulated mean; ``unit`` follows the difference in the verdict; ``titles`` are block titles.
     """
 
-    def titled(names: tuple[str, str] | None) -> tuple[str, str] | None:
+    def with_titles(names: tuple[str, str] | None) -> tuple[str, str] | None:
         return None if names is None else (titles.get(names[0], names[0]), titles.get(names[1], names[1]))
 
-    def directed(end: float) -> str:
+    def directed_text(end: float) -> str:
         """Return a difference without the sign of the other direction, which a one-sided test cannot detect."""
         if contrast.expected is None:
-            return written(end)
-        return written(end).replace("×/÷", "×" if contrast.expected == "higher" else "÷").removeprefix("±")
+            return format_difference(end)
+        return format_difference(end).replace("×/÷", "×" if contrast.expected == "higher" else "÷").removeprefix("±")
 
     def groups_of(n: int) -> list[int]:
         return [n] if shares is None else [int(n * share + 1e-9) for share in shares]
@@ -104,66 +104,77 @@ def smallest_differences(
     def differences(n: int, spread: float) -> tuple[float, float] | None:
         if min(groups := groups_of(n)) < 3:
             return None
-        half, least = detectable(*groups, alpha=strictest, expected=contrast.expected)
+        half, least = detectable_difference(*groups, alpha=strictest, expected=contrast.expected)
         return None if least > MOST_SD else (half * spread, least * spread)
 
     equal = [] if bound is None else [f"shown to be equivalent {IF_EQUAL}"]
     heads = (first, "participants", "SD", "half-width of the 95 % interval", "smallest difference", *equal)
     sides, strictest = "two-sided" if contrast.expected is None else "one-sided", alpha / members
     corrected = "" if members == 1 else f" ({alpha:.2g} divided by {members} hypotheses)"
-    both = "" if shares is None else f" {_group_sizes(*shares)}"
-    named = contrast.described(titled(contrast.compared), titled(contrast.within))
-    yield from ("", f"## Contrast: {named}", "")
-    at = f"{sides}, α = {strictest:.2g}{corrected}"
-    within = (
+    groups_note = "" if shares is None else f" {_group_sizes(*shares)}"
+    hypothesis = contrast.described(with_titles(contrast.compared), with_titles(contrast.within))
+    yield from ("", f"## Contrast: {hypothesis}", "")
+    test_note = f"{sides}, α = {strictest:.2g}{corrected}"
+    equivalence_note = (
         ""
         if bound is None
         else f"Equivalence requires at least {fewest_participants(alpha / bounds, bound, largest)} "
         f"participants{' in each group' if shares else ''}, at α = {alpha / bounds:.2g}. "
     )
     has_too_few = any(differences(n, spread) is None for n in sizes for *_, spread in rows)
-    unusable = (
+    too_few_note = (
         f"“Too few” means that fewer than {whole_percent(WANTED)} of studies would detect even a difference of "
         f"{MOST_SD:g} SD. " * has_too_few
     )
     yield (
-        f"{said}{both} The “smallest difference” is the difference that {whole_percent(WANTED)} of studies detect "
-        f"({at}). {unusable}{within}{inclusion_words([contrast])}"
+        f"{description}{groups_note} The “smallest difference” is the difference that {whole_percent(WANTED)} of "
+        f"studies detect ({test_note}). {too_few_note}{equivalence_note}{inclusion_words([contrast])}"
     )
     if planned is not None:
         name, _, spread = rows[0]
-        given = f" ({first}: {name})" if len(rows) > 1 else ""
+        row_note = f" ({first}: {name})" if len(rows) > 1 else ""
         yield from (
             "",
-            _verdict(contrast, planned, given, differences(planned, spread), lambda end: directed(end) + unit, assumed),
+            _verdict(
+                contrast,
+                planned,
+                row_note,
+                differences(planned, spread),
+                lambda end: directed_text(end) + unit,
+                assumed,
+            ),
         )
     yield from ("", f"| {' | '.join(heads)} |", "|---:" * len(heads) + "|")
-    for name, words, spread in rows:
+    for name, sd_text, spread in rows:
         for n in sizes:
             reached, groups = differences(n, spread), groups_of(n)
-            ends = ["too few", "too few"] if reached is None else [written(reached[0]), directed(reached[1])]
+            ends = (
+                ["too few", "too few"]
+                if reached is None
+                else [format_difference(reached[0]), directed_text(reached[1])]
+            )
             if bound is not None:
                 enough_people = min(groups) >= fewest_participants(alpha / bounds, bound, largest)
                 share = equivalence_power(*groups, alpha=alpha / bounds, bound=bound / spread) if enough_people else 0.0
                 ends.append(whole_percent(share))
-            yield f"| {name} | {size_text(n, planned)} | {words} | {' | '.join(ends)} |"
+            yield f"| {name} | {size_text(n, planned)} | {sd_text} | {' | '.join(ends)} |"
 
 
 def _verdict(
     contrast: Contrast,
     planned: int,
-    given: str,
+    row_note: str,
     reached: tuple[float, float] | None,
-    written: Callable[[float], str],
+    format_difference: Callable[[float], str],
     assumed: tuple[str, float] | None,
 ) -> str:
-    """Return the smallest difference that the planned sample finds, compared with a measure that falls to 0."""
-    of = "" if assumed is None else f" in {assumed[0]}"
-    too_few = f"The planned {planned} participants{given} are too few to find a difference{of}"
+    """Return a sentence on the smallest difference that the planned sample detects."""
+    in_measure = "" if assumed is None else f" in {assumed[0]}"
+    too_few = f"The planned {planned} participants{row_note} are too few to find a difference{in_measure}"
     if reached is None:
         return f"**{too_few} of {MOST_SD:g} SD with {whole_percent(WANTED)} power.**"
     _, least = reached
-    verdict = f"**{too_few} smaller than {written(least)} with {whole_percent(WANTED)} power.**"
+    verdict = f"**{too_few} smaller than {format_difference(least)} with {whole_percent(WANTED)} power.**"
     if assumed is None or least <= assumed[1]:
         return verdict
     measure, mean = assumed
@@ -175,12 +186,14 @@ def _verdict(
 
 
 def size_text(n: int, planned: int | None) -> str:
-    """Return a number of participants in a table, marked if it is the planned one."""
+    """Return a number of participants for a table, with a mark if it is the planned one."""
     return f"{n} (planned)" if n == planned else str(n)
 
 
-def detectable(n: int, second: int | None = None, *, alpha: float, expected: str | None) -> tuple[float, float]:
-    """Return half the 95 % interval and the smallest mean difference that 80 % of studies detect [SD].
+def detectable_difference(
+    n: int, second: int | None = None, *, alpha: float, expected: str | None
+) -> tuple[float, float]:
+    """Return the half-width of the 95 % interval and the smallest mean difference that 80 % of studies detect [SD].
 
     The studies have ``n`` pairs, or two groups of ``n`` and ``second`` participants, whose t has the degrees of freedom
     of the smaller group; a hypothesis without an ``expected`` direction is tested on both sides.

@@ -1,8 +1,8 @@
-"""The precision of thresholds that a study can expect, in simulated studies and in tables.
+"""The expected precision of thresholds, d′, d_a and exponents, from simulated studies, and its tables.
 
-The observers answer through the block's method; what they show is estimated as in the report. The people of a study
-differ by a factor of 1.2: in their thresholds about a mean that is drawn from the middle half of the levels, in d′, d_a
-and exponents about the value that `check` assumes.
+Simulated observers answer trials of the block's method, and their answers are analysed as in the report. Participants
+of a study differ by a factor of 1.2: in thresholds around a mean from the middle half of the levels, and in d′, d_a and
+exponents around the value that `check` assumes.
 """
 
 import math
@@ -41,17 +41,17 @@ from study_app.psychophysics.people import BETWEEN_PEOPLE, ESTIMATE_NOISE, Estim
 from study_app.store.files import Column, csv_bytes, optional
 
 BATCH: Final = 10
-"""Studies of one case; which studies these are does not depend on how many are asked for."""
+"""Studies in a batch; batches do not depend on the requested number of studies."""
 _TRACKS_AT_ONCE: Final = 200
 
 _Plan: TypeAlias = ThresholdPlan | MeanPlan
 _PrecisionPlans: TypeAlias = Mapping[str, Mapping[int, _Plan]]
-"""Block → trials of each standard → what is simulated."""
+"""The plans of simulations by block and by trials of each standard."""
 
 
 @dataclass(frozen=True)
 class Case:
-    """A batch of studies of one block with a given number of trials per standard."""
+    """The parameters of a batch of studies of one block, with a given number of trials for each standard."""
 
     block: str
     plan: _Plan
@@ -63,9 +63,9 @@ class PrecisionResult:
     """The results of studies of one block with a given number of trials per standard.
 
     ``errors`` are the errors of the participants' thresholds in each study, (participants, standards), in natural
-    logarithms, or relative to the threshold on linear spacing, or to the mean d′, d_a or exponent. ``halves`` are half
-    the group's 95 % interval relative to the mean, (sizes,); NaN below three participants, infinite if limits clip the
-    levels above the mean threshold.
+    logarithms, or relative to the threshold if levels are spaced linearly, or to the mean d′, d_a or exponent.
+    ``halves`` are half-widths of the group's 95 % interval relative to the mean, (sizes,); NaN for fewer than three
+    participants, infinite if limits clip the levels above the mean threshold.
     """
 
     errors: list[Array] = field(default_factory=list)
@@ -75,28 +75,29 @@ class PrecisionResult:
     def spread(self) -> float:
         """The standard deviation of one participant's error at one standard: the median over studies.
 
-        Infinite if nothing is measured.
+        It is infinite if limits clip the levels in all studies.
         """
         spreads = [float(errors.std(ddof=1)) for errors in self.errors if np.isfinite(errors).all()]
         return float(np.median(spreads)) if spreads else math.inf
 
     def half(self, place: int) -> float:
-        """Return the median of half the group's interval at the size with this index.
+        """Return the median half-width of the group's interval at the size with this index.
 
-        Studies without an interval have a wider one than all others; NaN if none has any.
+        Studies without an interval count as wider than all others; NaN if no study has one.
         """
         halves = np.array([half[place] for half in self.halves])
         return math.nan if np.isnan(halves).all() else float(np.median(np.nan_to_num(halves, nan=math.inf)))
 
     def within(self, place: int, precision: float) -> float:
-        """Return the share of studies whose half interval is within the precision, at the size with this index."""
+        """Return the share of studies whose half-width is at most ``precision``, at the size with this index."""
         return float(np.mean([half[place] <= precision for half in self.halves]))
 
 
 def plans(protocol: Protocol, trials: Sequence[int]) -> _PrecisionPlans:
-    """Return each block's plans by number of trials (default: its own), for thresholds, d′, d_a or exponents.
+    """Return the plans of each block by number of trials; without ``trials``, that of the protocol.
 
-    AnalysisError is raised if a method cannot have so few trials.
+    Blocks without a threshold, d′, d_a or exponent are omitted. AnalysisError is raised if a method cannot have so few
+    trials.
     """
     planned = {}
     for block in protocol.main_blocks:
@@ -104,43 +105,52 @@ def plans(protocol: Protocol, trials: Sequence[int]) -> _PrecisionPlans:
         if plan is None:
             continue
         changed: list[_Plan] = [plan.with_trials(trial) for trial in trials] or [plan]
-        for asked, one in zip(trials, changed, strict=False):
-            if abs(one.trials - asked) > max(1, asked / 2):
+        for asked, possible in zip(trials, changed, strict=False):
+            if abs(possible.trials - asked) > max(1, asked / 2):
                 raise AnalysisError(
                     f"{asked} trials cannot be divided among the tracks and levels in {block.id}: specify at least "
-                    f"{one.trials}"
+                    f"{possible.trials}"
                 )
-        planned[block.id] = {one.trials: one for one in changed}
+        planned[block.id] = {possible.trials: possible for possible in changed}
     return planned
 
 
 def study_batch(case: Case, sizes: Sequence[int]) -> PrecisionResult:
-    """Return the results of the studies of a batch.
+    """Simulate the studies of a batch and return their results.
 
-    ``sizes`` ascend; smaller studies have the first participants of the largest.
+    ``sizes`` ascend; smaller studies consist of the first participants of the largest one.
     """
     plan, rng, people = case.plan, np.random.default_rng(case.seed), sizes[-1]
     if not isinstance(plan, ThresholdPlan):
-        return _means(plan, sizes, rng)
+        return _simulate_means(plan, sizes, rng)
     low, high = plan.stimulus.domain
     means = low + (high - low) * (0.25 + 0.5 * rng.random((BATCH, 1, 1)))
-    apart = math.log(BETWEEN_PEOPLE) * rng.standard_normal((BATCH, people, 1))
+    deviations = math.log(BETWEEN_PEOPLE) * rng.standard_normal((BATCH, people, 1))
     log = plan.stimulus.spacing == "log"
-    own = means + apart / math.log(10) if log else means * np.exp(apart)
-    each, truth = plan.each_standard(), np.broadcast_to(own, (BATCH, people, plan.standards))
+    person_thresholds = means + deviations / math.log(10) if log else means * np.exp(deviations)
+    standard_plans, truth = plan.each_standard(), np.broadcast_to(person_thresholds, (BATCH, people, plan.standards))
     first = case.seed[-1] * BATCH
     kinds = [_kind_of(plan, first + place) for place in range(BATCH)]
-    parts = zip(each, np.split(truth, len(each), 2), strict=True)
-    of_sizes = zip(*(_estimates(plan, part, kinds, sizes, rng) for plan, part in parts), strict=True)
-    by_size = [tuple(np.concatenate(it, 2) for it in zip(*of_size, strict=True)) for of_size in of_sizes]
-    precision, full = PrecisionResult(), plan.measures(means).ravel().tolist()
+    parts = zip(standard_plans, np.split(truth, len(standard_plans), 2), strict=True)
+    of_sizes = zip(*(_simulate_thresholds(plan, part, kinds, sizes, rng) for plan, part in parts), strict=True)
+    by_size = [
+        tuple(np.concatenate(arrays, 2) for arrays in zip(*parts_of_size, strict=True)) for parts_of_size in of_sizes
+    ]
+    precision, mean_measures = PrecisionResult(), plan.measures(means).ravel().tolist()
     errors = (by_size[-1][0] - truth) * (math.log(10) if log else 1 / truth)
-    for study, measured in enumerate(full):
+    for study, measured in enumerate(mean_measures):
         halves = []
         for n, (medians, variances, shared) in zip(sizes, by_size, strict=True):
-            of_people, of_variances = medians[study].mean(axis=1), variances[study].sum(axis=1) / plan.standards**2
-            of_all = Z_95 * math.sqrt(float(shared[study].mean()))
-            group = group_mean(of_people.tolist(), of_variances.tolist(), (of_all, of_all)) if n >= FEWEST else None
+            person_medians, person_variances = (
+                medians[study].mean(axis=1),
+                variances[study].sum(axis=1) / plan.standards**2,
+            )
+            shared_error = Z_95 * math.sqrt(float(shared[study].mean()))
+            group = (
+                group_mean(person_medians.tolist(), person_variances.tolist(), (shared_error, shared_error))
+                if n >= FEWEST
+                else None
+            )
             if group is None or group.low is None or group.high is None:
                 halves.append(math.nan)
             elif not measured:
@@ -153,34 +163,34 @@ def study_batch(case: Case, sizes: Sequence[int]) -> PrecisionResult:
     return precision
 
 
-def _means(plan: MeanPlan, sizes: Sequence[int], rng: np.random.Generator) -> PrecisionResult:
-    """Return the results of a batch for d′, d_a or exponents, whose means have Student's interval."""
+def _simulate_means(plan: MeanPlan, sizes: Sequence[int], rng: np.random.Generator) -> PrecisionResult:
+    """Simulate a batch for d′, d_a or exponents, whose group intervals are Student's."""
     people, precision = sizes[-1], PrecisionResult()
     truth = plan.value * np.exp(math.log(BETWEEN_PEOPLE) * rng.standard_normal((BATCH, people)))
     estimates = plan.estimates(truth.reshape(-1), rng).reshape(BATCH, people)
-    for own, true in zip(estimates, truth, strict=True):
+    for estimated, true in zip(estimates, truth, strict=True):
         halves = []
         for n in sizes:
-            (low, high), mean = student_interval(own[:n]), abs(float(own[:n].mean()))
+            (low, high), mean = student_interval(estimated[:n]), abs(float(estimated[:n].mean()))
             half = math.nan if low is None or high is None else (high - low) / 2
             halves.append(half / mean if mean else math.inf)
-        precision.errors.append((own - true)[:, None] / plan.value)
+        precision.errors.append((estimated - true)[:, None] / plan.value)
         precision.halves.append(np.array(halves))
     return precision
 
 
 def _kind_of(plan: ThresholdPlan, study: int) -> Person:
-    """Return the kind of participants of a study; the kinds alternate."""
+    """Return the kind of participants of a study; studies cycle through all kinds."""
     return [*plan.kinds.values()][study % len(plan.kinds)]
 
 
-def _estimates(
+def _simulate_thresholds(
     plan: ThresholdPlan, truth: Array, kinds: Sequence[Person], sizes: Sequence[int], rng: np.random.Generator
 ) -> Iterator[tuple[Array, ...]]:
     """Yield for each size medians and variances (studies, participants, standards), and shared errors (studies, 1, …).
 
-    Observers have thresholds ``truth`` (studies, participants, standards) [u]; all participants of a study are of one
-    of ``kinds``. The first of them are the participants of the smaller studies, which estimate their own widths.
+    ``truth`` are the observers' thresholds (studies, participants, standards) [u]; ``kinds`` has the kind of
+    participants of each study. Smaller studies consist of the first participants, with their own group priors.
     """
     studies, people, standards = truth.shape
     own, at_once = truth.transpose(0, 2, 1).reshape(-1), max(1, _TRACKS_AT_ONCE // people) * people
@@ -195,13 +205,13 @@ def _estimates(
         values = zip(
             *((estimates.medians, estimates.variances, estimates.shared) for estimates in of_size), strict=True
         )
-        yield tuple(np.concatenate(it).reshape(studies, standards, -1).transpose(0, 2, 1) for it in values)
+        yield tuple(np.concatenate(arrays).reshape(studies, standards, -1).transpose(0, 2, 1) for arrays in values)
 
 
 def sweep(
     planned: _PrecisionPlans, sizes: Sequence[int], studies: int, seed: int, executor: Executor
 ) -> Iterator[tuple[int, dict[tuple[str, int], PrecisionResult]]]:
-    """Yield after every round of batches the number of simulated studies so far, and their results.
+    """Yield the number of simulated studies so far and their results after every round of batches.
 
     ``studies`` is the number for each block and number of trials; ``sizes`` ascend. Every batch has its own seed, so
     the numbers do not depend on the executor.
@@ -214,16 +224,16 @@ def sweep(
         for place, block in enumerate(planned)
         for trials in planned[block]
     ]
-    total = {key: PrecisionResult() for key in keys}
-    found = executor.map(study_batch, cases, [tuple(sizes)] * len(cases))
-    for number, (case, precision) in enumerate(zip(cases, found, strict=True), start=1):
+    pooled_results = {key: PrecisionResult() for key in keys}
+    results = executor.map(study_batch, cases, [tuple(sizes)] * len(cases))
+    for number, (case, precision) in enumerate(zip(cases, results, strict=True), start=1):
         done = (number - 1) // len(keys) * BATCH
-        kept = min(BATCH, studies - done)
-        held = total[case.block, case.plan.trials]
-        held.errors += precision.errors[:kept]
-        held.halves += precision.halves[:kept]
+        count = min(BATCH, studies - done)
+        pooled = pooled_results[case.block, case.plan.trials]
+        pooled.errors += precision.errors[:count]
+        pooled.halves += precision.halves[:count]
         if number % len(keys) == 0:
-            yield done + kept, total
+            yield done + count, pooled_results
 
 
 COLUMNS: Final = (
@@ -276,32 +286,32 @@ class Precisions:
 
     @property
     def precision(self) -> float | None:
-        """The planned half interval relative to the mean."""
+        """The planned half-width of the interval, relative to the mean."""
         decided = self.protocol.analysis
         return None if decided is None else decided.precision
 
 
 def threshold_csv(precisions: Precisions) -> bytes:
     """Return a CSV row for every block, number of trials and size."""
-    return csv_bytes(COLUMNS, _rows(precisions))
+    return csv_bytes(COLUMNS, _csv_rows(precisions))
 
 
-def _rows(all_of_it: Precisions) -> Iterator[dict[str, Any]]:
-    precision = all_of_it.precision
-    for (block, trials), found in all_of_it.found.items():
-        for place, size in enumerate(all_of_it.sizes):
-            half = found.half(place)
+def _csv_rows(precisions: Precisions) -> Iterator[dict[str, Any]]:
+    precision = precisions.precision
+    for (block, trials), result in precisions.found.items():
+        for place, size in enumerate(precisions.sizes):
+            half = result.half(place)
             known = precision is not None and not math.isnan(half)
-            within = found.within(place, precision) if precision is not None and known else None
-            low, high = (None, None) if within is None else interval(within, all_of_it.studies)
+            within = result.within(place, precision) if precision is not None and known else None
+            low, high = (None, None) if within is None else interval(within, precisions.studies)
             yield {
-                "study": all_of_it.protocol.study.name,
+                "study": precisions.protocol.study.name,
                 "simulated": True,
                 "block": block,
                 "trials": trials,
                 "participants": size,
-                "studies": all_of_it.studies,
-                "spread": round(found.spread, 4) if math.isfinite(found.spread) else None,
+                "studies": precisions.studies,
+                "spread": round(result.spread, 4) if math.isfinite(result.spread) else None,
                 "half_interval": round(half, 4) if math.isfinite(half) else None,
                 "precision": precision,
                 "within": None if within is None else round(within, 4),
@@ -324,8 +334,8 @@ def threshold_markdown(precisions: Precisions) -> str:
     if precisions.studies < precisions.asked:
         lines += ["", f"**Preliminary: {precisions.studies} of {precisions.asked} studies were simulated.**"]
     participants = None if precisions.protocol.analysis is None else precisions.protocol.analysis.participants
-    wanted = [] if precision is None else [f"studies within ±{100 * precision:g} %"]
-    heads = ["participants", "SD for one participant", "half-width of the group's 95 % interval", *wanted]
+    precision_heading = [] if precision is None else [f"studies within ±{100 * precision:g} %"]
+    heads = ["participants", "SD for one participant", "half-width of the group's 95 % interval", *precision_heading]
     planned = plans(precisions.protocol, ())
     blocks = precisions.protocol.blocks
     for block in dict.fromkeys(block for block, _ in precisions.found):
@@ -338,25 +348,25 @@ def threshold_markdown(precisions: Precisions) -> str:
         ]
         trials_of, unknown = "trials" + next(iter(planned[block].values())).per, False
         lines += [f"| {' | '.join((trials_of, *heads))} |", "|---:" * (1 + len(heads)) + "|"]
-        for (of_block, trials), found in precisions.found.items():
-            if of_block != block:
+        for (result_block, trials), result in precisions.found.items():
+            if result_block != block:
                 continue
             for place, size in enumerate(precisions.sizes):
-                half = found.half(place)
+                half = result.half(place)
                 unknown |= not math.isfinite(half)
-                share = "–" if math.isnan(half) else whole_percent(found.within(place, precision or 0.0))
-                spread = whole_percent(found.spread) if math.isfinite(found.spread) else "–"
+                share = "–" if math.isnan(half) else whole_percent(result.within(place, precision or 0.0))
+                spread = whole_percent(result.spread) if math.isfinite(result.spread) else "–"
                 cells = (
                     str(trials),
                     size_text(size, participants),
                     spread,
                     f"±{whole_percent(half)}" if math.isfinite(half) else "–",
                 )
-                lines.append(f"| {' | '.join((*cells, *([share] if wanted else [])))} |")
+                lines.append(f"| {' | '.join((*cells, *([share] if precision_heading else [])))} |")
         if unknown:
             lines += ["", _NO_INTERVAL]
-        lines += _of_kinds(precisions, block)
-    lines += _contrasts(precisions)
+        lines += _kind_sentences(precisions, block)
+    lines += _contrast_tables(precisions)
     return "\n".join(lines) + "\n"
 
 
@@ -366,8 +376,8 @@ _NO_INTERVAL: Final = (
 )
 
 
-def _of_kinds(precisions: Precisions, block: str) -> Iterator[str]:
-    """Yield the width of the largest group's interval with the most trials, over kinds: median and worst."""
+def _kind_sentences(precisions: Precisions, block: str) -> Iterator[str]:
+    """Yield a sentence on the precision of the largest sample with the most trials: median and worst over kinds."""
     trials = max(trials for of_block, trials in precisions.found if of_block == block)
     halves = [half[-1] for half in precisions.found[block, trials].halves]
     plan = plans(precisions.protocol, (trials,))[block][trials]
@@ -384,14 +394,14 @@ def _of_kinds(precisions: Precisions, block: str) -> Iterator[str]:
         )
 
 
-_MEASURED: Final = {ThresholdPlan: "threshold", SensitivityPlan: "d_prime", EstimationPlan: "exponent"}
+_MEASURES: Final = {ThresholdPlan: "threshold", SensitivityPlan: "d_prime", EstimationPlan: "exponent"}
 
 
-def _contrasts(precisions: Precisions) -> Iterator[str]:
-    """Yield, for each contrast of planned blocks, a table of the smallest difference that 80 % of studies show."""
+def _contrast_tables(precisions: Precisions) -> Iterator[str]:
+    """Yield the table of smallest detectable differences of each contrast between planned blocks."""
     if (decided := precisions.protocol.analysis) is None:
         return
-    planned, titles = plans(precisions.protocol, ()), _titles(precisions.protocol)
+    planned, titles = plans(precisions.protocol, ()), _titles_by_block(precisions.protocol)
     alpha, members = decisions(precisions.protocol).alphas[-1], len(decided.contrasts)
     for contrast in decided.contrasts:
         if contrast.form is not None:
@@ -401,34 +411,34 @@ def _contrasts(precisions: Precisions) -> Iterator[str]:
             )
             continue
         firsts = [next(iter(planned[block].values())) for block in contrast.blocks if block in planned]
-        if len(firsts) < len(contrast.blocks) or any(_MEASURED.get(type(it)) != contrast.measure for it in firsts):
+        if len(firsts) < len(contrast.blocks) or any(_MEASURES.get(type(plan)) != contrast.measure for plan in firsts):
             continue
         first, ratio = firsts[0], contrast.measure == "threshold"
-        what = contrast.measure.replace("d_prime", "d′")
-        assumed = None if isinstance(first, ThresholdPlan) else (what, first.value)
+        measure = contrast.measure.replace("d_prime", "d′")
+        assumed = None if isinstance(first, ThresholdPlan) else (measure, first.value)
         mean = 1.0 if assumed is None else assumed[1]
-        written = (lambda end: f"×/÷ {math.exp(end):.2f}") if ratio else "±{:.2f}".format
-        spreads = [(name, mean * spread) for name, spread in _spreads(precisions, contrast)]
-        rows = [(name, written(spread).removeprefix("±"), spread) for name, spread in spreads]
+        format_difference = (lambda end: f"×/÷ {math.exp(end):.2f}") if ratio else "±{:.2f}".format
+        spreads = [(name, mean * spread) for name, spread in _spreads_by_trials(precisions, contrast)]
+        rows = [(name, format_difference(spread).removeprefix("±"), spread) for name, spread in spreads]
         if not rows:
             continue
-        share = "" if assumed is None else f", at a mean {what} of {mean:g}"
-        whose = f"of one participant's {what}, from the estimation error and the variation between people"
+        mean_note = "" if assumed is None else f", at a mean {measure} of {mean:g}"
+        sd_note = f"of one participant's {measure}, from the estimation error and the variation between people"
         if contrast.within is not None:
-            whose = "of one participant's difference, from both estimation errors and the variation between people"
+            sd_note = "of one participant's difference, from both estimation errors and the variation between people"
         yield from smallest_differences(
             contrast, precisions.sizes, alpha, members, rows,
             f"trials{first.per}",
-            f"SD: standard deviation {whose} (a factor of {BETWEEN_PEOPLE:g}){share}.",
-            written,
+            f"SD: standard deviation {sd_note} (a factor of {BETWEEN_PEOPLE:g}){mean_note}.",
+            format_difference,
             group_shares(precisions.protocol, contrast),
             _log_bound(precisions.protocol, contrast) if ratio else contrast.bound,
-            bounds=sum(each.bound is not None for each in decided.contrasts),
+            bounds=sum(other.bound is not None for other in decided.contrasts),
             planned=decided.participants, assumed=assumed, titles=titles,
         )  # fmt: skip
 
 
-def _titles(protocol: Protocol) -> dict[str, str]:
+def _titles_by_block(protocol: Protocol) -> dict[str, str]:
     """Return the titles of the blocks by ID, as in the report."""
     blocks = {name: {"phase": block.phase, "title": block.title} for name, block in protocol.blocks.items()}
     return block_titles({"study": {"languages": protocol.study.languages}, "blocks": blocks})
@@ -442,17 +452,18 @@ def _log_bound(protocol: Protocol, contrast: Contrast) -> float | None:
     return abs(math.log(contrast.bound))
 
 
-def _spreads(precisions: Precisions, contrast: Contrast) -> Iterator[tuple[str, float]]:
-    """Yield numbers of trials, and the resulting standard deviation of a participant's compared value."""
+def _spreads_by_trials(precisions: Precisions, contrast: Contrast) -> Iterator[tuple[str, float]]:
+    """Yield numbers of trials, with the resulting standard deviation of the value that a contrast compares."""
     protocol = precisions.protocol
     tracks = [
-        () if contrast.measure == "exponent" else tracks_of(protocol, protocol.blocks[it]) for it in contrast.blocks
+        () if contrast.measure == "exponent" else tracks_of(protocol, protocol.blocks[block])
+        for block in contrast.blocks
     ]
-    averaged = [len({(track.standard, track.comparison) for track in of_block}) or 1 for of_block in tracks]
+    counts = [len({(track.standard, track.comparison) for track in of_block}) or 1 for of_block in tracks]
     for trials in (trials for block, trials in precisions.found if block == contrast.blocks[0]):
-        held = [found for block in contrast.blocks if (found := precisions.found.get((block, trials))) is not None]
-        spreads = [precision.spread / math.sqrt(count) for precision, count in zip(held, averaged, strict=False)]
-        if len(held) == len(contrast.blocks) and all(map(math.isfinite, spreads)):
+        results = [result for block in contrast.blocks if (result := precisions.found.get((block, trials))) is not None]
+        spreads = [precision.spread / math.sqrt(count) for precision, count in zip(results, counts, strict=False)]
+        if len(results) == len(contrast.blocks) and all(map(math.isfinite, spreads)):
             yield str(trials), math.hypot(math.log(BETWEEN_PEOPLE), *spreads)
 
 

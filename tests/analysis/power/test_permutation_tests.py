@@ -77,8 +77,8 @@ def test_where_everybody_answers_alike_nothing_is_found() -> None:
         assert (simulated_studies.slopes(untested, block, np.array([False, True])) == 1).all()
     assert (simulated_studies.signed(same[:, :, :2], rng()) == 1).all()
     equal = same[:, :, 0] - same[:, :, 1]
-    assert simulated_studies.equivalent(equal, 1.2, 0.05).all()
-    assert not simulated_studies.equivalent(equal[:, :13], 1.2, 0.05).any()
+    assert simulated_studies._are_equivalent(equal, 1.2, 0.05).all()
+    assert not simulated_studies._are_equivalent(equal[:, :13], 1.2, 0.05).any()
 
 
 @pytest.mark.variants(1)
@@ -87,7 +87,7 @@ def test_where_everybody_answers_alike_nothing_is_found() -> None:
 def test_equivalence_is_the_reports(n: int, bound: float) -> None:
     answers = answered(5, (200, n, 2, 2), rise=0.4)
     differences = answers[:, :, 1] - answers[:, :, 0]
-    found = simulated_studies.equivalent(differences, bound, 0.05).ravel()
+    found = simulated_studies._are_equivalent(differences, bound, 0.05).ravel()
     by_t = 0
     for one, shown in zip(differences.transpose(0, 2, 1).reshape(-1, n), found, strict=True):
         whole = tost(one, bound)

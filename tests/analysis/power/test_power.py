@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from study_app.analysis.planning.power_curves import _detectable, interval, power_markdown, powers
+from study_app.analysis.planning.power_curves import _detectable_effect, interval, power_markdown, powers
 from study_app.analysis.planning.simulated_studies import (
     BATCH,
     FULL,
@@ -241,4 +241,4 @@ def test_sizes_that_make_no_sense_are_refused(sizes: str) -> None:
     ],
 )
 def test_the_detectable_effect_is_where_80_percent_of_studies_find_it(found: list[float], effect: float | None) -> None:
-    assert _detectable(np.array(found), np.array([0.0, 1.0, 2.0])) == (effect and pytest.approx(effect))
+    assert _detectable_effect(np.array(found), np.array([0.0, 1.0, 2.0])) == (effect and pytest.approx(effect))

@@ -13,7 +13,7 @@ from study_app.analysis.planning.threshold_studies import (
     BATCH,
     PrecisionResult,
     Precisions,
-    _of_kinds,
+    _kind_sentences,
     plans,
     study_batch,
     sweep,
@@ -143,7 +143,7 @@ def test_the_precision_of_each_type_of_participant_is_that_of_the_largest_group_
     found = {("thicker", 20): few, ("thicker", 40): PrecisionResult([np.zeros((1, 2))] * len(of_kinds), of_kinds)}
     precisions = Precisions(protocol=study(), sizes=(5, 12), studies=9, asked=9, seed=1, found=found)
     middle, worst = len(kinds) // 2, len(kinds) - 1
-    assert [*_of_kinds(precisions, "thicker")] == [
+    assert [*_kind_sentences(precisions, "thicker")] == [
         "",
         "With 12 participants and 40 trials, the precision depends on the type of participant: "
         f"±{10 + 20 * middle} % (median across types), ±{10 + 20 * worst} % at worst ({kinds[worst]}).",
