@@ -13,7 +13,7 @@ from study_app.analysis.data.motion import Performance, performance
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.findings import all_findings
 from study_app.analysis.findings.finding import BlockAnswers, block_answers, empty_result, summarize_block
-from study_app.analysis.findings.statement_tests import with_gates
+from study_app.analysis.findings.statement_tests import add_gates
 from study_app.analysis.levels.evaluate import level_results
 from study_app.analysis.questions import question_results, score_results
 from study_app.analysis.results import (
@@ -49,7 +49,7 @@ def evaluate(study: Study, *, recordings: bool = True, progress: Progress = repo
     >>> results = evaluate(load_study(Path("results/sample-rek2024")))
     >>> [(block.id, block.n, block.revealed) for block in results.blocks]
     [('liquids', 12, False), ('delays', 12, False)]
-    >>> tested = SettingsDiffer.of(results.blocks[0])[0]
+    >>> tested = SettingsDiffer.value_in(results.blocks[0])[0]
     >>> print(f"{tested.item}: p = {tested.outcome.p:.2f}, W = {tested.outcome.effect:.2f}")
     feels_liquid: p = 0.78, W = 0.03
     """
@@ -73,7 +73,7 @@ def _evaluate_study(study: Study, failures: Failures, progress: Progress, *, rec
         failures.attempt("all tests", partial(block_answers, study, block, SEED, failures), block=block.id)
         for block in study.blocks
     ]
-    gated = with_gates([answers for answers in collected if not isinstance(answers, Failure)])
+    gated = add_gates([answers for answers in collected if not isinstance(answers, Failure)])
 
     def block_result(number: int, block: Block) -> BlockResult:
         def tell(what: str) -> None:

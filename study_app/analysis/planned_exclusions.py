@@ -11,7 +11,7 @@ import pandas as pd
 
 from study_app.analysis.data.study_tables import Study, load_study
 from study_app.analysis.evaluate import evaluate
-from study_app.analysis.levels.tracks import below_chance, tracks
+from study_app.analysis.levels.tracks import sessions_below_chance, tracks
 from study_app.analysis.results import Results
 from study_app.analysis.wording import counted, number, p_equals, percent
 from study_app.number_text import capitalised
@@ -139,7 +139,7 @@ _SessionReasons = Iterator[tuple[Any, str]]
 
 def _sessions_below_chance(study: Study) -> _SessionReasons:
     if study.revealed and study.levels:
-        for session in below_chance(tracks(replace(study, with_below_chance=True)), study.levels):
+        for session in sessions_below_chance(tracks(replace(study, with_below_chance=True)), study.levels):
             yield (
                 (session.participant, session.session),
                 f"{session.right} of {session.n} answers in {session.block} are correct, which is fewer than expected "

@@ -63,7 +63,7 @@ def keeps_contract(made: Study, forms: Sequence[str] = ()) -> Results:
         texts.append(seen(re.sub(r'src="[^"]*"', 'src="#part-"', section)))
         for finding in all_findings():
             if found.kind not in (finding.kinds if found.revealed else finding.sealed):
-                assert finding.of(found) == finding.empty, finding.key
+                assert finding.value_in(found) == finding.empty, finding.key
             here = finding(found, results)
             told = [*here.limits(), *here.methods()]
             assert all(text.endswith(".") for text in told), finding.key

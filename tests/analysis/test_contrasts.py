@@ -25,7 +25,7 @@ from study_app.analysis.page_layout import draw_figures
 from study_app.analysis.planning.power_curves import Powers, power_markdown, powers
 from study_app.analysis.planning.preregistration import preregistration
 from study_app.analysis.planning.simulated_studies import count_findings, draw_opinions, plan, stacked_answers
-from study_app.analysis.planning.smallest_differences import detectable, smallest_differences
+from study_app.analysis.planning.smallest_differences import detectable_difference, smallest_differences
 from study_app.analysis.planning.threshold_studies import PrecisionResult, Precisions, threshold_markdown
 from study_app.analysis.report import write_report
 from study_app.analysis.report.first_page import Presented, cards, first_page
@@ -106,7 +106,12 @@ def test_two_thresholds_are_compared_once_the_key_is_open(delayed: Path, tmp_pat
     error = (expected.high - expected.low) / 2 / student.ppf(0.975, 5)
     assert found.statistic == pytest.approx(expected.mean / error)
     assert found.p == pytest.approx(student.sf(expected.mean / error, 5))
-    least = detectable(6, alpha=results.decided.alpha, expected="higher")[1] * error * math.log(10) * math.sqrt(6)
+    least = (
+        detectable_difference(6, alpha=results.decided.alpha, expected="higher")[1]
+        * error
+        * math.log(10)
+        * math.sqrt(6)
+    )
     not_shown = replace(results, contrasts=(replace(found, verdict="not shown"),))
     detected = f"a mean ratio must be at least {math.exp(least):.2f} (or at most {math.exp(-least):.2f}) to be detected"
     assert any(detected in it for it in limits(study, not_shown))
@@ -153,7 +158,7 @@ def test_thresholds_of_a_staircase_leave_nobody_out_and_name_who_did_not_do_a_bl
     below = [
         one
         for level in evaluate(study).levels
-        for one in Thresholds.own(level)
+        for one in Thresholds.participant_rows(level)
         if one.threshold < met[one.participant, level.block]
     ]
     assert below, "some thresholds lie below all levels that the person met"
@@ -299,7 +304,7 @@ def test_the_score_of_a_form_after_each_block_is_a_hypothesis(tmp_path: Path) ->
 def test_power_of_a_hypothesis_on_a_form_is_stated_in_standard_deviations() -> None:
     protocol = parse(LOADED.encode(), "loaded.toml")
     told = threshold_markdown(Precisions(protocol=protocol, sizes=(18,), studies=10, asked=10, seed=1, found={}))
-    half, smallest = detectable(18, alpha=0.05, expected=None)
+    half, smallest = detectable_difference(18, alpha=0.05, expected=None)
     assert "“raw” (load) differs between Late and Prompt" in told
     assert f"| raw | 18 | 1 | ±{half:.2f} SD | ±{smallest:.2f} SD |" in told
 
@@ -354,8 +359,8 @@ def test_limits_of_the_study_are_the_power_of_its_hypotheses_and_groups_that_exi
     spread = (settings["L3"] - settings["L1"]).std()
     alpha = results.decided.alpha / 2
     leasts = (
-        pooled * detectable(len(one), len(two), alpha=alpha, expected=None)[1],
-        spread * detectable(len(people), alpha=alpha, expected="higher")[1],
+        pooled * detectable_difference(len(one), len(two), alpha=alpha, expected=None)[1],
+        spread * detectable_difference(len(people), alpha=alpha, expected="higher")[1],
     )
     for place, least in enumerate(leasts, start=1):
         line = next(line for line in told if line.startswith(f"Hypothesis {place}: with {len(people)} participants"))
@@ -444,7 +449,7 @@ def test_power_tells_the_smallest_interaction() -> None:
     }
     told = threshold_markdown(Precisions(protocol=protocol, sizes=(18,), studies=10, asked=10, seed=1, found=found))
     spread = math.hypot(math.log(1.2), math.log(1.3), math.log(1.3))
-    half, smallest = (math.exp(spread * end) for end in detectable(12, 6, alpha=0.05, expected=None))
+    half, smallest = (math.exp(spread * end) for end in detectable_difference(12, 6, alpha=0.05, expected=None))
     assert "the difference in threshold between Late and Prompt differs between a and b (interaction)" in told
     assert f"| 20 | 18 | ×/÷ {math.exp(spread):.2f} | ×/÷ {half:.2f} | ×/÷ {smallest:.2f} |" in told
     text, _, rest = source_bytes("rek2024").decode().partition("sequence = ")
@@ -541,7 +546,7 @@ def test_power_tells_the_smallest_difference_between_groups() -> None:
         assert f"{sizes} of the participants." in told
     spread = math.hypot(math.log(1.2), math.log(1.3))
     assert f"| 20 | 3 | ×/÷ {math.exp(spread):.2f} | too few | too few |" in told
-    half, smallest = (math.exp(spread * end) for end in detectable(12, 6, alpha=0.05, expected=None))
+    half, smallest = (math.exp(spread * end) for end in detectable_difference(12, 6, alpha=0.05, expected=None))
     root = spread * math.sqrt(1 / 12 + 1 / 6)
     assert half == pytest.approx(math.exp(student.ppf(0.975, 5) * root))
     assert f"| 20 | 18 | ×/÷ {math.exp(spread):.2f} | ×/÷ {half:.2f} | ×/÷ {smallest:.2f} |" in told
@@ -561,7 +566,7 @@ def test_power_tells_the_smallest_difference_between_groups() -> None:
 @pytest.mark.parametrize(("n", "alpha", "expected"), [(9, 0.05, None), (26, 0.02, "lower"), (40, 0.0125, "higher")])
 def test_80_percent_of_studies_detect_the_smallest_difference(n: int, alpha: float, expected: str | None) -> None:
     """The t test alone detects it more often: the bootstrap and the test corrected for skewness must agree with it."""
-    half, smallest = detectable(n, alpha=alpha, expected=expected)
+    half, smallest = detectable_difference(n, alpha=alpha, expected=expected)
     assert half == pytest.approx(student.ppf(0.975, n - 1) / math.sqrt(n))
     values = np.random.default_rng(n).normal(size=(4000, n)) + smallest
     p = p_differs(means_of(values), "greater" if expected else "two-sided")
@@ -579,7 +584,7 @@ def test_power_says_whether_the_planned_participants_suffice() -> None:
         )  # fmt: skip
         return "\n".join(lines)
 
-    half, least = (0.9 * end for end in detectable(8, 8, alpha=0.03, expected=None))
+    half, least = (0.9 * end for end in detectable_difference(8, 8, alpha=0.03, expected=None))
     assert 1.3 < least < 1.9
     few = told(16, 1.3)
     assert (
@@ -621,7 +626,7 @@ def test_the_smallest_difference_is_slightly_above_that_of_published_tables(
     sizes: tuple[int, ...], expected: str | None, of_t: float
 ) -> None:
     """Cohen 1988, tables 2.4.1, for the t test alone: d = 0.5 needs 34 pairs, or two groups of 64 (α = .05)."""
-    assert of_t < detectable(*sizes, alpha=0.05, expected=expected)[1] < 1.15 * of_t
+    assert of_t < detectable_difference(*sizes, alpha=0.05, expected=expected)[1] < 1.15 * of_t
 
 
 @pytest.mark.parametrize("groups", [(9,), (30,), (12, 6)])
@@ -676,7 +681,7 @@ def test_power_plans_differences_and_equality_within_people(
             protocol=parse(text.encode(), "delayed.toml"), sizes=(40,), studies=10, asked=10, seed=1, found=found
         )
     )
-    half, least = (spread * end for end in detectable(40, alpha=0.05, expected="higher"))
+    half, least = (spread * end for end in detectable_difference(40, alpha=0.05, expected="higher"))
     ends = f"{spread:.2f} | ±{half:.2f} | {least:.2f}"  # a one-sided test detects one direction
     if not edits:
         ends = f"×/÷ {math.exp(spread):.2f} | ×/÷ {math.exp(half):.2f} | × {math.exp(least):.2f}"

@@ -15,7 +15,7 @@ from study_app.analysis.data.blocks import Block, Decided, Item, Setting
 from study_app.analysis.data.study_tables import load_study
 from study_app.analysis.evaluate import _delivery_check, evaluate
 from study_app.analysis.findings.delays import ContrastsWithControl
-from study_app.analysis.findings.finding import MANY, corrected_tests, of_tables
+from study_app.analysis.findings.finding import MANY, answers_from_tables, corrected_tests
 from study_app.analysis.findings.recognition import LiquidRecognition
 from study_app.analysis.findings.statement_tests import DelayTrend, Pairs, SettingsDiffer, pairs_of
 from study_app.analysis.report.write_report import as_json_types
@@ -44,7 +44,7 @@ DECIDED = Decided(
 )
 
 
-NOBODY = of_tables(
+NOBODY = answers_from_tables(
     Block(id="b", title="Block", kind="liquids", settings=(), items=(), labels=(), cannot_judge=None), DECIDED, (), {}
 )
 
@@ -108,7 +108,7 @@ def test_what_could_not_have_been_shown_is_out_of_reach() -> None:
 
 def test_of_five_no_pair_is_there_and_it_says_why(rek: Folder) -> None:
     liquids, delays = blocks(opened(rek, 5))
-    assert Pairs.of(liquids) == ()
+    assert Pairs.value_in(liquids) == ()
     assert [one.what for one in liquids.absent] == ["pairwise comparison of conditions", "cumulative mixed model"]
     why = "5 participants cannot show a difference between two conditions: the smallest attainable p is .062, and .188"
     assert liquids.absent[0].why.startswith(f"{why} after Holm's correction for 3 pairs, which is above 0.05")
@@ -123,20 +123,20 @@ def test_nothing_decided_makes_everything_exploratory(tmp_path: Path) -> None:
     results = found(opened(without("all", tmp_path / "rek2024"), 8))
     liquids, delays = results.blocks
     assert not results.decided.made
-    assert {one.primary for one in SettingsDiffer.of(liquids)} == {False}
-    assert {one.correction for one in SettingsDiffer.of(liquids)} == {"Benjamini-Hochberg"}
-    assert "shown" not in {one.verdict for one in SettingsDiffer.of(liquids)}
+    assert {one.primary for one in SettingsDiffer.value_in(liquids)} == {False}
+    assert {one.correction for one in SettingsDiffer.value_in(liquids)} == {"Benjamini-Hochberg"}
+    assert "shown" not in {one.verdict for one in SettingsDiffer.value_in(liquids)}
     why = {one.what: one.why for one in (*liquids.absent, *delays.absent)}
     assert "be influenced by the answers" in why["equivalence test"]
     assert "does not specify which statements name" in why["recognition test"]
-    assert {one.outcome.method.split(", ")[1] for one in DelayTrend.of(delays)} == {"two-sided"}
+    assert {one.outcome.method.split(", ")[1] for one in DelayTrend.value_in(delays)} == {"two-sided"}
     assert "does not specify a detection question" in why["detection threshold"]
 
 
 def test_a_bound_that_was_not_decided_is_not_made_up(tmp_path: Path) -> None:
     _, delays = blocks(opened(without("equivalence_bound", tmp_path / "rek2024"), 8))
     assert ContrastsWithControl.entries(delays) == {"against": (), "equivalent_up_to": {}}
-    assert len(DelayTrend.of(delays)) == 5
+    assert len(DelayTrend.value_in(delays)) == 5
 
 
 @pytest.mark.parametrize("level", [1, 4, 7])
@@ -147,10 +147,12 @@ def test_equal_answers_are_no_variation_and_no_evidence(rek: Folder, level: int)
     results = found(rek)
     json.dumps(as_json_types(results), allow_nan=False)
     liquids, delays = results.blocks
-    assert {one.verdict for one in (*SettingsDiffer.of(liquids), *DelayTrend.of(delays))} == {"not tested"}
-    assert {one.found.verdict for one in ContrastsWithControl.of(delays)} == {"equivalent"}  # none of seventeen moved
-    assert LiquidRecognition.of(liquids) is not None
-    assert LiquidRecognition.of(liquids).found.undecided == 51
+    assert {one.verdict for one in (*SettingsDiffer.value_in(liquids), *DelayTrend.value_in(delays))} == {"not tested"}
+    assert {one.found.verdict for one in ContrastsWithControl.value_in(delays)} == {
+        "equivalent"
+    }  # none of seventeen moved
+    assert LiquidRecognition.value_in(liquids) is not None
+    assert LiquidRecognition.value_in(liquids).found.undecided == 51
 
 
 def test_trials_judged_and_valid_and_errors_of_the_delay_are_counted_by_setting_or_over_all_while_sealed() -> None:
@@ -185,14 +187,14 @@ def test_missing_answers_drop_the_participant_and_are_never_neutral(rek: Folder)
     rek.add("P100", missing)
     rek.open()
     liquids, _ = blocks(rek)
-    one = next(one for one in SettingsDiffer.of(liquids) if one.item == "immersive")
+    one = next(one for one in SettingsDiffer.value_in(liquids) if one.item == "immersive")
     assert (one.outcome.n, one.outcome.dropped) == (8, 1)
     assert one.outcome.p == pytest.approx(whole["immersive"].p)
     assert next(row for row in liquids.measures if row["item"] == "immersive" and row["missing"])["n"] == 8
 
 
 def _omnibus(folder: Folder) -> tuple:  # type: ignore[type-arg]
-    return SettingsDiffer.of(found(folder).blocks[0])
+    return SettingsDiffer.value_in(found(folder).blocks[0])
 
 
 @pytest.mark.parametrize("n", [12, 24])
@@ -232,7 +234,7 @@ def test_where_one_liquid_differs_the_others_are_seldom_told_apart(n: int) -> No
         latent = 3.5 + np.array([[0.0], [2.0], [0.0]]) + rng.normal(0, 1, (9, n, 3, 1))
         values = {item.id: np.clip(np.rint(rows), 1, 7) for item, rows in zip(items, latent, strict=True)}
         people = tuple(f"P{number:03d}" for number in range(n))
-        pairs, _ = pairs_of(of_tables(block, decided, people, values), omnibus)
+        pairs, _ = pairs_of(answers_from_tables(block, decided, people, values), omnibus)
         right += sum(one.tested.verdict == "shown" for one in pairs if "honey" in (one.first, one.second))
         wrong += any(one.tested.verdict == "shown" for one in pairs if "honey" not in (one.first, one.second))
     assert right >= 100 * 9
@@ -258,7 +260,7 @@ def test_draws_are_so_many_that_they_decide_nothing(statements: int, alpha: floa
     rng = np.random.default_rng(3)
     values = {item.id: rng.integers(1, 8, (people, 3, 1)).astype(float) for item in items}
     names = tuple(f"P{number:04d}" for number in range(people))
-    asked = of_tables(block, replace(DECIDED, alpha=alpha), names, values)
+    asked = answers_from_tables(block, replace(DECIDED, alpha=alpha), names, values)
     assert statements / (1 + asked.draws) <= alpha / 20
     assert 1 / (1 + asked.draws_over_all) <= alpha / 20
     assert asked.draws >= DRAWS

@@ -148,8 +148,8 @@ def test_slopes_are_tested_and_planned_where_the_study_says_so() -> None:
     made = study(settings, list(everybody(settings, 12, lambda person, _s, code, _i: int(code[1]) + person % 3)))
     made = replace(made, decided=replace(made.decided, trends="slopes"))
     (found,) = (results := evaluate(made)).blocks
-    assert {one.outcome.test for one in DelayTrend.of(found)} == {"t test of slopes"}
-    assert not MeanTests.of(found), "each statement is tested once"
+    assert {one.outcome.test for one in DelayTrend.value_in(found)} == {"t test of slopes"}
+    assert not MeanTests.value_in(found), "each statement is tested once"
     assert f"Trends across delays were tested with {told} (one-sided" in methods(made, results)
 
 

@@ -1,4 +1,4 @@
-"""An export as a Psych-DS folder of its own, to share: tables, report, script, and materials."""
+"""An export as a separate Psych-DS folder to share: tables, report, script, and materials."""
 
 import json
 import math
@@ -19,7 +19,7 @@ from study_app.store.merged import read_merged
 
 
 class Materials(NamedTuple):
-    """The study materials on this machine by name, and descriptions of missing ones; footage is not read."""
+    """The study materials on this computer by name, and descriptions of missing ones; footage is copied later."""
 
     files: dict[str, bytes | FileCopy]
     missing: tuple[str, ...]
@@ -30,21 +30,21 @@ def materials(study: Study) -> Materials:
     if not study.revealed:
         return Materials({}, ())
     footage = _footage(study)
-    found = find_study_file(study.name, set(study.participants["protocol_hash"]), footage)
-    if found is None:
+    study_file = find_study_file(study.name, set(study.participants["protocol_hash"]), footage)
+    if study_file is None:
         return Materials({}, ("the study file", *(f"{name} (SHA-256 {footage[name]})" for name in footage)))
-    file, source = found
-    shown = {name: file.parent / name for name in footage if _is_inside(name)}
-    there = {name: path for name, path in shown.items() if file_hash(path) == footage[name]}
+    file, source = study_file
+    inside = {name: file.parent / name for name in footage if _is_inside(name)}
+    matching = {name: path for name, path in inside.items() if file_hash(path) == footage[name]}
     files: dict[str, bytes | FileCopy] = {
         file.name: source.file,
         **{name: text.encode() for name, text in source.liquids.items() if _is_inside(name)},
-        **{name: FileCopy(path, footage[name]) for name, path in there.items()},
+        **{name: FileCopy(path, footage[name]) for name, path in matching.items()},
     }
     missing = [
-        f"{name} (SHA-256 {digest}; {_why_missing(shown.get(name))})"
+        f"{name} (SHA-256 {digest}; {_why_missing(inside.get(name))})"
         for name, digest in footage.items()
-        if name not in there
+        if name not in matching
     ]
     return Materials(files, tuple(missing))
 
@@ -70,7 +70,7 @@ def _is_inside(name: str) -> bool:
 
 
 def _why_missing(path: Path | None) -> str:
-    """Return why footage is not shared; ``path`` is None if it lies outside the study's folder."""
+    """Return the reason why footage is not shared; ``path`` is None if it is outside the study's folder."""
     if path is None:
         return "the file is outside the study's folder"
     try:
@@ -93,26 +93,26 @@ def dataset_files(
 ) -> dict[str, bytes | FileCopy]:
     """Return the dataset's files by path.
 
-    ``tables`` and ``columns`` are by file name; ``report`` has the files of the report, including its own copies of
-    tables.
+    The keys of ``tables`` and ``columns`` are file names; ``report`` has the files of the report, including its copies
+    of tables.
     """
-    shown = {name: content for name, content in report.items() if name not in tables and name != _SCRIPT}
+    report_files = {name: content for name, content in report.items() if name not in tables and name != _SCRIPT}
     description = _description(study, columns)
-    own = materials(study)
+    study_materials = materials(study)
     files: dict[str, bytes | FileCopy] = {
-        "dataset_description.json": _json(description),
-        "data/file_metadata.json": _json({key: description[key] for key in description if key != _VARIABLES}),
+        "dataset_description.json": _json_bytes(description),
+        "data/file_metadata.json": _json_bytes({key: description[key] for key in description if key != _VARIABLES}),
         **{f"data/{PurePosixPath(name).stem}.json": _sidecar(study, name, columns[name]) for name in tables},
-        "README.md": _readme(study, tables, report, own.missing),
+        "README.md": _readme(study, tables, report, study_materials.missing),
         "CHANGES.md": f"# Changes\n\n- {study.version}: exported by liquid-study {__version__}\n".encode(),
         ".psychds-ignore": b".psychds-ignore\n",
         **{f"data/{name}": content for name, content in tables.items()},
         "documentation/codebook.json": codebook_bytes(study, columns),
         "analysis/settings.json": _settings(study),
         **({f"analysis/{_SCRIPT}": report[_SCRIPT]} if _SCRIPT in report else {}),
-        **{f"results/{name}": content for name, content in shown.items() if name != "codebook.json"},
-        "materials/protocol.json": _json(study.protocol),
-        **{f"materials/{name}": content for name, content in own.files.items()},
+        **{f"results/{name}": content for name, content in report_files.items() if name != "codebook.json"},
+        "materials/protocol.json": _json_bytes(study.protocol),
+        **{f"materials/{name}": content for name, content in study_materials.files.items()},
     }
     return {f"{FOLDER}/{name}": content for name, content in files.items()}
 
@@ -120,43 +120,45 @@ def dataset_files(
 def _sidecar(study: Study, name: str, columns: tuple[Column, ...]) -> bytes:
     """Return the JSON sidecar that describes one table's columns, with authors and licence."""
     head = {"@context": _CONTEXT, "@type": "Dataset", "name": PurePosixPath(name).stem}
-    return _json({**head, _VARIABLES: [column.variable for column in columns], **stated_credits(study)})
+    return _json_bytes({**head, _VARIABLES: [column.variable for column in columns], **stated_credits(study)})
 
 
 def _settings(study: Study) -> bytes:
     """Return the analysis settings (defaults if the study's file has none) and their study."""
     head = {"name": study.name, "version": study.version, **stated_credits(study)}
     decided = {name: value for name, value in asdict(study.decided).items() if name not in ("made", "changed")}
-    return _json({**head, "analysis": decided | (study.protocol.get("analysis") or {})})
+    return _json_bytes({**head, "analysis": decided | (study.protocol.get("analysis") or {})})
 
 
-def variables(columns: Mapping[str, tuple[Column, ...]]) -> list[dict[str, Any]]:
-    """Return every column of the tables once; ``columns`` are by file name.
+def merged_variables(columns: Mapping[str, tuple[Column, ...]]) -> list[dict[str, Any]]:
+    """Return one description for each column name; ``columns`` has the columns of each file.
 
-    If tables describe a column of the same name differently, all descriptions are joined, and unit and range are those
-    common to all tables.
+    If tables describe a column differently, the descriptions are joined, and only properties that all tables share are
+    kept, with the widest range.
     """
-    found: dict[str, dict[str, dict[str, Any]]] = {}
-    for file, of_table in columns.items():
+    by_name: dict[str, dict[str, dict[str, Any]]] = {}
+    for file, table_columns in columns.items():
         table = file.partition("_description-")[2].partition("_")[0]
-        for column in of_table:
-            found.setdefault(column.name, {})[table] = column.variable
-    return [_combine_descriptions(described) for described in found.values()]
+        for column in table_columns:
+            by_name.setdefault(column.name, {})[table] = column.variable
+    return [_combine_descriptions(described) for described in by_name.values()]
 
 
 def _combine_descriptions(described: Mapping[str, dict[str, Any]]) -> dict[str, Any]:
     """Return one description of a column from those of its tables."""
     first, *others = described.values()
     tables: dict[str, list[str]] = {}
-    for table, one in described.items():
-        tables.setdefault(one["description"], []).append(table)
-    same = {name: value for name, value in first.items() if all(other.get(name) == value for other in others)}
+    for table, variable in described.items():
+        tables.setdefault(variable["description"], []).append(table)
+    combined = {name: value for name, value in first.items() if all(other.get(name) == value for other in others)}
     if len(tables) > 1:
-        same["description"] = " ".join(f"In {', '.join(named)}: {words}" for words, named in tables.items())
+        combined["description"] = " ".join(
+            f"In {', '.join(table_names)}: {description}" for description, table_names in tables.items()
+        )
     for name, widest in (("minValue", min), ("maxValue", max)):
-        if all(name in one for one in described.values()):
-            same[name] = widest(one[name] for one in described.values())
-    return same
+        if all(name in variable for variable in described.values()):
+            combined[name] = widest(variable[name] for variable in described.values())
+    return combined
 
 
 def _description(study: Study, columns: Mapping[str, tuple[Column, ...]]) -> dict[str, Any]:
@@ -173,12 +175,12 @@ def _description(study: Study, columns: Mapping[str, tuple[Column, ...]]) -> dic
         else str(description).strip(),
         "version": study.version,
         "keywords": [*_KEYWORDS, *(["simulated"] if study.simulated else [])],
-        _VARIABLES: variables(columns),
+        _VARIABLES: merged_variables(columns),
         **stated_credits(study),
     }
 
 
-def _json(content: Any) -> bytes:
+def _json_bytes(content: Any) -> bytes:
     return f"{json.dumps(content, indent=2, ensure_ascii=False)}\n".encode()
 
 

@@ -1,8 +1,8 @@
-"""Tables as SPSS files (.sav), which jamovi, JASP and R read too: labels, levels and codes of missing answers included.
+"""Tables as SPSS files (.sav), which jamovi, JASP and R can also read, with labels, levels and missing-value codes.
 
-Answers are numbers with labels: options are nominal, points of a scale ordinal. An excluded answer is 97 in the wide
-table, one off the scale 98 and one that was not given 99, all declared as missing; of any other number what is missing
-is SPSS's own. SPSS has no missing text: it is empty.
+Answers are numbers with labels: options are nominal, scale points ordinal. In the wide table, an excluded answer is 97,
+an answer off the scale 98 and an answer that was not given 99; all three are declared as missing. Other missing numbers
+are system-missing. As SPSS has no missing texts, these are empty.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ import pandas as pd
 from study_app.analysis.data.blocks import PlacedQuestion, PlacedScore
 from study_app.analysis.data.measures import LEVELS
 from study_app.analysis.data.study_tables import Study
-from study_app.analysis.export.tables import Cells, Delivered, QuestionCells
+from study_app.analysis.export.tables import Cells, ExportTable, QuestionCells
 from study_app.store.files import Column
 
 _EXCLUDED: Final = 97
@@ -34,7 +34,7 @@ _TEXT_BYTES: Final = 32_767
 _RESERVED: Final = frozenset(("ALL", "AND", "BY", "EQ", "GE", "GT", "LE", "LT", "NE", "NOT", "OR", "TO", "WITH"))
 
 
-def wide_sav(study: Study, table: Delivered, cells: Mapping[str, Cells | QuestionCells]) -> bytes:
+def wide_sav(study: Study, table: ExportTable, cells: Mapping[str, Cells | QuestionCells]) -> bytes:
     """Return the wide table as an SPSS file."""
     answers = study.responses
     by_cell = dict(iter(answers.groupby(["block", "code", "item"])))
@@ -42,40 +42,40 @@ def wide_sav(study: Study, table: Delivered, cells: Mapping[str, Cells | Questio
     coded = {}
     for name, cell in cells.items():
         if isinstance(cell, QuestionCells):
-            frame[name], coded[name] = _question(study, cell, frame[name], frame["participant"])
+            frame[name], coded[name] = _code_question(study, cell, frame[name], frame["participant"])
             continue
         rows = by_cell.get((cell.block.id, cell.setting.code, cell.item.id), answers.head(0))
         frame[name] = _code_missing_answers(frame[name], frame["participant"], rows)
-        coded[name] = _levels(dict(zip(LEVELS, cell.block.labels, strict=True)), cell.block.cannot_judge or "")
-    numbered = {name for name, found in coded.items() if found}
+        coded[name] = _value_labels(dict(zip(LEVELS, cell.block.labels, strict=True)), cell.block.cannot_judge or "")
+    numbered = {name for name, labels in coded.items() if labels}
     columns = tuple(replace(column, kind="number") if column.name in numbered else column for column in table.columns)
-    options = {name for name, cell in cells.items() if isinstance(cell, QuestionCells) and _names_options(cell.asked)}
-    return sav(study, Delivered(table.name, columns, frame), {name: coded[name] for name in numbered}, options)
+    options = {name for name, cell in cells.items() if isinstance(cell, QuestionCells) and _has_options(cell.asked)}
+    return sav(study, ExportTable(table.name, columns, frame), {name: coded[name] for name in numbered}, options)
 
 
-def _names_options(asked: PlacedQuestion | PlacedScore) -> bool:
-    """Return whether the answers to a question are options, which have no order."""
-    return not isinstance(asked, PlacedScore) and asked.question.value_type == "text"
+def _has_options(question: PlacedQuestion | PlacedScore) -> bool:
+    """Return whether the answers to a question are options, which are not ordered."""
+    return not isinstance(question, PlacedScore) and question.question.value_type == "text"
 
 
-def _question(
+def _code_question(
     study: Study, cells: QuestionCells, values: pd.Series[Any], people: pd.Series[Any]
 ) -> tuple[pd.Series[Any], dict[int, str]]:
-    """Return the cells of another question and its value labels: options are numbered from 1; others have none."""
-    asked = cells.asked
-    if isinstance(asked, PlacedScore) or not asked.levels:
+    """Return the cells of a question other than a statement, and its value labels; options are numbered from 1."""
+    question = cells.asked
+    if isinstance(question, PlacedScore) or not question.levels:
         return values, {}
-    rows = study.rows_of(asked)
+    rows = study.rows_of(question)
     if cells.setting is not None:
         rows = rows[rows["code"] == cells.setting.code]
-    if _names_options(asked):
-        if asked.question.names_several:
+    if _has_options(question):
+        if question.question.names_several:
             return values, {}
-        numbers = {option: number for number, option in enumerate(asked.levels, start=1)}
+        numbers = {option: number for number, option in enumerate(question.levels, start=1)}
         coded = _code_missing_answers(values.map(numbers), people, rows)
-        return coded, _levels({numbers[option]: words for option, words in asked.levels.items()}, "")
-    levels = {int(point): words for point, words in asked.levels.items()}
-    return _code_missing_answers(values, people, rows), _levels(levels, asked.cannot_judge or "")
+        return coded, _value_labels({numbers[option]: words for option, words in question.levels.items()}, "")
+    levels = {int(point): words for point, words in question.levels.items()}
+    return _code_missing_answers(values, people, rows), _value_labels(levels, question.cannot_judge or "")
 
 
 def _code_missing_answers(values: pd.Series[Any], people: pd.Series[Any], rows: pd.DataFrame) -> pd.Series[Any]:
@@ -88,22 +88,24 @@ def _code_missing_answers(values: pd.Series[Any], people: pd.Series[Any], rows: 
     return coded.mask(coded.isna() & people.isin(excluded), _EXCLUDED).fillna(_NOT_ANSWERED)
 
 
-def _levels(levels: Mapping[int, str], cannot_judge: str) -> dict[int, str]:
+def _value_labels(levels: Mapping[int, str], cannot_judge: str) -> dict[int, str]:
     off = {_EXCLUDED: "Excluded", _CANNOT_JUDGE: cannot_judge or "Cannot judge", _NOT_ANSWERED: "No answer"}
     return {**levels, **off}
 
 
-def sav(study: Study, table: Delivered, coded: Mapping[str, dict[int, str]], options: Collection[str] = ()) -> bytes:
+def sav(study: Study, table: ExportTable, coded: Mapping[str, dict[int, str]], options: Collection[str] = ()) -> bytes:
     """Return the table as an SPSS file.
 
     ``coded`` has the value labels of columns whose missing answers have codes; the columns in ``options`` are nominal.
     """
-    names = _names_of([column.name for column in table.columns])
+    names = _spss_names([column.name for column in table.columns])
     columns = {names[column.name]: column for column in table.columns}
     levels = {names[name]: found for name, found in coded.items()}
     ordered = {names[name] for name in coded.keys() - set(options)}
     flags = {name: {0: "false", 1: "true"} for name, column in columns.items() if column.kind == "flag"}
-    frame = pd.DataFrame({names[column.name]: _plain(column, table.frame[column.name]) for column in table.columns})
+    frame = pd.DataFrame(
+        {names[column.name]: _plain_values(column, table.frame[column.name]) for column in table.columns}
+    )
     import pyreadstat  # noqa: PLC0415  # only this table needs it
 
     with tempfile.TemporaryDirectory() as scratch:
@@ -111,59 +113,63 @@ def sav(study: Study, table: Delivered, coded: Mapping[str, dict[int, str]], opt
         pyreadstat.write_sav(
             frame,
             str(path),
-            file_label=_cut(f"{study.title} ({study.name} {study.version})", _FILE_LABEL_BYTES),
-            column_labels={name: _cut(_label(name, column), _LABEL_BYTES) for name, column in columns.items()},
+            file_label=_truncate(f"{study.title} ({study.name} {study.version})", _FILE_LABEL_BYTES),
+            column_labels={
+                name: _truncate(_column_label(name, column), _LABEL_BYTES) for name, column in columns.items()
+            },
             variable_value_labels={
-                name: {value: _cut(label, _LABEL_BYTES // 2) for value, label in found.items()}
+                name: {value: _truncate(label, _LABEL_BYTES // 2) for value, label in found.items()}
                 for name, found in (levels | flags).items()
             },
             missing_ranges={name: [*sorted(_CODES & level.keys())] for name, level in levels.items()},
             variable_measure={
-                name: "ordinal" if name in ordered else "nominal" if name in levels else _measure(column)
+                name: "ordinal" if name in ordered else "nominal" if name in levels else _measurement_level(column)
                 for name, column in columns.items()
             },
             variable_format={
-                name: form for name, column in columns.items() if (form := _format(column, table.frame[column.name]))
+                name: form
+                for name, column in columns.items()
+                if (form := _display_format(column, table.frame[column.name]))
             },
         )
         return path.read_bytes()
 
 
-def _names_of(names: list[str]) -> dict[str, str]:
+def _spss_names(names: list[str]) -> dict[str, str]:
     """Return valid SPSS names: starting with a letter, at most 64 bytes, not reserved, unique regardless of case."""
-    found: dict[str, str] = {}
-    taken: set[str] = set()
+    spss_names: dict[str, str] = {}
+    used: set[str] = set()
     for name in names:
-        plain = re.sub(r"[^A-Za-z0-9_]", "_", name).rstrip("_") or "v"
-        if not plain[0].isalpha() or plain.upper() in _RESERVED:
-            plain = f"v_{plain}"
-        short, number = plain[:_NAME_BYTES], 1
-        while short.upper() in taken:
+        valid = re.sub(r"[^A-Za-z0-9_]", "_", name).rstrip("_") or "v"
+        if not valid[0].isalpha() or valid.upper() in _RESERVED:
+            valid = f"v_{valid}"
+        unique, number = valid[:_NAME_BYTES], 1
+        while unique.upper() in used:
             number += 1
-            short = f"{plain[: _NAME_BYTES - len(str(number)) - 1]}_{number}"
-        taken.add(short.upper())
-        found[name] = short
-    return found
+            unique = f"{valid[: _NAME_BYTES - len(str(number)) - 1]}_{number}"
+        used.add(unique.upper())
+        spss_names[name] = unique
+    return spss_names
 
 
-def _plain(column: Column, values: pd.Series[Any]) -> pd.Series[Any]:
+def _plain_values(column: Column, values: pd.Series[Any]) -> pd.Series[Any]:
     """Return values in the library's types: floats with NaN, or texts with "" for missing ones."""
     if column.kind in {"text", "time"}:
-        texts = ["" if value is pd.NA else _cut(str(value), _TEXT_BYTES) for value in values.tolist()]
+        texts = ["" if value is pd.NA else _truncate(str(value), _TEXT_BYTES) for value in values.tolist()]
         return pd.Series(texts, dtype=object)
     return pd.Series(values.astype("Float64").to_numpy(dtype=np.float64, na_value=np.nan))
 
 
-def _label(name: str, column: Column) -> str:
+def _column_label(name: str, column: Column) -> str:
     unit = f" [{column.unit}]" if column.unit else ""
     return f"{column.description}{unit}" if name == column.name else f"{column.name}: {column.description}{unit}"
 
 
-def _measure(column: Column) -> str:
+def _measurement_level(column: Column) -> str:
     return "nominal" if column.kind in {"text", "time", "flag"} else "scale"
 
 
-def _format(column: Column, values: pd.Series[Any]) -> str | None:
+def _display_format(column: Column, values: pd.Series[Any]) -> str | None:
     """Return the display format of numbers; integers have no decimal point."""
     if column.kind == "flag":
         return "F1.0"
@@ -171,7 +177,7 @@ def _format(column: Column, values: pd.Series[Any]) -> str | None:
     return f"F{max(2, len(str(values.max()).partition('.')[0]))}.0" if whole and values.notna().any() else None
 
 
-def _cut(text: str, most: int) -> str:
+def _truncate(text: str, most: int) -> str:
     """Return a text truncated to ``most`` bytes without splitting a character."""
     content = text.encode("utf-8", "replace")
     return text if len(content) <= most else content[: most - 3].decode("utf-8", "ignore") + "…"

@@ -1,4 +1,4 @@
-"""The tables of a study with codebook and credits, as files: CSV, and further formats that are asked for."""
+"""The tables of a study as files, with codebook and credits: CSV, and other formats on request."""
 
 import io
 import json
@@ -12,13 +12,13 @@ from study_app.analysis.data.blocks import Block, LevelBlock
 from study_app.analysis.data.measures import AGREEMENT, LEVELS, QUARTILES
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.export import spss
-from study_app.analysis.export.tables import Cells, Delivered, QuestionCells, names_of_sealed
+from study_app.analysis.export.tables import Cells, ExportTable, QuestionCells, sealed_interval_columns
 from study_app.analysis.levels.statistic import statistics
 from study_app.store.files import COMPUTED, MISSING, SEALED, Column, csv_bytes, header
 from study_app.store.unblinding import reveals_of
 
 _CREDITS: Final = {"authors": "author", "license": "license", "citation": "citation", "funder": "funder", "url": "url"}
-"""Keys of ``[study.credits]``, and the properties of schema.org that say the same."""
+"""Keys of ``[study.credits]``, and the corresponding properties of schema.org."""
 
 Extra: TypeAlias = Literal["wide", "parquet", "sav", "psych-ds"]
 NOTHING_ELSE: Final[frozenset[Extra]] = frozenset()
@@ -26,11 +26,11 @@ NOTHING_ELSE: Final[frozenset[Extra]] = frozenset()
 
 def table_files(
     study: Study,
-    tables: Sequence[Delivered],
+    tables: Sequence[ExportTable],
     extras: Collection[Extra] = NOTHING_ELSE,
     cells: Mapping[str, Cells | QuestionCells] = MappingProxyType({}),
 ) -> dict[str, bytes]:
-    """Return tables of a study and their codebook, also in the formats of ``extras``, by file name.
+    """Return tables of a study in CSV and the formats of ``extras``, and their codebook, by file name.
 
     With ``extras`` the wide table is the last of ``tables``, and ``cells`` describes its columns.
     """
@@ -65,7 +65,7 @@ def _codebook(study: Study, files: Mapping[str, Any]) -> dict[str, Any]:
         f"text that begins with {COMPUTED}",
         "missing": MISSING,
         "blinded": not study.revealed,
-        "sealed_columns": [] if study.revealed else sorted(SEALED | names_of_sealed(study)),
+        "sealed_columns": [] if study.revealed else sorted(SEALED | sealed_interval_columns(study)),
         "key_opened": list(reveals_of(study.folder)),
         "doubts": [
             {"file": doubt.path.relative_to(study.folder).as_posix(), "what": doubt.what} for doubt in study.doubts
@@ -94,8 +94,8 @@ def _codebook(study: Study, files: Mapping[str, Any]) -> dict[str, Any]:
             for block in study.blocks
         ],
         **({"levels": [_levels_entry(block) for block in study.levels]} if study.levels else {}),
-        **({"questions": _questions(study)} if study.others.questions else {}),
-        **({"scores": _scores(study)} if study.others.scores else {}),
+        **({"questions": _question_entries(study)} if study.others.questions else {}),
+        **({"scores": _score_entries(study)} if study.others.scores else {}),
         "measures": {
             "quartiles": QUARTILES,
             "agree_percent": f"percentage of valid answers at levels {AGREEMENT[0]} to {AGREEMENT[-1]}",
@@ -132,14 +132,14 @@ def stated_credits(study: Study) -> dict[str, Any]:
 
 
 def _presentations(study: Study, block: Block) -> dict[str, Any]:
-    """Return the number of answers per participant, statement and setting, and their sessions."""
+    """Return codebook entries: answers per participant, statement and setting, sessions, and replicates."""
     answers = study.answers(block)
-    given = answers[answers["response"].notna()]
-    given = given.assign(column=given["code"].map(block.columns))
-    counts = given.groupby(["participant", "column", "item"]).size()
+    valid = answers[answers["response"].notna()]
+    valid = valid.assign(column=valid["code"].map(block.columns))
+    counts = valid.groupby(["participant", "column", "item"]).size()
     return {
         "answers_per_participant_setting_and_item": [int(counts.min()), int(counts.max())] if len(counts) else [0, 0],
-        "sessions": sorted({int(number) for number in given["session"]}),
+        "sessions": sorted({int(number) for number in valid["session"]}),
         "replicates": [
             codes
             for place in sorted(set(block.columns.values()))
@@ -148,8 +148,8 @@ def _presentations(study: Study, block: Block) -> dict[str, Any]:
     }
 
 
-def _questions(study: Study) -> list[dict[str, Any]]:
-    """Return the questions outside blocks of statements."""
+def _question_entries(study: Study) -> list[dict[str, Any]]:
+    """Return the codebook entries of questions other than statements after trials."""
     return [
         {
             "form" if question.where.is_form else "block": question.where.id,
@@ -166,7 +166,7 @@ def _questions(study: Study) -> list[dict[str, Any]]:
     ]
 
 
-def _scores(study: Study) -> list[dict[str, Any]]:
+def _score_entries(study: Study) -> list[dict[str, Any]]:
     return [
         {
             "form" if score.where.is_form else "block": score.where.id,
@@ -209,20 +209,20 @@ def _describe_column(column: Column) -> dict[str, Any]:
     return described
 
 
-def file_name(study: Study, table: Delivered, ending: str) -> str:
+def file_name(study: Study, table: ExportTable, ending: str) -> str:
     """Return the name of a table's file."""
     return f"study-{study.name}_description-{table.name}_data.{ending}"
 
 
-def table_bytes(table: Delivered) -> bytes:
-    """Return a table as CSV, as `csv_bytes` writes it."""
+def table_bytes(table: ExportTable) -> bytes:
+    """Return a table as CSV (see `csv_bytes`)."""
     plain = table.frame.astype(object).where(table.frame.notna(), None)
     return csv_bytes(
         table.columns, (dict(zip(header(table.columns), row, strict=True)) for row in plain.itertuples(index=False))
     )
 
 
-def _parquet_bytes(table: Delivered) -> bytes:
+def _parquet_bytes(table: ExportTable) -> bytes:
     """Return a table as Parquet, with description and unit of every column; scale points are Int8."""
     import pyarrow as pa  # type: ignore[import-untyped]  # noqa: PLC0415 - takes long to load
     from pyarrow import parquet  # noqa: PLC0415
@@ -245,7 +245,7 @@ def _parquet_bytes(table: Delivered) -> bytes:
 
 
 def credit_lines(study: Study) -> tuple[str, str, str]:
-    """Return authors, licence and citation, one line each, also if the study does not state them."""
+    """Return lines with authors, licence and citation, even if the study does not state them."""
     stated = stated_credits(study)
     lines = (
         f"Authors: {', '.join(stated.get('author', [])) or 'not stated'}.",

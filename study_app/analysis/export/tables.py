@@ -1,7 +1,7 @@
-"""The tables that are handed out, as typed frames with a description of every column.
+"""The tables of an export, as typed data frames with a description of every column.
 
-Settings are codes until the key was opened, and the sealed columns are left out; then condition, liquid and delay
-(asked for, and achieved) are columns.
+Until the key is open, settings are codes and sealed columns are omitted. Afterwards, tables also have columns for
+condition, liquid, and requested and achieved delay.
 """
 
 from collections import Counter
@@ -34,8 +34,8 @@ from study_app.store.files import (
 
 
 @dataclass(frozen=True, eq=False)
-class Delivered:
-    """A table: its name, its columns in order, and a data frame with them."""
+class ExportTable:
+    """A table of an export: its name, its columns in order, and a data frame with these columns."""
 
     name: str
     columns: tuple[Column, ...]
@@ -45,19 +45,19 @@ class Delivered:
 SITE: Final = Column("site", "text", "The participant's site (the part of the ID before the dash).")
 
 
-def _add_site(study: Study, table: Delivered) -> Delivered:
-    """Return a table of a merged study with the column ``site`` after the participants; other tables unchanged."""
+def _add_site(study: Study, table: ExportTable) -> ExportTable:
+    """Return a table with the column ``site`` after ``participant`` if the study is merged and the table has IDs."""
     if not study.sites or "participant" not in header(table.columns):
         return table
     place = header(table.columns).index("participant") + 1
-    sites = pd.array([study.site_of(str(one)) for one in table.frame["participant"]], dtype="string")
+    sites = pd.array([study.site_of(str(person)) for person in table.frame["participant"]], dtype="string")
     columns = (*table.columns[:place], SITE, *table.columns[place:])
     return _select_columns(table.name, columns, table.frame.assign(site=sites))
 
 
-def _select_columns(name: str, columns: tuple[Column, ...], frame: pd.DataFrame) -> Delivered:
+def _select_columns(name: str, columns: tuple[Column, ...], frame: pd.DataFrame) -> ExportTable:
     """Return a table with these columns of a frame."""
-    return Delivered(name, columns, frame[list(header(columns))])
+    return ExportTable(name, columns, frame[list(header(columns))])
 
 
 _OF_TRIAL: Final = ("study", "participant", "session", "simulated", "pilot", "group", "trial", "attempt", "block")
@@ -70,7 +70,7 @@ _TYPES: Final[dict[Kind, str]] = {"text": "string", "number": "Float64", "intege
 _TRACKS: Final = (*(_LEVEL_COLUMNS[name] for name in (*_OF_TRIAL, *_OF_BLOCK)), *JUDGED, TRIALS_MISSING, *OF_TRACKS)
 
 
-def _level_tables(study: Study) -> Iterator[Delivered]:
+def _level_tables(study: Study) -> Iterator[ExportTable]:
     """Yield the tables of a study with levels; none for other studies."""
     if not study.levels:
         return
@@ -79,19 +79,19 @@ def _level_tables(study: Study) -> Iterator[Delivered]:
     if not study.revealed:
         return
     frame = _add_conditions(study, tracks(study)).rename(columns={"level": "level_asked"})
-    # the frame has no column for an interval that no trial reached
-    of_tracks = (*_TRACKS, *_may_miss((*OPENED, ACHIEVED)), *_interval_columns(study))
-    yield _select_columns("tracks", of_tracks, frame.reindex(columns=list(header(of_tracks))))
+    # reindex adds the columns of intervals that no trial reached
+    track_columns = (*_TRACKS, *_optional_columns((*OPENED, ACHIEVED)), *_interval_columns(study))
+    yield _select_columns("tracks", track_columns, frame.reindex(columns=list(header(track_columns))))
     results = level_results(study, frame.rename(columns={"level_asked": "level"}))
-    about = {"study": study.name, "simulated": study.simulated, "pilot": study.pilot}
+    study_fields = {"study": study.name, "simulated": study.simulated, "pilot": study.pilot}
     groups = dict(zip(frame["participant"], frame["group"], strict=True))
     for statistic in statistics():
-        if statistic.exported_in(study):
+        if statistic.is_exported_in(study):
             columns = (*_OF_PERSON, *RESULTS[statistic.table].columns)
             rows = [
-                {**row, **about, "group": groups[row["participant"]]}
-                for of in results
-                for row in statistic(of).exported()
+                {**row, **study_fields, "group": groups[row["participant"]]}
+                for result in results
+                for row in statistic(result).export_rows()
             ]
             table = pd.DataFrame(rows, columns=list(header(columns)))
             yield _select_columns(
@@ -100,7 +100,7 @@ def _level_tables(study: Study) -> Iterator[Delivered]:
 
 
 def _interval_columns(study: Study) -> tuple[Column, ...]:
-    """Return the force and speed columns, for the largest number of intervals per trial."""
+    """Return the columns of force and speed in each interval of a trial."""
     most = max(block.design.intervals for block in study.levels)
     return tuple(
         replace(column, name=f"{name}_{number}", description=f"{column.description} In interval {number}.")
@@ -110,18 +110,18 @@ def _interval_columns(study: Study) -> tuple[Column, ...]:
     )
 
 
-def names_of_sealed(study: Study) -> set[str]:
+def sealed_interval_columns(study: Study) -> set[str]:
     """Return the interval columns that are not exported before the key is opened."""
     return {column.name for column in INTERVALS if column.sealed} if study.levels else set()
 
 
 _OF_A_FORM: Final = Setting(code="")
-"""Stands for the setting of an answer in a form, which has none."""
+"""The setting of answers in forms, which have none."""
 
 _BY_NAME: Final = {column.name: column for column in TRIALS}
 
 
-_MEASURED: Final = (
+_MEASURE_COLUMNS: Final = (
     Column("item", "text", "ID of the statement; its text is in the codebook."),
     Column("short", "text", "Short label of the statement."),
     Column("participants", "integer", "Number of participants with a valid answer.", minimum=0),
@@ -156,45 +156,50 @@ _MEASURED: Final = (
 )
 
 
-def _may_miss(columns: tuple[Column, ...]) -> tuple[Column, ...]:
-    """Return columns about a trial's setting that are empty for some rows: those of forms and of tracks."""
+def _optional_columns(columns: tuple[Column, ...]) -> tuple[Column, ...]:
+    """Return columns that may have missing values, such as the condition of answers in forms."""
     return tuple(replace(column, may_miss=True) for column in columns)
 
 
-def exported_tables(study: Study) -> tuple[Delivered, ...]:
-    """Return responses, trials and aggregate of a study; with levels, also intervals, opened tracks and thresholds."""
+def exported_tables(study: Study) -> tuple[ExportTable, ...]:
+    """Return the tables of a study: responses, trials and aggregate; with levels also intervals.
+
+    Once the key is open, a study with levels also has tracks and the tables of statistics.
+    """
     opened = OPENED if study.revealed else ()
     achieved = (*OPENED, ACHIEVED) if study.revealed else ()
     trials = TRIALS if study.revealed else unsealed_columns(TRIALS)
     judged = (*JUDGED, TRIALS_MISSING) if study.levels else JUDGED
     tables = (
         _select_columns(
-            "responses", (*RESPONSES, *judged, *_may_miss(achieved)), _add_conditions(study, _add_delay_error(study))
+            "responses",
+            (*RESPONSES, *judged, *_optional_columns(achieved)),
+            _add_conditions(study, _add_delay_error(study)),
         ),
         _select_columns(
             "trials",
-            (*trials, *judged, *(_may_miss(achieved) if study.levels else achieved)),
+            (*trials, *judged, *(_optional_columns(achieved) if study.levels else achieved)),
             _add_conditions(study, study.trials),
         ),
-        _select_columns("aggregate", (*_aggregate_head(), *opened, *_MEASURED), _aggregate(study)),
+        _select_columns("aggregate", (*_aggregate_head(), *opened, *_MEASURE_COLUMNS), _aggregate_frame(study)),
         *_level_tables(study),
     )
     return tuple(_add_site(study, table) for table in tables)
 
 
 def _add_conditions(study: Study, table: pd.DataFrame) -> pd.DataFrame:
-    """Add the condition of each code; empty for answers in forms and while the key is sealed."""
+    """Return a table with the condition of each code, missing for answers in forms and while the key is sealed."""
     pairs = zip(table["block"], table["code"], strict=True)
     settings = [setting.of or setting for setting in (study.settings.get(pair, _OF_A_FORM) for pair in pairs)]
     delay_ms = np.array([np.nan if setting.delay_ms is None else setting.delay_ms for setting in settings], np.float64)
-    named = table.assign(
+    opened = table.assign(
         condition=pd.array([setting.condition for setting in settings], dtype="string"),
         liquid=pd.array([setting.liquid for setting in settings], dtype="string"),
         delay_ms=delay_ms,
     )
     if "delay_error_mean_ms" in table:
-        named["delay_achieved_ms"] = (table["delay_error_mean_ms"] + delay_ms).round(6)
-    return named
+        opened["delay_achieved_ms"] = (table["delay_error_mean_ms"] + delay_ms).round(6)
+    return opened
 
 
 def _add_delay_error(study: Study) -> pd.DataFrame:
@@ -209,14 +214,14 @@ def _aggregate_head() -> tuple[Column, ...]:
     return tuple(_BY_NAME[name] for name in ("study", "simulated", "pilot", "block", "code"))
 
 
-def _aggregate(study: Study) -> pd.DataFrame:
+def _aggregate_frame(study: Study) -> pd.DataFrame:
     frames = []
     for block in study.blocks:
         frame = study.aggregate(block)
         shorts = frame["item"].map({item.id: item.short for item in block.items})
         frames.append(frame.assign(block=block.id, short=shorts))
     if not frames:
-        names = [*header(_aggregate_head()), *header(OPENED), *header(_MEASURED)]
+        names = [*header(_aggregate_head()), *header(OPENED), *header(_MEASURE_COLUMNS)]
         return pd.DataFrame({name: pd.Series(dtype=object) for name in names})
     frame = pd.concat(frames, ignore_index=True)
     return _add_conditions(study, frame.assign(study=study.name, simulated=study.simulated, pilot=study.pilot))
@@ -239,88 +244,95 @@ class QuestionCells:
     setting: Setting | None
 
 
-def wide_table(study: Study) -> tuple[Delivered, dict[str, Cells | QuestionCells]]:
+def wide_table(study: Study) -> tuple[ExportTable, dict[str, Cells | QuestionCells]]:
     """Return the wide table of all valid answers, and the content of each of its columns.
 
-    Columns are ``item__condition``, or ``item__code`` until the key is opened; if names would clash,
-    ``block__item__condition``. Repeated settings have the median, as in the analysis; options and texts have the last
-    answer. Questions of forms are ``form__item``, scores ``form__score``, and for repeated forms ``form__item__block``.
+    Columns are ``item__condition``, or ``item__code`` until the key is opened; if names would not be unique, they are
+    ``block__item__condition``. A column has the median of repeated answers, as in the analysis, and the last answer for
+    options and texts. Questions of forms are ``form__item``, scores ``form__score``, and for repeated forms
+    ``form__item__block``.
     """
     people, cells = list(study.people), _wide_cells(study)
     simulated = dict(zip(study.participants["participant"], study.participants["simulated"], strict=True))
-    held = {
+    values_by_name = {
         "participant": pd.array(people, dtype="string"),
         "simulated": pd.array([bool(simulated[person]) for person in people], dtype="boolean"),
     }
     columns = [_BY_NAME["participant"], _BY_NAME["simulated"]]
     if groups := group_members(study):
-        held["group"] = pd.array([groups.get(person) for person in people], dtype="string")
+        values_by_name["group"] = pd.array([groups.get(person) for person in people], dtype="string")
         columns.append(_BY_NAME["group"])
     for name, cell in cells.items():
-        found = _statement(study, cell, people) if isinstance(cell, Cells) else _question(study, cell, people)
-        held[name], description, (least, most) = found
-        kind = next(kind for kind, dtype in _TYPES.items() if dtype == held[name].dtype.name)
+        column = (
+            _statement_column(study, cell, people) if isinstance(cell, Cells) else _question_column(study, cell, people)
+        )
+        values_by_name[name], description, (least, most) = column
+        kind = next(kind for kind, dtype in _TYPES.items() if dtype == values_by_name[name].dtype.name)
         columns.append(optional(name, kind, description, minimum=least, maximum=most))
-    return _add_site(study, Delivered("wide", tuple(columns), pd.DataFrame(held))), cells
+    return _add_site(study, ExportTable("wide", tuple(columns), pd.DataFrame(values_by_name))), cells
 
 
 def _wide_cells(study: Study) -> dict[str, Cells | QuestionCells]:
-    """Return the content of each column of the wide table by name: statements, then other questions and scores."""
+    """Return the content of each column of the wide table by name: statements, other questions, scores."""
     statements = [
         (f"{item.id}__{setting.condition or setting.code}", Cells(block, setting, item))
         for block in study.blocks
         for setting in block.settings
         for item in block.items
     ]
-    found: dict[str, Cells | QuestionCells] = {}
-    asked: tuple[PlacedQuestion | PlacedScore, ...] = (*study.others.questions, *study.others.scores)
-    levels = {block.id for block in study.levels}  # their answers belong to no track: see the table of tracks
-    for other in (one for one in asked if one.where.id not in levels):
-        called = other.name if isinstance(other, PlacedScore) else other.id
-        for about in other.where.settings or (None,):
-            ending = "" if about is None else f"__{about.condition or about.code}"
-            found[f"{other.where.id}__{called}{ending}"] = QuestionCells(other, about)
-    often = Counter((*found, *(name for name, _ in statements)))
-    return {name if often[name] == 1 else f"{cells.block.id}__{name}": cells for name, cells in statements} | found
+    other_cells: dict[str, Cells | QuestionCells] = {}
+    questions: tuple[PlacedQuestion | PlacedScore, ...] = (*study.others.questions, *study.others.scores)
+    levels = {block.id for block in study.levels}  # their answers are in the table of tracks
+    for other in (question for question in questions if question.where.id not in levels):
+        question_name = other.name if isinstance(other, PlacedScore) else other.id
+        for setting in other.where.settings or (None,):
+            ending = "" if setting is None else f"__{setting.condition or setting.code}"
+            other_cells[f"{other.where.id}__{question_name}{ending}"] = QuestionCells(other, setting)
+    name_counts = Counter((*other_cells, *(name for name, _ in statements)))
+    return {
+        name if name_counts[name] == 1 else f"{cells.block.id}__{name}": cells for name, cells in statements
+    } | other_cells
 
 
 Answers: TypeAlias = tuple[pd.api.extensions.ExtensionArray, str, tuple[float | None, float | None]]
 """The cells of a column of the wide table, its description, and the ends of the scale."""
 
 
-def _statement(study: Study, cells: Cells, people: list[str]) -> Answers:
+def _statement_column(study: Study, cells: Cells, people: list[str]) -> Answers:
     block, setting, item = cells.block, cells.setting, cells.item
     answers = study.answers(block)
     answers = answers[(answers["code"] == setting.code) & (answers["item"] == item.id)]
     description = f"{item.text} About {block.name(setting)}, in {block.title}."
-    return _medians(answers, "response", people), description, (1, 7)
+    return _median_column(answers, "response", people), description, (1, 7)
 
 
-def _question(study: Study, cells: QuestionCells, people: list[str]) -> Answers:
-    asked, setting = cells.asked, cells.setting
-    answers = scored(study, asked) if isinstance(asked, PlacedScore) else study.answers_to(asked)
-    about = ""
+def _question_column(study: Study, cells: QuestionCells, people: list[str]) -> Answers:
+    question, setting = cells.asked, cells.setting
+    answers = scored(study, question) if isinstance(question, PlacedScore) else study.answers_to(question)
+    setting_note = ""
     if setting is not None:
         answers = answers[answers["code"] == setting.code]
-        about = f" {asked.where.name(setting)}." if asked.where.is_form else f" About {asked.where.name(setting)}."
-    if isinstance(asked, PlacedScore):
-        of = f" of {asked.instrument}" if asked.instrument else ""
-        description = f"Score {asked.name}{of}, in {asked.where.title}.{about}"
-        return _medians(answers, "score", people), description, (None, None)
-    text = asked.text if asked.text.endswith((".", "?", "!")) else f"{asked.text}."
-    description = f"{text} In {asked.where.title}.{about}"
-    if asked.question.value_type != "text":
-        return _medians(answers, "value", people), description, asked.bounds or (None, None)
+        setting_note = (
+            f" {question.where.name(setting)}." if question.where.is_form else f" About {question.where.name(setting)}."
+        )
+    if isinstance(question, PlacedScore):
+        instrument = f" of {question.instrument}" if question.instrument else ""
+        description = f"Score {question.name}{instrument}, in {question.where.title}.{setting_note}"
+        return _median_column(answers, "score", people), description, (None, None)
+    text = question.text if question.text.endswith((".", "?", "!")) else f"{question.text}."
+    description = f"{text} In {question.where.title}.{setting_note}"
+    if question.question.value_type != "text":
+        return _median_column(answers, "value", people), description, question.bounds or (None, None)
     last = answers.sort_values(["session", "trial"]).groupby("participant")["response"].last()
     return pd.array([last.get(person, pd.NA) for person in people], dtype="string"), description, (None, None)
 
 
-def _medians(answers: pd.DataFrame, column: str, people: list[str]) -> pd.api.extensions.ExtensionArray:
-    """Return each participant's median; missing without numbers, integers if all are."""
+def _median_column(answers: pd.DataFrame, column: str, people: list[str]) -> pd.api.extensions.ExtensionArray:
+    """Return each participant's median, missing without numbers; the type is integer if all medians are whole."""
     numbers = answers[column].dropna().astype(float).groupby(answers["participant"]).median()
     values = numbers.reindex(people).to_numpy()
     missing = np.isnan(values)
-    known = np.where(missing, 0, values)
-    if (known == np.floor(known)).all():
-        return pd.arrays.IntegerArray(known.astype(np.int64), missing)
-    return pd.arrays.FloatingArray(known, missing)
+    filled = np.where(missing, 0, values)
+    if (filled == np.floor(filled)).all():
+        return pd.arrays.IntegerArray(filled.astype(np.int64), missing)
+    return pd.arrays.FloatingArray(filled, missing)

@@ -1,4 +1,4 @@
-"""The methods paragraph: participants, apparatus, design, hypotheses, tests and exclusions, as the study has them."""
+"""The methods paragraph of a report: participants, apparatus, design, hypotheses, tests and exclusions."""
 
 from collections import Counter
 from collections.abc import Iterator
@@ -9,7 +9,7 @@ from study_app.analysis.contrasts import contrast_methods
 from study_app.analysis.data.blocks import SPENDINGS, Block, name_in_sentence
 from study_app.analysis.data.measures import QUARTILES
 from study_app.analysis.data.study_tables import Study, group_assignment, group_counts
-from study_app.analysis.figures.answer_figures import people_a_setting
+from study_app.analysis.figures.answer_figures import people_by_setting
 from study_app.analysis.findings import all_findings
 from study_app.analysis.findings.delays import ContrastsWithControl
 from study_app.analysis.findings.statement_tests import DelayTrend, Effects, MeanTests, OverAll
@@ -27,9 +27,9 @@ _FILTERS: Final = {
     "kalman": "a Kalman filter",
     "raw": "position differences",
 }
-"""Velocity estimators by name; a pooled study may have several."""
+"""Descriptions of velocity estimators by name; a pooled study may have several."""
 _WITHOUT_FORCE: Final = {"mouse", "spacemouse"}
-"""The devices without force: reading results must not load their descriptors."""
+"""Devices without force, listed here because reading results must not load their descriptors."""
 
 _ORDERS: Final = {
     "fixed": "in the same order for all participants",
@@ -46,72 +46,82 @@ _BLOCK_ORDERS: Final = {
 
 
 def methods(study: Study, results: Results) -> str:
-    """Return the methods paragraph. Each sentence is included only if it applies to the study."""
-    return " ".join(sentence for sentence in _sentences(study, results) if sentence)
+    """Return the methods paragraph; each sentence is included only if it applies to the study."""
+    return " ".join(sentence for sentence in _all_sentences(study, results) if sentence)
 
 
-def _sentences(study: Study, results: Results) -> Iterator[str]:
+def _all_sentences(study: Study, results: Results) -> Iterator[str]:
     blocks = [block for block in results.blocks if block.n]
-    yield _sample(study)
-    yield _groups(study)
+    yield _sample_sentence(study)
+    yield _group_sentence(study)
     yield _sample_size_sentences(study, results)
-    yield _exclusions(study)
-    yield _exclusion_rules(study, results)
-    yield _apparatus(study)
-    yield _liquids(study)
-    yield from _design(study, results)
-    yield from _delays(study, results)
+    yield _exclusion_sentences(study)
+    yield _exclusion_rule_sentence(study, results)
+    yield _apparatus_sentence(study)
+    yield _liquid_sentence(study)
+    yield from _design_sentences(study, results)
+    yield from _delay_sentences(study, results)
     yield from level_methods(study.levels, results.levels)
-    yield _missing_trials(study)
-    yield from _questionnaires(study)
+    yield _missing_trials_sentence(study)
+    yield from _form_sentences(study)
     yield from contrast_methods(results)
     if blocks:
         yield from _statement_sentences(study, results, blocks)
     if blocks or results.levels or study.others.questions:
-        ran, analysed = (f"liquid-study {listed(them)}" for them in (study.programs or [__version__], [__version__]))
+        ran, analysed = (
+            f"liquid-study {listed(versions)}" for versions in (study.programs or [__version__], [__version__])
+        )
         same = f"The sessions were run and analysed with {ran}."
         yield same if ran == analysed else f"The sessions were run with {ran} and analysed with {analysed}."
 
 
-def _sample(study: Study) -> str:
+def _sample_sentence(study: Study) -> str:
     people = number_text.capitalised(counted(study.n, "participant"))
     kind = " (SIMULATED, not people)" if study.simulated else ""
-    under = ""
+    conditions_note = ""
     if study.blocks and study.n:
-        whole = all(set(people_a_setting(study, block).values()) == {study.n} for block in study.blocks)
-        under = ", each in all conditions" if whole else _fewer_settings(study)
+        is_complete = all(set(people_by_setting(study, block).values()) == {study.n} for block in study.blocks)
+        conditions_note = ", each in all conditions" if is_complete else _missing_conditions_phrase(study)
     sites = f" at the sites {listed(study.sites)}" if study.sites else ""
-    return f"{people}{kind} took part in “{study.title}” (protocol {study.name}, {version_words(study)}){sites}{under}."
+    protocol = f"protocol {study.name}, {version_words(study)}"
+    return f"{people}{kind} took part in “{study.title}” ({protocol}){sites}{conditions_note}."
 
 
-def _fewer_settings(study: Study) -> str:
-    """Return a sentence on participants with missing conditions, if exclusions of single trials are the cause."""
-    fewer: set[str] = set()
+def _missing_conditions_phrase(study: Study) -> str:
+    """Return a phrase on participants with missing conditions, and whether excluded trials are the cause."""
+    incomplete: set[str] = set()
     for block in study.blocks:
         trials = study.trials[study.trials["counted"] & (study.trials["block"] == block.id)]
-        left = set(zip(trials["participant"], trials["code"], strict=True))
-        gone = study.excluded_trials(block)
-        fewer |= {who for who, code in zip(gone["participant"], gone["code"], strict=True) if (who, code) not in left}
-    if not fewer:
+        remaining = set(zip(trials["participant"], trials["code"], strict=True))
+        excluded = study.excluded_trials(block)
+        incomplete |= {
+            participant
+            for participant, code in zip(excluded["participant"], excluded["code"], strict=True)
+            if (participant, code) not in remaining
+        }
+    if not incomplete:
         return ", but some did not complete all conditions"
-    people = counted(len(fewer), "participant")
+    people = counted(len(incomplete), "participant")
     return f"; at least one condition is missing for {people}, because individual trials were excluded"
 
 
-def _groups(study: Study) -> str:
+def _group_sentence(study: Study) -> str:
     """Return a sentence on the assignment to groups and their number; "" without groups."""
-    counts, shares = group_counts(study), {name: one["share"] for name, one in study.protocol.get("groups", {}).items()}
-    named = listed([f"{name} (n = {counts.get(name, 0)})" if counts else name for name in shares])
+    counts, shares = (
+        group_counts(study),
+        {name: group["share"] for name, group in study.protocol.get("groups", {}).items()},
+    )
+    groups = listed([f"{name} (n = {counts.get(name, 0)})" if counts else name for name in shares])
     match group_assignment(study):
         case "pre-existing":
             return (
-                f"Participants were assigned to the groups {named} by an existing attribute, which was recorded at "
+                f"Participants were assigned to the groups {groups} by an existing attribute, which was recorded at "
                 "the start of the session; the groups were not randomised."
             )
         case "randomised":
             ratio = ":".join(f"{share}" for share in shares.values())
             return (
-                f"Participants were randomised in permuted blocks to the groups {named}, with an allocation ratio of "
+                f"Participants were randomised in permuted blocks to the groups {groups}, with an allocation ratio of "
                 f"{ratio}."
             )
     return ""
@@ -131,11 +141,11 @@ def _sample_size_sentences(study: Study, results: Results) -> str:
     return "" if planned is None else f"The planned sample size was {counted(planned, 'participant')}."
 
 
-def _exclusions(study: Study) -> str:
+def _exclusion_sentences(study: Study) -> str:
     """Return sentences on the exclusions, and on whether the key was sealed when they were decided."""
     trials, sessions = sum(exclusion.trial is not None for exclusion in study.exclusions), len(study.excluded_sessions)
-    out = [(study.left_out, "unfinished session"), (sessions, "excluded session"), (trials, "excluded trial")]
-    parts = [counted(count, noun) for count, noun in out if count]
+    counts = [(study.left_out, "unfinished session"), (sessions, "excluded session"), (trials, "excluded trial")]
+    parts = [counted(count, noun) for count, noun in counts if count]
     sentences = [f"The analysis does not include {listed(parts)}."] if parts else []
     by_rule = Counter(exclusion.rule_or_person for exclusion in study.exclusions)
     sentences += [
@@ -144,14 +154,14 @@ def _exclusions(study: Study) -> str:
         for rule, reason in RULES.items()
         if by_rule[rule]
     ]
-    caught: dict[float, list[str]] = {}
+    titles_by_limit: dict[float, list[str]] = {}
     for level in study.levels:
         if level.wrong_most is not None:
-            caught.setdefault(level.wrong_most, []).append(f"“{level.title}”")
+            titles_by_limit.setdefault(level.wrong_most, []).append(f"“{level.title}”")
     sentences += [
         f"The protocol excludes sessions with more than {100 * most:g} % incorrect answers to the catch trials in "
         f"{listed(titles)}."
-        for most, titles in caught.items()
+        for most, titles in titles_by_limit.items()
     ]
     if study.late:
         sentences.append(
@@ -162,7 +172,7 @@ def _exclusions(study: Study) -> str:
     return " ".join(sentences)
 
 
-def _exclusion_rules(study: Study, results: Results) -> str:
+def _exclusion_rule_sentence(study: Study, results: Results) -> str:
     """Return a sentence on the planned exclusion rules and the sessions that met them; "" if no rules are planned."""
     conditions = rule_conditions(study)
     if not conditions:
@@ -178,11 +188,11 @@ def _exclusion_rules(study: Study, results: Results) -> str:
 
 
 def late_exclusions(study: Study) -> str:
-    """Return the number of exclusions decided, and of those reversed, after the key was opened, as text."""
+    """Return a phrase with the numbers of exclusions decided and reversed after the key was opened."""
     decided = sum(exclusion in study.exclusions for exclusion in study.late)
-    back = len(study.late) - decided
+    reversed_count = len(study.late) - decided
     parts = [f"{decided} of {number_text.counted(len(study.exclusions), 'exclusion')}"] if decided else []
-    return listed([*parts, *([f"the reversal of {counted(back, 'exclusion')}"] if back else [])])
+    return listed([*parts, *([f"the reversal of {counted(reversed_count, 'exclusion')}"] if reversed_count else [])])
 
 
 def version_words(study: Study) -> str:
@@ -192,10 +202,10 @@ def version_words(study: Study) -> str:
     return f"{pooled}, from {study.contents} different files" if study.contents > len(versions) else pooled
 
 
-def _apparatus(study: Study) -> str:
+def _apparatus_sentence(study: Study) -> str:
     """Return a sentence on devices, forces, ball size and motion, as recorded in receipts."""
-    used = study.participants.loc[study.participants["counted"], "device"].dropna()
-    names = sorted({str(name).partition(":")[0] for name in used} - {"answers-only"})
+    devices = study.participants.loc[study.participants["counted"], "device"].dropna()
+    names = sorted({str(name).partition(":")[0] for name in devices} - {"answers-only"})
     device, scene = study.protocol.get("device"), study.protocol.get("scene")
     if not (device and scene and names):
         return ""
@@ -205,67 +215,68 @@ def _apparatus(study: Study) -> str:
     device_words += f"{device['force_limit_n']:g} N"
     if _WITHOUT_FORCE.issuperset(names):
         device_words = f"a device without force feedback ({listed(names)})"
-    velocity = {None: "", "device": "; its velocity was measured by the device"}.get(
+    velocity_note = {None: "", "device": "; its velocity was measured by the device"}.get(
         study.estimator, f"; its velocity was estimated with {_FILTERS.get(study.estimator or '', study.estimator)}"
     )
     return (
         f"Participants used {device_words}. A virtual ball with a diameter of {1000 * scene['body']['diameter_m']:g} "
-        f"mm moved {scene['scale']:g} times as far as the hand{velocity}."
+        f"mm moved {scene['scale']:g} times as far as the hand{velocity_note}."
     )
 
 
-def _liquids(study: Study) -> str:
-    """Return the liquids of the main blocks with their parameters; "" while the key is sealed."""
+def _liquid_sentence(study: Study) -> str:
+    """Return a sentence on the liquids of the main blocks and their parameters; "" while the key is sealed."""
     settings = [setting for block in study.blocks for setting in block.settings]
     settings += [setting for block in study.levels for setting in (block.reference, *block.settings) if setting]
     settings += [setting for question in study.others.questions for setting in question.where.settings]
-    held = [
+    liquid_ids = [
         setting.liquid
-        for each in settings
-        for setting in (each, each.of)
+        for listed_setting in settings
+        for setting in (listed_setting, listed_setting.of)
         if setting is not None and setting.liquid is not None
     ]
-    names = [name for liquids in dict.fromkeys(held) for name in liquids.split(" + ")]
-    words = [f"{name.replace('_', ' ')} ({liquid_words(study.liquids[name])})" for name in dict.fromkeys(names)
+    names = [name for liquids in dict.fromkeys(liquid_ids) for name in liquids.split(" + ")]
+    descriptions = [f"{name.replace('_', ' ')} ({liquid_words(study.liquids[name])})" for name in dict.fromkeys(names)
              if name in study.liquids]  # fmt: skip
-    if not words:
+    if not descriptions:
         return ""
-    return f"The simulated liquid{'s were' if len(words) > 1 else ' was'} {listed(words)}."
+    return f"The simulated liquid{'s were' if len(descriptions) > 1 else ' was'} {listed(descriptions)}."
 
 
-def _design(study: Study, results: Results) -> Iterator[str]:
+def _design_sentences(study: Study, results: Results) -> Iterator[str]:
     """Yield sentences on the presentation and order of trials in each block with questions, and on block order."""
     blocks = {block.id: block for block in study.blocks}
     for result in results.blocks:
         yield _presentation_sentence(study, blocks[result.id], result)
         yield from presentation_sentences(result)
-    others = [*_other_questions(study, results)]
+    others = [*_other_question_sentences(study, results)]
     yield from others
     if results.blocks or others:
         opened = "Conditions were identified only by codes until the key was opened."
         yield opened if study.revealed else "Conditions are identified only by codes."
-    yield _block_order(study)
+    yield _block_order_sentence(study)
 
 
-def _other_questions(study: Study, results: Results) -> Iterator[str]:
-    """Yield the questions other than statements after the trials of each block; without statements, also its design."""
+def _other_question_sentences(study: Study, results: Results) -> Iterator[str]:
+    """Yield sentences on other questions in blocks with trials; without statements, also on the design of the block."""
     designed, rated = {level.id for level in study.levels}, {result.id for result in results.blocks}
-    asked = Counter(question.where.id for question in study.others.questions)
+    question_counts = Counter(question.where.id for question in study.others.questions)
     for where in {question.where.id: question.where for question in study.others.questions}.values():
         if where.is_form or where.id in designed:
             continue
         if where.id in rated:
-            questions = counted(asked[where.id], "other question")
+            questions = counted(question_counts[where.id], "other question")
             yield f"In “{where.title}”, participants also answered {questions} after each presentation."
             continue
         table, names = study.protocol["blocks"][where.id], [setting.condition for setting in where.settings]
-        known = [name.replace("_", " ") for name in names if name is not None]
-        which = counted(len(names), "condition") + (f" ({listed(known)})" if known else "")
+        conditions = [name.replace("_", " ") for name in names if name is not None]
+        conditions_text = counted(len(names), "condition") + (f" ({listed(conditions)})" if conditions else "")
         order = f" {_ORDERS[table['order']]}" if len(names) > 1 else ""
-        times = f", {table['repetitions']} times each" if table["repetitions"] > 1 else ""
+        repetitions_note = f", {table['repetitions']} times each" if table["repetitions"] > 1 else ""
         yield (
-            f"In “{where.title}”, {which} {'was' if len(names) == 1 else 'were'} presented{order}{times}; participants "
-            f"answered {counted(asked[where.id], 'question')} after each presentation."
+            f"In “{where.title}”, {conditions_text} {'was' if len(names) == 1 else 'were'} "
+            f"presented{order}{repetitions_note}; participants answered "
+            f"{counted(question_counts[where.id], 'question')} after each presentation."
         )
 
 
@@ -276,21 +287,21 @@ def _presentation_sentence(study: Study, block: Block, result: BlockResult) -> s
     )
     names = [f"{delay:g}" for delay in result.delays_ms] or [name_in_sentence(name) for name in result.names]
     unit = " ms" if result.delays_ms else ""
-    which = counted(len(names), noun) + (f" ({listed(names)}{unit})" if result.revealed else "")
-    of = (
+    settings_text = counted(len(names), noun) + (f" ({listed(names)}{unit})" if result.revealed else "")
+    liquids = (
         sorted({setting.liquid for setting in block.settings if setting.liquid is not None}) if result.delays_ms else []
     )
-    liquid = f" in {listed(of)}".replace("_", " ") if of else ""
-    asked = counted(len(result.items), "statement")
+    liquid = f" in {listed(liquids)}".replace("_", " ") if liquids else ""
+    statements = counted(len(result.items), "statement")
     return (
-        f"In “{result.title}”, {which}{liquid} {'was' if len(names) == 1 else 'were'} "
-        f"presented{f' {order}' if order and len(names) > 1 else ''}; participants rated {asked} after each "
+        f"In “{result.title}”, {settings_text}{liquid} {'was' if len(names) == 1 else 'were'} "
+        f"presented{f' {order}' if order and len(names) > 1 else ''}; participants rated {statements} after each "
         "presentation."
     )
 
 
-def _block_order(study: Study) -> str:
-    """Return the order of the main blocks, by group if these differ; "" with one block."""
+def _block_order_sentence(study: Study) -> str:
+    """Return a sentence on the order of the main blocks, by group if it differs; "" for a single block."""
     titles = {block.id: block.title for block in study.blocks}
     titles |= {level.id: level.title for level in study.levels if level.phase == "main"}
     titles |= {question.where.id: question.where.title for question in study.others.questions
@@ -310,8 +321,8 @@ def _block_order(study: Study) -> str:
     return f"The blocks were presented {_BLOCK_ORDERS[order]}."
 
 
-def _delays(study: Study, results: Results) -> Iterator[str]:
-    """Yield requested and achieved delays of each unblinded block of delays."""
+def _delay_sentences(study: Study, results: Results) -> Iterator[str]:
+    """Yield a sentence on requested and achieved delays for each unblinded block of delays."""
     for block in results.blocks:
         rows = [
             delivered
@@ -331,10 +342,12 @@ def _delays(study: Study, results: Results) -> Iterator[str]:
         )
 
 
-def _missing_trials(study: Study) -> str:
+def _missing_trials_sentence(study: Study) -> str:
     """Return a sentence on undelivered interval trials in the included sessions."""
-    known = [one for one in study.participants.loc[study.participants["counted"], "missing"] if one is not None]
-    asked, count = sum(one.asked for one in known), sum(one.count for one in known)
+    known = [
+        missing for missing in study.participants.loc[study.participants["counted"], "missing"] if missing is not None
+    ]
+    asked, count = sum(missing.asked for missing in known), sum(missing.count for missing in known)
     if not study.levels or not asked:
         return ""
     if not count:
@@ -343,25 +356,25 @@ def _missing_trials(study: Study) -> str:
     return f"{lost} because no presentation met the limits for valid trials."
 
 
-def _questionnaires(study: Study) -> Iterator[str]:
-    """Yield each form with its questions and its position in the session."""
-    asked_in = (question.where for question in study.others.questions if question.where.is_form)
-    forms = Counter((where.id, where.title) for where in asked_in)
+def _form_sentences(study: Study) -> Iterator[str]:
+    """Yield a sentence on each form, with its number of questions and its position in the session."""
+    places = (question.where for question in study.others.questions if question.where.is_form)
+    forms = Counter((where.id, where.title) for where in places)
     for (form, title), questions in forms.items():
         recorded = RecordedSessions.model_validate(study.protocol)
         sessions = list(recorded.every_session())
-        times = list(dict.fromkeys(_form_times(study, steps, form) for steps in sessions if form in steps))
-        differ = ", depending on the group or session" if len(times) > 1 else ""
-        if not differ and not all(form in steps for steps in sessions):
-            differ = _sessions_with(recorded, form)
+        times = list(dict.fromkeys(_form_times_phrase(study, steps, form) for steps in sessions if form in steps))
+        note = ", depending on the group or session" if len(times) > 1 else ""
+        if not note and not all(form in steps for steps in sessions):
+            note = _sessions_phrase(recorded, form)
         yield (
             f"Participants completed the questionnaire “{title}” ({counted(questions, 'question')}) "
-            f"{' or '.join(times)}{differ}."
+            f"{' or '.join(times)}{note}."
         )
 
 
-def _sessions_with(recorded: RecordedSessions, form: str) -> str:
-    """Return in which sessions or groups a form is asked, if it is not asked in all: ", in session 1"."""
+def _sessions_phrase(recorded: RecordedSessions, form: str) -> str:
+    """Return a phrase on the sessions or groups in which a form is asked: ", in session 1"."""
     sessions = {group: range(1, (recorded.session_count(group) or 1) + 1) for group in recorded.groups or (None,)}
     asked_in = {
         group: [number for number in numbers if form in recorded.session_steps(group, number)]
@@ -376,8 +389,8 @@ def _sessions_with(recorded: RecordedSessions, form: str) -> str:
     return ", in some groups or sessions"
 
 
-def _form_times(study: Study, steps: tuple[str, ...], form: str) -> str:
-    """Return when a form is completed in a session with these steps."""
+def _form_times_phrase(study: Study, steps: tuple[str, ...], form: str) -> str:
+    """Return a phrase on the times at which a form is completed in a session with these steps."""
     titles, sessions = block_titles(study.protocol), RecordedSessions.model_validate(study.protocol)
     blocks = [step for step in steps if step in titles]
     main = {block for block in blocks if sessions.blocks[block].phase == "main"}
@@ -403,35 +416,35 @@ def _statement_sentences(study: Study, results: Results, blocks: list[BlockResul
         "Statements were rated on seven-point scales. Answers were treated as ordinal and summarised by medians "
         f"and quartiles ({quartiles})."
     )
-    yield from _means(results, blocks)
+    yield from _mean_sentences(results, blocks)
     for block in blocks:
         of_findings = [sentence for finding in all_findings() for sentence in finding(block, results).methods()]
         if of_findings and len(blocks) > 1:
             yield f"{lead_phrase(block)}:"
         yield from of_findings
-    yield from _common(results, blocks)
+    yield from _common_sentences(results, blocks)
 
 
-def _means(results: Results, blocks: list[BlockResult]) -> Iterator[str]:
+def _mean_sentences(results: Results, blocks: list[BlockResult]) -> Iterator[str]:
     """Yield sentences on the means shown, and on the tests that use them."""
-    if any(Effects.of(block) for block in blocks):
+    if any(Effects.value_in(block) for block in blocks):
         yield "Mean differences from the first condition are shown with 95 % confidence intervals (Student's t)."
     tested = [
         (
             "the hypotheses",
             any(contrast.contrast.blocks[0] in {block.id for block in blocks} for contrast in results.contrasts),
         ),
-        ("the equivalence tests", any(ContrastsWithControl.of(block) for block in blocks)),
-        ("the trend tests", results.decided.trends == "slopes" and any(DelayTrend.of(block) for block in blocks)),
+        ("the equivalence tests", any(ContrastsWithControl.value_in(block) for block in blocks)),
+        ("the trend tests", results.decided.trends == "slopes" and any(DelayTrend.value_in(block) for block in blocks)),
         ("the exploratory tests of means", any(MeanTests.tested(block) for block in blocks)),
     ]
-    where = [what for what, applies in tested if applies]
-    yield f"Means were used for {listed(where)}." if where else "Means were not tested."
+    uses = [test for test, applies in tested if applies]
+    yield f"Means were used for {listed(uses)}." if uses else "Means were not tested."
 
 
-def _common(results: Results, blocks: list[BlockResult]) -> Iterator[str]:
+def _common_sentences(results: Results, blocks: list[BlockResult]) -> Iterator[str]:
     decided = results.decided
-    gated = [block for block in blocks if (overall := OverAll.of(block)) is not None and overall.p is not None]
+    gated = [block for block in blocks if (overall := OverAll.value_in(block)) is not None and overall.p is not None]
     if gated:
         holm = f", Holm-adjusted across {counted(len(gated), 'block')}" if len(gated) > 1 else ""
         yield (
@@ -439,10 +452,10 @@ def _common(results: Results, blocks: list[BlockResult]) -> Iterator[str]:
             f"block{holm}."
         )
     if decided.binding:
-        which = listed([f"“{item}”" for item in decided.primary]) if decided.primary else "all statements"
+        primary_text = listed([f"“{item}”" for item in decided.primary]) if decided.primary else "all statements"
         yield (
-            f"Alpha ({decided.alpha_words()}) and the primary statements ({which}) were specified before the first "
-            "session."
+            f"Alpha ({decided.alpha_words()}) and the primary statements ({primary_text}) were specified before the "
+            "first session."
         )
     elif decided.changed:
         yield (
@@ -453,12 +466,12 @@ def _common(results: Results, blocks: list[BlockResult]) -> Iterator[str]:
         yield f"The analysis was not specified beforehand, so all results are exploratory (alpha = {decided.alpha:g})."
     for finding in all_findings():
         yield from finding.common_methods(blocks)
-    if gone := sorted({person for block in blocks for people in block.incomplete.values() for person in people}):
-        were = "was" if len(gone) == 1 else "were"
+    if incomplete := sorted({person for block in blocks for people in block.incomplete.values() for person in people}):
+        verb = "was" if len(incomplete) == 1 else "were"
         yield (
-            f"Missing answers were not imputed; {number_text.counted(len(gone), 'participant')} with a missing answer "
-            f"to a statement {were} excluded from that statement's tests over all conditions, and from comparisons of "
-            "two conditions that involve the missing answer."
+            f"Missing answers were not imputed; {number_text.counted(len(incomplete), 'participant')} with a missing "
+            f"answer to a statement {verb} excluded from that statement's tests over all conditions, and from "
+            "comparisons of two conditions that involve the missing answer."
         )
     measured = results.performance
     if measured is not None and measured.recorded:

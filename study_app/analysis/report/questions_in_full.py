@@ -1,6 +1,6 @@
-"""The appendix of the report: every question in full, in every language and version, and what changed between versions.
+"""The appendix of the report: all questions in full, in all languages and versions, and changes between versions.
 
-It needs the receipts alone, not the study's file.
+The texts are from the receipts; the study's file is not needed.
 """
 
 import itertools
@@ -21,7 +21,7 @@ class _Text(NamedTuple):
 
 
 def changed_questions(contents: Sequence[RecordedContent]) -> Iterator[str]:
-    """Yield a caveat for each later content of the study's file in which questions read otherwise than before."""
+    """Yield a caveat for each version of the study's file in which the wording of questions changed."""
     for before, after in itertools.pairwise(contents):
         old, new = ({text[:2]: text.words for text in _texts(content.protocol)} for content in (before, after))
         reworded = sorted({place[0] for place in old.keys() & new.keys() if old[place] != new[place]})
@@ -33,7 +33,7 @@ def changed_questions(contents: Sequence[RecordedContent]) -> Iterator[str]:
 
 
 def appendix(contents: Sequence[RecordedContent]) -> Iterator[str]:
-    """Yield the section with every text of every version, and the differences between versions."""
+    """Yield the section with all texts of all versions, and the changes between versions."""
     versions: dict[_Text, list[str]] = {}
     for content in contents:
         for text in _texts(content.protocol):
@@ -76,7 +76,7 @@ def _texts(protocol: Mapping[str, Any]) -> Iterator[_Text]:
 
 
 def _translations(name: str, text: Any, only: str) -> Iterable[_Text]:
-    """Return a text in each of its languages; ``only`` is the language of a text that has just one."""
+    """Return a text in each of its languages; ``only`` is the language of a text without translations."""
     by_language = text if isinstance(text, Mapping) else {only: text} if text else {}
     return [
         _Text(id=name, language=language, words=" · ".join(words) if isinstance(words, list) else str(words))

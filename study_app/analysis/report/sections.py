@@ -1,4 +1,4 @@
-"""The parts of the page and its texts: findings, limits, methods, the first page, blocks, and how the study was run."""
+"""Sections and texts of the report: findings, limitations, conclusions, blocks, and how the study was run."""
 
 import math
 import statistics
@@ -28,7 +28,7 @@ from study_app.analysis.page_layout import Picture
 from study_app.analysis.planned_exclusions import PlannedExclusions, rule_sentences
 from study_app.analysis.planning import WANTED
 from study_app.analysis.planning.power_curves import interval as share_interval
-from study_app.analysis.planning.smallest_differences import MOST_SD, detectable
+from study_app.analysis.planning.smallest_differences import MOST_SD, detectable_difference
 from study_app.analysis.questions import MEASURES
 from study_app.analysis.report.methods import late_exclusions
 from study_app.analysis.report.questions_in_full import changed_questions
@@ -62,13 +62,13 @@ from study_app.store.unblinding import RULES as AUTOMATIC_RULES
 from study_app.store.versions import recorded_contents
 
 
-def of_levels(results: Results) -> tuple[str, ...]:
-    """Return the findings in blocks of levels, one sentence each."""
+def level_sentences(results: Results) -> tuple[str, ...]:
+    """Return sentences on the findings in blocks of levels."""
     return tuple(line for level in results.levels for line in level_findings(level))
 
 
-def none_found(results: Results) -> str:
-    """Return why there are no findings."""
+def no_findings_sentence(results: Results) -> str:
+    """Return a sentence on the reason why there are no findings."""
     if results.blocks:
         return "No answers are included yet."
     return (
@@ -90,18 +90,18 @@ def limits(study: Study, results: Results) -> tuple[str, ...]:
                 lines.append(f"{result.title} presents only one {noun}, so its ratings are not compared.")
             continue
         lines += [f"{lead_phrase(result)}: {sentence}" for sentence in missing_sentences(result)]
-        decisive = [one for finding in all_findings() if finding.statements for one in finding.of(result)]
-        out = [f"“{short_text(result, one.item)}”" for one in decisive if one.verdict == "out of reach"]
-        if out:
+        tests = [test for finding in all_findings() if finding.statements for test in finding.value_in(result)]
+        out_of_reach = [f"“{short_text(result, test.item)}”" for test in tests if test.verdict == "out of reach"]
+        if out_of_reach:
             lines.append(
-                f"{lead_phrase(result)}: the tests for {listed(out)} could not have been significant with so few "
-                "participants, because no rearrangement of the answers within participants gives a small enough "
+                f"{lead_phrase(result)}: the tests for {listed(out_of_reach)} could not have been significant with so "
+                "few participants, because no rearrangement of the answers within participants gives a small enough "
                 "adjusted p value."
             )
         untested: dict[str, list[str]] = {}
-        for one in decisive:
-            if one.verdict == "not tested":
-                untested.setdefault(one.outcome.note, []).append(f"“{short_text(result, one.item)}”")
+        for test in tests:
+            if test.verdict == "not tested":
+                untested.setdefault(test.outcome.note, []).append(f"“{short_text(result, test.item)}”")
         lines += [
             f"{lead_phrase(result)}: {listed(items)} could not be tested ({why})." for why, items in untested.items()
         ]
@@ -139,12 +139,14 @@ def _general_sentences(study: Study, results: Results) -> Iterator[str]:
             "from the first session are used."
         )
     hypotheses = [contrast.contrast for contrast in results.contrasts]
-    if len({one.groups is None for one in hypotheses}) == 2 and not any(one.is_interaction for one in hypotheses):
+    if len({contrast.groups is None for contrast in hypotheses}) == 2 and not any(
+        contrast.is_interaction for contrast in hypotheses
+    ):
         yield "No hypothesis tests an interaction between groups and blocks or conditions."
-    yield from _low_power(results)
-    yield from _near_chance(results)
-    yield from _fixed_orders(study, results)
-    if any(one.groups for one in hypotheses) and group_assignment(study) == "pre-existing":
+    yield from _low_power_sentences(results)
+    yield from _chance_level_sentences(results)
+    yield from _fixed_order_sentences(study, results)
+    if any(contrast.groups for contrast in hypotheses) and group_assignment(study) == "pre-existing":
         yield (
             "Participants were not assigned to groups at random, so a difference between groups may have other causes."
         )
@@ -166,7 +168,7 @@ def _general_sentences(study: Study, results: Results) -> Iterator[str]:
             f"{late_exclusions(study)}. To see their influence, reverse these decisions in a copy of the study "
             "(`include` or `exclude`) and compare the two reports."
         )
-    yield from _late_devices(study)
+    yield from _late_device_sentence(study)
     if study.n == 1:
         yield "There is only one participant, so the results do not generalise to other people."
     if study.n < FEW and results.blocks:
@@ -176,7 +178,7 @@ def _general_sentences(study: Study, results: Results) -> Iterator[str]:
         )
 
 
-def _late_devices(study: Study) -> Iterator[str]:
+def _late_device_sentence(study: Study) -> Iterator[str]:
     """Yield a sentence on the main trials in which the device answered later than assumed, if there are any."""
     rows = study.trials[study.trials["counted"] & (study.trials["phase"] == "main")]
     late = rows[rows["device_delay_ticks"].notna()] if "device_delay_ticks" in rows else rows[:0]
@@ -189,42 +191,46 @@ def _late_devices(study: Study) -> Iterator[str]:
         )
 
 
-def _low_power(results: Results) -> Iterator[str]:
-    """Yield the smallest difference with 80 % power of each hypothesis that was not shown."""
+def _low_power_sentences(results: Results) -> Iterator[str]:
+    """Yield a sentence on the smallest difference with 80 % power for each hypothesis that was not shown."""
     for place, result in enumerate(results.contrasts, start=1):
         sides = [(len(side.values), side.sd) for side in result.sides if side.sd]
-        grouped = result.contrast.groups is not None
+        compares_groups = result.contrast.groups is not None
         if result.p_adjusted is None or result.verdict in (*FOUND, "equivalent") or len(sides) < 2:
             continue
         sizes, freedom = [n for n, _ in sides], sum(n - 1 for n, _ in sides)
-        sd = math.sqrt(sum((n - 1) * (own or 0.0) ** 2 for n, own in sides) / freedom) if grouped else result.sd
-        if sd and result.standard_error is not None and not grouped:
-            sd = result.standard_error * math.sqrt(result.n)  # that of the test, which may weight the participants
+        sd = (
+            math.sqrt(sum((n - 1) * (side_sd or 0.0) ** 2 for n, side_sd in sides) / freedom)
+            if compares_groups
+            else result.sd
+        )
+        if sd and result.standard_error is not None and not compares_groups:
+            sd = result.standard_error * math.sqrt(result.n)  # as in the test, which may weight participants
         if not sd:
             continue
-        groups, alpha = sizes if grouped else sizes[:1], results.decided.alpha / result.members
-        least = math.inf
+        groups, alpha = sizes if compares_groups else sizes[:1], results.decided.alpha / result.members
+        smallest = math.inf
         if min(sizes) > 2:
-            _, least = detectable(*groups, alpha=alpha, expected=result.contrast.expected)
+            _, smallest = detectable_difference(*groups, alpha=alpha, expected=result.contrast.expected)
         lead = f"Hypothesis{f' {place}' if len(results.contrasts) > 1 else ''}"
         people, power = counted(result.n, "participant"), f"{100 * WANTED:.0f} % power"
         largest = equality_limits(result.contrast, 1.0, ratio=False)[1] or math.inf
-        beyond = f"a difference of {MOST_SD:g} SD" if least > MOST_SD else "the largest difference on the scale"
-        least *= sd
-        if least > min(MOST_SD * sd, largest):
+        beyond = f"a difference of {MOST_SD:g} SD" if smallest > MOST_SD else "the largest difference on the scale"
+        smallest *= sd
+        if smallest > min(MOST_SD * sd, largest):
             yield f"{lead}: {people} are too few to find even {beyond} with {power}."
             continue
-        kind, size = ("difference", number(least))
+        kind, size = ("difference", number(smallest))
         if result.ratio:
-            kind, size = "ratio", f"{number(math.exp(least))} (or at most {number(math.exp(-least))})"
+            kind, size = "ratio", f"{number(math.exp(smallest))} (or at most {number(math.exp(-smallest))})"
         yield (
             f"{lead}: with {people} and the observed variation between them, a mean {kind} must be at least {size} to "
             f"be detected with {power}; the confidence interval shows which {kind}s remain possible."
         )
 
 
-def _near_chance(results: Results) -> Iterator[str]:
-    """Yield the sides of hypotheses about d′ at which participants may have guessed."""
+def _chance_level_sentences(results: Results) -> Iterator[str]:
+    """Yield a sentence for each hypothesis about d′ with conditions in which participants may have guessed."""
     for place, result in enumerate(results.contrasts, start=1):
         if result.contrast.measure != "d_prime" or result.contrast.is_interaction or result.verdict in FOUND:
             continue
@@ -241,8 +247,8 @@ def _near_chance(results: Results) -> Iterator[str]:
             )
 
 
-def _fixed_orders(study: Study, results: Results) -> Iterator[str]:
-    """Yield the hypotheses that compare two blocks which all participants completed in the same order."""
+def _fixed_order_sentences(study: Study, results: Results) -> Iterator[str]:
+    """Yield a sentence for each hypothesis on two blocks that all participants completed in the same order."""
     if study.protocol.get("study", {}).get("block_order", "fixed") != "fixed":
         return
     for place, result in enumerate(results.contrasts, start=1):
@@ -264,7 +270,7 @@ def _fixed_orders(study: Study, results: Results) -> Iterator[str]:
 
 
 def _repeated_position_sentences(result: BlockResult, results: Results) -> Iterator[str]:
-    """Yield the settings that had the same position for all participants, if several orders were expected."""
+    """Yield a sentence for each setting that had the same position for all participants."""
     counts = results.orders.get(result.id)
     if counts is None or counts.orders < 2 or len(counts.codes) < 2:
         return
@@ -278,20 +284,23 @@ def _repeated_position_sentences(result: BlockResult, results: Results) -> Itera
 
 
 CLAIMS: Final[dict[int, tuple[int, int]]] = {5: (4, 2000), 12: (47, 3000), 24: (42, 3000)}
-"""Participants → in how many empty studies anything in the report claims something, and of how many studies, by the
-answer model and by the ordinal probit model: ``liquid-study validate-report --studies 1000``."""
+"""By number of participants: how many reports of simulated studies without effects claimed one, and of how many.
+
+The studies were simulated with the answer model and with the ordinal probit model, by
+``liquid-study validate-report --studies 1000``.
+"""
 
 
 def conclusions(results: Results) -> list[tuple[str, ...]]:
-    """Return the conclusions: part, question, verdict and sentence."""
-    asked = {finding.key: finding.question for finding in all_findings() if finding.question}
+    """Return the conclusions as tuples of subject, question, verdict and text."""
+    questions = {finding.key: finding.question for finding in all_findings() if finding.question}
     kinds = {result.id: result.kind for result in results.blocks}
     hypotheses = [
         ("Hypothesis", question(contrast), contrast.verdict, answer(contrast)) for contrast in results.contrasts
     ]
     return hypotheses + [
-        (one.title, asked[one.question].format(kind=kinds[one.block]), one.verdict, one.text)
-        for one in answers(results)
+        (given.title, questions[given.question].format(kind=kinds[given.block]), given.verdict, given.text)
+        for given in answers(results)
     ]
 
 
@@ -323,37 +332,40 @@ def planned_section(planned: PlannedExclusions | None) -> Iterator[str]:
 
 
 def _conclusions_by_question(results: Results) -> dict[str, str]:
-    by_question = {f"{part}: {asked}": f"{verdict}: {text}" for part, asked, verdict, text in conclusions(results)}
-    sentences = (sentence.partition(": ") for sentence in of_levels(results))
-    return by_question | {about: text for about, _, text in sentences}
+    by_question = {
+        f"{part}: {question_text}": f"{verdict}: {text}" for part, question_text, verdict, text in conclusions(results)
+    }
+    sentences = (sentence.partition(": ") for sentence in level_sentences(results))
+    return by_question | {subject: text for subject, _, text in sentences}
 
 
 def answers(results: Results) -> tuple[Answer, ...]:
-    """Return the answers of a study, block by block; none for a block without valid answers or with a single setting.
+    """Return the answers of all findings, block by block; none for blocks without valid answers or with one setting.
 
-    They make a claim about a block only if the global test over all its statements is significant; it gates every
-    verdict of the block.
+    They claim an effect in a block only if the test over all its statements is significant.
     """
     return tuple(
-        _answer(finding(result, results))
+        _answer_or_sealed(finding(result, results))
         for result in results.blocks
         for finding in all_findings()
         if result.n and len(result.names) > 1 and finding.question and result.kind in finding.kinds
     )
 
 
-def _answer(finding: Finding[Any]) -> Answer:
-    """Return the answer of a finding."""
-    if not finding.found.revealed:
-        return finding.answered("sealed", "This question is answered after unblinding.")
+def _answer_or_sealed(finding: Finding[Any]) -> Answer:
+    """Return the answer of a finding, or that it is sealed."""
+    if not finding.result.revealed:
+        return finding.make_answer("sealed", "This question is answered after unblinding.")
     return finding.answer()
 
 
-def empty_studies(participants: int) -> str:
-    """Return how many of a hundred reports claim an effect although there is none, for this sample size."""
+def false_claims_sentence(participants: int) -> str:
+    """Return a sentence on the share of reports that claim an effect although there is none, for this sample size."""
     n = min(CLAIMS, key=lambda size: abs(size - participants))
     claims, studies = CLAIMS[n]
-    share, low, high = (number(100 * one, 1) for one in (claims / studies, *share_interval(claims / studies, studies)))
+    share, low, high = (
+        number(100 * value, 1) for value in (claims / studies, *share_interval(claims / studies, studies))
+    )
     return (
         f"In {studies} simulated studies with {n} participants, three liquids, seven delays and no true effect, "
         f"{share} % of the reports claimed a difference or a noticed delay ({claims} reports, 95 % confidence "
@@ -364,7 +376,7 @@ def empty_studies(participants: int) -> str:
 def block(
     result: BlockResult, results: Results, drawn: Sequence[Picture], failures: Failures | None = None
 ) -> Iterator[str]:
-    """Return the section of one block; a part that fails is replaced by its reason and added to ``failures``."""
+    """Yield the section of one block; a part that fails is replaced by its reason and added to ``failures``."""
     title = heading(2, lead_phrase(result))
     if not result.n:
         yield title
@@ -372,22 +384,22 @@ def block(
         none = paragraph("No answers are included yet.")
         yield bullets(missing_sentences(result)) if untested else none
         return
-    held = Failures() if failures is None else failures
+    collected = Failures() if failures is None else failures
     pictures = {picture.name.split("-")[0]: picture for picture in drawn if picture.block == result.id}
     parts = [
         part
-        for what, make in _parts(result, results, pictures)
-        for part in try_part(held, what, heading(3, what.capitalize()), make, block=result.id)
+        for part_title, make in _block_parts(result, results, pictures)
+        for part in try_part(collected, part_title, heading(3, part_title.capitalize()), make, block=result.id)
     ]
     yield from [title, *parts] if parts else []
 
 
-def _parts(
+def _block_parts(
     result: BlockResult, results: Results, pictures: Mapping[str, Picture]
 ) -> Iterator[tuple[str, Callable[[], Iterable[str]]]]:
     """Yield the titles of a block's parts and the functions that make them."""
-    if said := presentation_sentences(result):
-        yield "presentations", lambda: [paragraph(" ".join(said))]
+    if sentences := presentation_sentences(result):
+        yield "presentations", lambda: [paragraph(" ".join(sentences))]
     if result.incomplete:
         yield "missing answers", lambda: [paragraph(incomplete_words(result), "soft")]
     effects, *others = all_findings()
@@ -401,7 +413,7 @@ def _parts(
 
 
 def verdicts_mean(results: Results) -> Iterator[str]:
-    """Yield a common explanation of verdicts for all tables; nothing without tests."""
+    """Yield the section that explains the verdicts in all tables; nothing without blocks of statements."""
     if not results.blocks:
         return
     yield heading(2, "What the verdicts mean")
@@ -416,10 +428,10 @@ def counts_of_answers(results: Results) -> Iterator[str]:
     for result in results.blocks:
         if result.measures:
             yield heading(3, lead_phrase(result))
-            yield _measures(result)
+            yield _counts_table(result)
 
 
-def _measures(result: BlockResult) -> str:
+def _counts_table(result: BlockResult) -> str:
     order = [item.id for item in result.items]
     return table_of(
         sorted(result.measures, key=lambda row: order.index(str(row["item"]))),
@@ -438,13 +450,13 @@ def _measures(result: BlockResult) -> str:
 
 
 def _mean_and_sd(row: Mapping[str, Any]) -> tuple[float | None, float | None]:
-    """Return the mean and the standard deviation of the answers with these counts; None if they are too few."""
+    """Return the mean and the standard deviation of the answers in a row of counts; None if there are too few."""
     answers = [level for level in LEVELS for _ in range(int(row[f"count_{level}"]))]
     return statistics.mean(answers) if answers else None, statistics.stdev(answers) if len(answers) > 1 else None
 
 
 def places(results: Results) -> dict[str, str]:
-    """Return the places of questions: id → title of the section, in session order."""
+    """Return the titles of the sections on questions by the ID of their place, in session order."""
     levels = {
         level.block: "discrimination" if level.revealed and level.vary is None else "levels" for level in results.levels
     }
@@ -456,28 +468,28 @@ def places(results: Results) -> dict[str, str]:
 
 
 def place_title(result: QuestionResult, results: Results) -> str:
-    """Return the title of the place of a question; of a form after every main block it says so."""
-    others = {asked.where for asked in results.questions if not asked.is_form}
-    main = {one.id for one in results.blocks} | {level.block for level in results.levels} | others
+    """Return the title of the place of a question, with a note if it is a form after every main block."""
+    others = {other.where for other in results.questions if not other.is_form}
+    main = {result_block.id for result_block in results.blocks} | {level.block for level in results.levels} | others
     is_repeated = result.is_form and len(main) > 1 and {group.code for group in result.groups} == main
     return f"{result.title}, after each block" if is_repeated else result.title
 
 
-def question_section(where: str, study: Study, results: Results, drawn_: Sequence[Picture]) -> Iterator[str]:
+def question_section(where: str, study: Study, results: Results, pictures: Sequence[Picture]) -> Iterator[str]:
     """Yield the section of a form, or of a block's other questions."""
     yield heading(2, places(results)[where])
-    asked = {
+    placed_questions = {
         (placed_question.where.id, placed_question.id): placed_question for placed_question in study.others.questions
     }
     levels = [level for level in results.levels if level.block == where]
-    yield from _scores([score for score in results.scores if score.where == where])
+    yield from _score_table([score for score in results.scores if score.where == where])
     for result in results.questions:
         if result.where != where:
             continue
         yield heading(3, "Answers" if levels else result.short)
         yield paragraph(result.text)
         if any(level.summary == "settings" for level in levels):
-            continue  # each from another start
+            continue  # starting levels differ, so a summary of raw answers has no meaning
         if not result.n:
             yield paragraph("No answers are included yet.")
             continue
@@ -488,15 +500,17 @@ def question_section(where: str, study: Study, results: Results, drawn_: Sequenc
                     yield paragraph(f"{group.name}:")
                 yield bullets(group.numbers["texts"])
             continue
-        rows = [(group.name, measure.cells(asked[where, result.item], group.numbers)) for group in result.groups]
+        rows = [
+            (group.name, measure.cells(placed_questions[where, result.item], group.numbers)) for group in result.groups
+        ]
         first = "Answers" if result.is_form else "Condition"
         yield table((first, *rows[0][1]), [[name, *cells.values()] for name, cells in rows])
-        yield from drawn_figure({picture.name: picture for picture in drawn_}, f"question-{where}-{result.item}")
+        yield from drawn_figure({picture.name: picture for picture in pictures}, f"question-{where}-{result.item}")
     for level in levels:
-        yield from level_section(level, drawn_, study.estimator)
+        yield from level_section(level, pictures, study.estimator)
 
 
-def _scores(scores: Sequence[ScoreResult]) -> Iterator[str]:
+def _score_table(scores: Sequence[ScoreResult]) -> Iterator[str]:
     if not scores:
         return
     yield heading(3, "Scores")
@@ -519,8 +533,8 @@ def _scores(scores: Sequence[ScoreResult]) -> Iterator[str]:
     yield from (paragraph(source, "soft") for source in dict.fromkeys(score.source for score in scores) if source)
 
 
-def _reversed_exclusions(study: Study) -> Iterator[str]:
-    """Yield each exclusion that a person reversed; sessions that were kept from the start stand with the rules."""
+def _reversed_exclusion_sentences(study: Study) -> Iterator[str]:
+    """Yield a sentence on each reversed exclusion; sessions kept despite a rule are listed with the rules."""
     for prefix, place in folders_of(study.folder).items():
         for reversal in dated_reversals(place):
             exclusion = replace(reversal.exclusion, participant=f"{prefix}{reversal.exclusion.participant}")
@@ -534,7 +548,7 @@ def _reversed_exclusions(study: Study) -> Iterator[str]:
 
 _UNITS: Final = {"s": "s", "m": "m", "mm": "mm", "n": "N", "percent": "%"}
 _SHOWN: Final = 20
-"""So many exclusions and doubts are listed; all of them stand in report.json."""
+"""The most exclusions, doubts and sessions that the page lists; report.json lists all of them."""
 
 
 def conduct(study: Study, results: Results) -> Iterator[str]:
@@ -547,19 +561,21 @@ def conduct(study: Study, results: Results) -> Iterator[str]:
         f"{counted(study.n, 'participant')}."
     )
     if study.sites:
-        here = Counter(map(study.site_of, study.people))
-        people = listed([f"{site} ({counted(here[site], 'participant')})" for site in study.sites])
+        people_by_site = Counter(map(study.site_of, study.people))
+        people = listed([f"{site} ({counted(people_by_site[site], 'participant')})" for site in study.sites])
         yield paragraph(f"The results from these sites are merged: {people}.")
     if study.withdrawn:
         people = counted(len(study.withdrawn), "participant").capitalize()
         yield paragraph(f"{people} withdrew; their data were erased.")
-        yield bullets([f"{it.at[:10]}, recorded by {it.by}: {it.reason}" for it in study.withdrawn])
-    masked = Counter(map(str, study.participants["motors_masked"].dropna()))
-    if masked:
-        answers = [f"{means} in {counted(count, 'session')}" for means, count in masked.most_common()]
+        yield bullets(
+            [f"{tombstone.at[:10]}, recorded by {tombstone.by}: {tombstone.reason}" for tombstone in study.withdrawn]
+        )
+    masking = Counter(map(str, study.participants["motors_masked"].dropna()))
+    if masking:
+        answers = [f"{means} in {counted(count, 'session')}" for means, count in masking.most_common()]
         yield paragraph(f"Motors masked: {listed(answers)}.")
     yield heading(3, "Exclusions")
-    gone = [
+    exclusions = [
         f"{describe_exclusion(exclusion)}: {exclusion.reason} ("
         f"{'rule ' if exclusion.rule_or_person in AUTOMATIC_RULES else ''}{exclusion.rule_or_person}, "
         f"{exclusion.excluded_at}"
@@ -567,22 +583,22 @@ def conduct(study: Study, results: Results) -> Iterator[str]:
         for exclusion in study.exclusions
     ]
     if study.left_out:
-        were = "was" if study.left_out == 1 else "were"
-        gone.append(f"{counted(study.left_out, 'session')} {were} not completed and therefore not analysed")
-    yield bullets(_first(gone)) if gone else paragraph("There are no exclusions.")
+        verb = "was" if study.left_out == 1 else "were"
+        exclusions.append(f"{counted(study.left_out, 'session')} {verb} not completed and therefore not analysed")
+    yield bullets(_first_lines(exclusions)) if exclusions else paragraph("There are no exclusions.")
     if rules := rule_sentences(study, results):
         yield bullets(rules)
-    if reversed_ones := [*_reversed_exclusions(study)]:
+    if reversals := [*_reversed_exclusion_sentences(study)]:
         yield heading(3, "Exclusions that were reversed")
-        yield bullets(_first(reversed_ones))
-    yield from _missing_trials(study)
+        yield bullets(_first_lines(reversals))
+    yield from _missing_trials_part(study)
     if study.doubts:
         yield heading(3, "Files that have changed since recording")
         yield bullets(
-            _first([f"{doubt.path.relative_to(study.folder).as_posix()} {doubt.what}" for doubt in study.doubts])
+            _first_lines([f"{doubt.path.relative_to(study.folder).as_posix()} {doubt.what}" for doubt in study.doubts])
         )
-    yield from _delivered_delay_lines(study, results)
-    yield from _orders(results)
+    yield from _delivered_delays_part(study, results)
+    yield from _trial_orders_part(results)
 
 
 def groups(study: Study, results: Results, by: By = "group") -> Iterator[str]:
@@ -596,11 +612,11 @@ def groups(study: Study, results: Results, by: By = "group") -> Iterator[str]:
     for result in results.blocks:
         if rows := [mean for mean in means if mean.block == result.id]:
             yield heading(3, result.title)
-            yield _means(result, rows, by)
+            yield _group_means_table(result, rows, by)
     if not results.blocks:
         return
     compared = by == "group" and any(contrast.contrast.groups for contrast in results.contrasts)
-    tested = (
+    tests_note = (
         f"Differences between {by}s are tested only if a hypothesis states them."
         if compared
         else (f"Differences between {by}s are not tested.")
@@ -608,12 +624,12 @@ def groups(study: Study, results: Results, by: By = "group") -> Iterator[str]:
     preexisting = by == "group" and group_assignment(study) == "pre-existing"
     yield paragraph(
         "The table shows the mean and standard deviation, across participants, of each participant's mean answer. "
-        f"{tested}{' The groups were not randomised, so a difference may have other causes.' * preexisting}",
+        f"{tests_note}{' The groups were not randomised, so a difference may have other causes.' * preexisting}",
         "soft",
     )
 
 
-def _means(result: BlockResult, rows: Sequence[Any], by: By) -> str:
+def _group_means_table(result: BlockResult, rows: Sequence[Any], by: By) -> str:
     return table_of(
         rows,
         ("Statement", lambda row: short_text(result, row.item)),
@@ -626,22 +642,22 @@ def _means(result: BlockResult, rows: Sequence[Any], by: By) -> str:
     )
 
 
-class _LostTrials(NamedTuple):
-    """A session, whether it is included, and its missing trials."""
+class _MissingTrialsRow(NamedTuple):
+    """The missing trials of a session, and whether the session is included."""
 
     session: str
     counted: bool
     missing: MissingTrials
 
 
-def _missing_trials(study: Study) -> Iterator[str]:
-    """Yield how many interval trials each participant lost, which and why; nothing without such trials."""
+def _missing_trials_part(study: Study) -> Iterator[str]:
+    """Yield a table of the missing interval trials of each session, with reasons; nothing without blocks of levels."""
     if not study.levels:
         return
     yield heading(3, "Trials that were not delivered")
     sessions: Iterable[Any] = study.participants.itertuples()
     rows = [
-        _LostTrials(f"{row.participant}, session {row.session}", bool(row.counted), row.missing)
+        _MissingTrialsRow(f"{row.participant}, session {row.session}", bool(row.counted), row.missing)
         for row in sessions
         if row.missing is not None and row.missing.count
     ]
@@ -653,7 +669,7 @@ def _missing_trials(study: Study) -> Iterator[str]:
             (
                 "of which",
                 lambda lost_trials: listed(
-                    [f"{_track(study, *of)}: {n}" for of, n in lost_trials.missing.tracks.items()]
+                    [f"{_setting_text(study, *track)}: {n}" for track, n in lost_trials.missing.tracks.items()]
                 ),
             ),
             ("reason", lambda lost_trials: listed(lost_trials.missing.reason_texts)),
@@ -673,26 +689,26 @@ def _missing_trials(study: Study) -> Iterator[str]:
         )
 
 
-def _track(study: Study, block: str, code: str) -> str:
+def _setting_text(study: Study, block: str, code: str) -> str:
     """Return the name of a setting of a block of levels, or its code while the key is sealed."""
     titles = {level.id: level.title for level in study.levels}
     setting = study.settings.get((block, code))
     return f"{titles.get(block, block)}, {code if setting is None or setting.condition is None else setting.condition}"
 
 
-def _first(lines: list[str]) -> list[str]:
+def _first_lines(lines: list[str]) -> list[str]:
     more = len(lines) - _SHOWN
     return [*lines[:_SHOWN], *([f"and {more} more, listed in report.json"] if more > 0 else [])]
 
 
-def _delivered_delay_lines(study: Study, results: Results) -> Iterator[str]:
+def _delivered_delays_part(study: Study, results: Results) -> Iterator[str]:
     if not results.delivered:
         return
     yield heading(3, "Were the delays presented as specified?")
     blocks = {result.id: result for result in results.blocks}
 
     def shown(cell: Callable[[Delivered], str]) -> Callable[[Delivered], str]:
-        return cell if study.revealed else lambda _one: "sealed"
+        return cell if study.revealed else lambda _delivered: "sealed"
 
     def trials(delivered: Delivered) -> str:
         whole = delivered.measured == delivered.trials or not study.revealed
@@ -705,8 +721,11 @@ def _delivered_delay_lines(study: Study, results: Results) -> Iterator[str]:
             "Condition",
             lambda delivered: "all" if delivered.code is None else name(blocks[delivered.block], delivered.code),
         ),
-        ("requested", shown(lambda one: "–" if one.delay_ms is None else ms(one.delay_ms))),
-        ("achieved", shown(lambda one: "–" if one.achieved_ms is None else f"{number(one.achieved_ms, 1)} ms")),
+        ("requested", shown(lambda delivered: "–" if delivered.delay_ms is None else ms(delivered.delay_ms))),
+        (
+            "achieved",
+            shown(lambda delivered: "–" if delivered.achieved_ms is None else f"{number(delivered.achieved_ms, 1)} ms"),
+        ),
         ("mean error", shown(lambda delivered: _signed_ms(delivered.error_mean_ms))),
         ("worst trial", shown(lambda delivered: _signed_ms(delivered.error_worst_ms))),
         ("trials", trials),
@@ -718,8 +737,9 @@ def _delivered_delay_lines(study: Study, results: Results) -> Iterator[str]:
         "Delay error is the age of the drawn position minus the requested delay. The table shows the mean across "
         "trials and the trial with the largest mean error. Times are from the program's clock and do not include "
         "display latency. "
-        + (f"Limits: {'; '.join(_limit(what, limit) for what, limit in limits.items())}. " if limits else "")
-        + f"{_violated_limits(study, limits)}Trials that exceed a limit are included, unless they are excluded above."
+        + (f"Limits: {'; '.join(_limit_text(what, limit) for what, limit in limits.items())}. " if limits else "")
+        + f"{_violated_limits_sentence(study, limits)}Trials that exceed a limit are included, unless they are "
+        "excluded above."
         + (
             ""
             if study.revealed
@@ -730,7 +750,7 @@ def _delivered_delay_lines(study: Study, results: Results) -> Iterator[str]:
     )
 
 
-def _violated_limits(study: Study, limits: Mapping[str, float]) -> str:
+def _violated_limits_sentence(study: Study, limits: Mapping[str, float]) -> str:
     """Return a sentence on the limits that trials violated; "" if there are none."""
     rows = study.trials[study.trials["counted"] & (study.trials["phase"] == "main")]
     broken = [
@@ -739,15 +759,17 @@ def _violated_limits(study: Study, limits: Mapping[str, float]) -> str:
     ]
     if not any(broken):
         return ""
-    counts = Counter(limit for one in broken for limit in one)
-    listed = "; ".join(f"{_limit(what, limits[what])} ({counted(count, 'trial')})" for what, count in counts.items())
-    return f"{sum(map(bool, broken))} of {len(rows)} trials exceeded a limit: {listed}. "
+    counts = Counter(limit for limits_of_trial in broken for limit in limits_of_trial)
+    limit_counts = "; ".join(
+        f"{_limit_text(limit, limits[limit])} ({counted(count, 'trial')})" for limit, count in counts.items()
+    )
+    return f"{sum(map(bool, broken))} of {len(rows)} trials exceeded a limit: {limit_counts}. "
 
 
-def _limit(what: str, limit: float) -> str:
+def _limit_text(name: str, limit: float) -> str:
     """Return a limit as text: "time between two ticks at most 20 ms"."""
-    words, _, unit = what.rpartition("_")
-    bound, _, quantity = limit_label(what).partition(" ")
+    words, _, unit = name.rpartition("_")
+    bound, _, quantity = limit_label(name).partition(" ")
     value = f"at {'least' if bound == 'minimum' else 'most'} {limit:g}"
     value += {"percent": " %", "ms": " ms"}.get(unit, "" if quantity else f" {unit}")
     return f"{quantity or words.replace('_', ' ')} {value}".lstrip()
@@ -761,21 +783,21 @@ def _signed_ms(value: float | None) -> str:
     return "–" if value is None else f"{'+' if value > 0 else ''}{number(value, 1)} ms"
 
 
-def _orders(results: Results) -> Iterator[str]:
-    several = [(result, counts) for result in results.blocks if (counts := results.orders.get(result.id)) is not None]
-    several = [(result, counts) for result, counts in several if counts.orders and len(counts.codes) >= 2]
-    if not several:
+def _trial_orders_part(results: Results) -> Iterator[str]:
+    blocks = [(result, counts) for result in results.blocks if (counts := results.orders.get(result.id)) is not None]
+    blocks = [(result, counts) for result, counts in blocks if counts.orders and len(counts.codes) >= 2]
+    if not blocks:
         return
     yield heading(3, "Trial orders")
-    for result, counts in several:
+    for result, counts in blocks:
         names = [name(result, code) if result.revealed else code for code in counts.codes]
-        yield paragraph(f"{result.title} ({counted(counts.orders, 'order')}): {_evenness(counts)}")
+        yield paragraph(f"{result.title} ({counted(counts.orders, 'order')}): {_evenness_sentence(counts)}")
         lines = enumerate(counts.positions, start=1)
         yield table(("Position", *names), [[str(place), *map(str, line)] for place, line in lines])
     yield paragraph("The tables show how often each condition occurred in each position of its block.", "soft")
 
 
-def _evenness(counts: Evenness) -> str:
+def _evenness_sentence(counts: Evenness) -> str:
     cells, after = [count for line in counts.positions for count in line], counts.after_another
     places = f"positions were not balanced; each condition occurred {min(cells)} to {max(cells)} times in each position"
     if counts.positions_even:
@@ -794,11 +816,15 @@ def motion(results: Results) -> Iterator[str]:
         yield paragraph("Motion and force are shown only after unblinding, because they reveal liquids and delays.")
         return
     for result in results.blocks:
-        measures = [one for one in (*OF_TRIALS, *OF_REACHES) if any(_movement_measures(measured, result, measure=one))]
+        measures = [
+            measure
+            for measure in (*OF_TRIALS, *OF_REACHES)
+            if any(_movement_measures(measured, result, measure=measure))
+        ]
         rows = _motion_rows(result, measured, measures, results.delivered)
         if rows:
             yield heading(3, result.title)
-            head = (settings_noun(result).capitalize(), "n", *map(_label, measures), "trials within limits")
+            head = (settings_noun(result).capitalize(), "n", *map(_measure_label, measures), "trials within limits")
             yield table(head, rows)
             if result.id not in measured.reaching:
                 yield paragraph(
@@ -810,10 +836,10 @@ def motion(results: Results) -> Iterator[str]:
                 yield paragraph(
                     "Without readable recordings of this block, reaching measures are not available.", "soft"
                 )
-    yield paragraph(_recordings(measured))
+    yield paragraph(_recordings_sentence(measured))
     recorded = any(measured.recorded_in(result.id) for result in results.blocks)
     definitions = TRIAL_DEFINITIONS | (REACH_DEFINITIONS if recorded else {})
-    yield bullets(f"{_label(measure)}: {words}." for measure, words in definitions.items())
+    yield bullets(f"{_measure_label(measure)}: {words}." for measure, words in definitions.items())
     yield paragraph(
         "The tables show the median across participants (with quartiles) of each participant's own median. “Trials "
         "within limits” shows how many of the measured trials met the protocol's limits; the other columns "
@@ -822,40 +848,45 @@ def motion(results: Results) -> Iterator[str]:
     )
 
 
-def _movement_measures(measured: Performance, result: BlockResult, **wanted: str) -> Iterator[MovementQuartiles]:
-    """Yield the measures of a block, by code or by name."""
+def _movement_measures(measured: Performance, result: BlockResult, **fields: str) -> Iterator[MovementQuartiles]:
+    """Yield the movement measures of a block whose fields have the given values."""
     for moved in measured.moved:
-        if moved.block == result.id and all(getattr(moved, field) == value for field, value in wanted.items()):
+        if moved.block == result.id and all(getattr(moved, field) == value for field, value in fields.items()):
             yield moved
 
 
 def _motion_rows(
     result: BlockResult, measured: Performance, measures: Sequence[str], delivered: Sequence[Delivered]
 ) -> list[list[str]]:
-    kept = {one.code: _within_limits(one) for one in delivered if one.block == result.id}
+    within_limits = {setting.code: _within_limits(setting) for setting in delivered if setting.block == result.id}
     rows = []
     for setting in result.settings:
-        here = {moved.measure: moved for moved in _movement_measures(measured, result, code=setting.code) if moved.n}
-        if here:
-            n = max(moved.n for moved in here.values())
-            cells = [_quartiles(here[measure]) if measure in here else "–" for measure in measures]
-            rows.append([name(result, setting.code), str(n), *cells, kept[setting.code]])
+        measures_by_name = {
+            moved.measure: moved for moved in _movement_measures(measured, result, code=setting.code) if moved.n
+        }
+        if measures_by_name:
+            n = max(moved.n for moved in measures_by_name.values())
+            cells = [
+                _quartiles_text(measures_by_name[measure]) if measure in measures_by_name else "–"
+                for measure in measures
+            ]
+            rows.append([name(result, setting.code), str(n), *cells, within_limits[setting.code]])
     return rows
 
 
-def _quartiles(moved: MovementQuartiles) -> str:
+def _quartiles_text(moved: MovementQuartiles) -> str:
     digits = 2 if moved.measure.endswith(("_s", "_n", "_m", "percent")) else 1
     return f"{number(moved.median, digits)} ({number(moved.q1, digits)}–{number(moved.q3, digits)})"
 
 
-def _label(measure: str) -> str:
+def _measure_label(measure: str) -> str:
     words, _, unit = measure.rpartition("_")
     if unit not in _UNITS:
         return measure.replace("_", " ")
     return f"{words.replace('_', ' ')}, {_UNITS[unit]}"
 
 
-def _recordings(measured: Performance) -> str:
+def _recordings_sentence(measured: Performance) -> str:
     if not measured.trials:
         return "The study does not contain any reaching trials, so reaching measures are not available."
     text = f"Reaching measures are based on the recordings of {measured.recorded} of {measured.trials} reaching trials"

@@ -1,4 +1,4 @@
-"""Every figure of a study: of its answers as files, and of its findings for a report."""
+"""All figures of a study: those of its answers as files, and those of its findings for a report."""
 
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
@@ -27,7 +27,7 @@ def block_figure_tasks(study: Study, results: Results, forms: Sequence[str] = st
         if not result.n:
             continue
         lowest = {
-            lowest.item: lowest.over_all_ms for lowest in LowestDelay.of(result) if lowest.over_all_ms is not None
+            lowest.item: lowest.over_all_ms for lowest in LowestDelay.value_in(result) if lowest.over_all_ms is not None
         }
         name = block_name(study, block)
         yield block.id, name, partial(answer_figures.answers_picture, study, block, name, forms, lowest)
@@ -40,7 +40,7 @@ def block_figure_tasks(study: Study, results: Results, forms: Sequence[str] = st
 
 
 def block_name(study: Study, block: Block, what: str = "") -> str:
-    """Return the file name of a figure, by default of the block's answers."""
+    """Return the file name of a block's figure: ``what``, by default the kind of block, with the ID if it is needed."""
     name = what or block.kind
     return f"{name}-{block.id}" if len(study.blocks_of(block.kind)) > 1 else name
 

@@ -1,4 +1,4 @@
-"""The report of a study, written whole or not at all: page, numbers in files, figures, tables, and a script in R."""
+"""The report of a study: page, files with all numbers, figures, tables, and an R script, written completely or not."""
 
 import hashlib
 import json
@@ -68,13 +68,13 @@ _OF_FORMAT_2: Final = {
     Setting: frozenset({"link", "view"}),
     ContrastResult: frozenset({"cells"}),
 }
-"""Results that reports of earlier versions do not have; omitted where there are none."""
+"""Fields that earlier versions do not have in report.json; omitted if they are empty."""
 
 
 def as_json_types(value: Any) -> Any:
-    """Return a result as JSON types."""
+    """Return a result as dictionaries, lists and values that JSON can represent."""
     if isinstance(value, BlockResult):
-        return {name: as_json_types(entry) for name, entry in _entries(value)}
+        return {name: as_json_types(entry) for name, entry in _block_entries(value)}
     if isinstance(value, LevelsResult):
         entries = {field.name: getattr(value, field.name) for field in fields(value) if field.name != "statistics"}
         return as_json_types(entries | level_entries(value))
@@ -97,8 +97,8 @@ def as_json_types(value: Any) -> Any:
     return value
 
 
-def _entries(result: BlockResult) -> Iterator[tuple[str, Any]]:
-    """Yield a block's fields, with its findings inserted at their place."""
+def _block_entries(result: BlockResult) -> Iterator[tuple[str, Any]]:
+    """Yield the report.json entries of a block: its fields, with the entries of findings in place of ``findings``."""
     for field in fields(result):
         if field.name != "findings":
             if field.name != "incomplete" or result.incomplete:
@@ -143,16 +143,19 @@ def motion_csv(results: Results) -> bytes:
     """Return a CSV table with one row per measure of motion and force and setting."""
     moved = () if results.performance is None else results.performance.moved
     blocks = {block.id: block for block in results.blocks}
-    kept = {(delivered.block, delivered.code): delivered for delivered in results.delivered}
+    delivered = {(setting.block, setting.code): setting for setting in results.delivered}
     return csv_bytes(
         _MOTION,
         [
             {
-                **as_json_types(one),
-                "setting": name(blocks[one.block], one.code),
-                **{field: getattr(kept[one.block, one.code], field) for field in ("trials", "judged", "valid")},
+                **as_json_types(quartiles),
+                "setting": name(blocks[quartiles.block], quartiles.code),
+                **{
+                    field: getattr(delivered[quartiles.block, quartiles.code], field)
+                    for field in ("trials", "judged", "valid")
+                },
             }
-            for one in moved
+            for quartiles in moved
         ],
     )
 
@@ -178,12 +181,12 @@ def document(study: Study, results: Results, texts: Mapping[str, Any], failures:
     }
     if any((folder / PREREGISTRATION).exists() for folder in preregistration_folders(study).values()):
         parts["preregistration"] = lambda: as_json_types(deviations(study))
-    held = {name: failures.attempt(f"report.json, {name}", make) for name, make in parts.items()}
+    made = {name: failures.attempt(f"report.json, {name}", make) for name, make in parts.items()}
     content = {
         "format": _FORMAT,
         "program": f"liquid-study {__version__}",
         "failures": [{**asdict(failure), "why": failure.why} for failure in failures.found],
-        **{name: None if isinstance(part, Failure) else part for name, part in held.items()},
+        **{name: None if isinstance(part, Failure) else part for name, part in made.items()},
     }
     return f"{json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False)}\n".encode()
 
@@ -200,22 +203,22 @@ def versions() -> dict[str, str]:
 def plug_ins(study: Study) -> dict[str, list[str]]:
     """Return the plug-ins used in the sessions and in this report: kinds and names by package and version."""
     places = map(StudyFolder, folders_of(study.folder).values())
-    found = recorded_plug_ins(session.receipt for place in places for session in place.sessions())
+    used = recorded_plug_ins(session.receipt for place in places for session in place.sessions())
     for plug_in in FINDINGS.plug_ins:
         if not plug_in.fault:
-            found.setdefault(f"{plug_in.package} {plug_in.version}", []).append(f"{plug_in.kind} {plug_in.name}")
-    return found
+            used.setdefault(f"{plug_in.package} {plug_in.version}", []).append(f"{plug_in.kind} {plug_in.name}")
+    return used
 
 
 def sessions(study: Study) -> list[dict[str, Any]]:
     """Return the provenance of every session: seed, protocol hash, and program version."""
     columns = ["participant", "session", "status", "counted", "seed", "protocol_hash", "key_hash", "version", "device"]
     rows = study.participants[columns].astype(object).where(study.participants[columns].notna(), None)
-    found = [{str(key): as_json_types(value) for key, value in row.items()} for row in rows.to_dict("records")]
+    entries = [{str(key): as_json_types(value) for key, value in row.items()} for row in rows.to_dict("records")]
     if not study.levels:
-        return found
-    missing = [None if one is None else one.count for one in study.participants["missing"]]
-    return [row | {TRIALS_MISSING.name: count} for row, count in zip(found, missing, strict=True)]
+        return entries
+    missing = [None if trials is None else trials.count for trials in study.participants["missing"]]
+    return [row | {TRIALS_MISSING.name: count} for row, count in zip(entries, missing, strict=True)]
 
 
 def files(study: Study) -> dict[str, str]:
@@ -241,7 +244,7 @@ def r_script(study: Study) -> str:
 
 
 _HASHES_SHOWN = 12
-"""Of so few files the page shows the hashes one by one; of more, one over all of them."""
+"""The most files whose hashes the page lists; it always shows a combined hash."""
 
 
 def report(
@@ -254,7 +257,7 @@ def report(
 ) -> tuple[Path, ...]:
     """Write the report of a study's results into the folder ``to``; return the files, ``report.html`` first.
 
-    The same results give the same bytes. While the key is sealed the report uses codes, and lists what awaits the key.
+    The same results give the same bytes. While the key is sealed, the report uses codes and lists the missing results.
 
     Parameters
     ----------
@@ -263,8 +266,8 @@ def report(
     warn : callable, optional
         Called with a line for every file that differs from its recorded state but is used.
     failed : callable, optional
-        Called with a line for every section that could not be computed; the report says so there, and contains all
-        others.
+        Called with a line for every section that could not be computed; the report has a note in its place and contains
+        all others.
 
     Raises
     ------
@@ -279,12 +282,12 @@ def report(
         raise AnalysisError(
             f"{folder}: the study {study.name!r} does not ask any questions, so there is nothing to report"
         )
-    files, found = report_files(study, progress)
+    files, report_failures = report_files(study, progress)
     progress("writing", 0.95)
     written = write_output(study.folder, Path(to), files, warn)
     study.tell_doubts(warn)
     if failed is not None:
-        for failure in found:
+        for failure in report_failures:
             failed(f"error: {failure}")
     return written
 
@@ -297,21 +300,21 @@ def has_questions(study: Study) -> bool:
 def report_files(study: Study, progress: Progress = report_no_progress) -> tuple[dict[str, bytes], tuple[Failure, ...]]:
     """Return the files of a study's report by name, ``report.html`` first, and the sections that failed.
 
-    report.json is made last, since it lists the failures of the others.
+    report.json is made last, because it lists the failures of all other parts.
     """
     results = evaluate(study, progress=lambda what, share: progress(what, 0.1 + 0.6 * share))
     failures = Failures(results.failures)
     numbers = failures.value("the participants' values", lambda: numbers_of(study), {})
-    figure_tasks = SharedTasks([partial(_draw, task) for task in _figure_tasks(study, results, numbers)])
+    figure_tasks = SharedTasks([partial(_draw_or_fail, task) for task in _figure_tasks(study, results, numbers)])
     texts: dict[str, Any] = {
-        "findings": failures.value("texts: findings", lambda: sections.of_levels(results), ()),
+        "findings": failures.value("texts: findings", lambda: sections.level_sentences(results), ()),
         "limits": failures.value("texts: limits", lambda: sections.limits(study, results), ()),
         "methods": failures.value("texts: methods", lambda: methods(study, results), ""),
     }
     planned = failures.value("planned exclusions", lambda: planned_exclusions(study, results), None)
     if planned is not None:
-        open_ones = [proposal for proposal in planned.proposals if proposal.decision == "undecided"]
-        texts["limits"] = (*_proposal_sentences(open_ones), *texts["limits"])
+        undecided = [proposal for proposal in planned.proposals if proposal.decision == "undecided"]
+        texts["limits"] = (*_proposal_sentences(undecided), *texts["limits"])
         texts["planned_exclusions"] = [asdict(proposal) for proposal in planned.proposals]
     files: dict[str, bytes] = {}
     for file, make in (
@@ -330,8 +333,8 @@ def report_files(study: Study, progress: Progress = report_no_progress) -> tuple
     for picture in drawn:
         files |= {f"{picture.name}.{form}": content for form, content in picture.files.items()}
         files[f"{picture.name}.txt"] = f"{picture.caption}\n".encode()
-    page_ = _page(study, results, numbers, drawn, texts, planned, failures).encode()
-    return {"report.html": page_, "report.json": document(study, results, texts, failures), **files}, tuple(
+    page = _render_page(study, results, numbers, drawn, texts, planned, failures).encode()
+    return {"report.html": page, "report.json": document(study, results, texts, failures), **files}, tuple(
         failures.found
     )
 
@@ -345,27 +348,28 @@ def _figure_tasks(study: Study, results: Results, numbers: Mapping[str, Sequence
         yield from level_figure_tasks(study, results.levels, FORMATS)
 
 
-def _draw(task: FigureTask) -> Picture | Failure | None:
+def _draw_or_fail(task: FigureTask) -> Picture | Failure | None:
     failures = Failures()
     picture = next(draw_figures([task], failures), None)
     return failures.found[0] if failures.found else picture
 
 
 def _proposal_sentences(proposals: Sequence[Proposal]) -> Iterator[str]:
-    """Yield the sentence on sessions whose exclusion awaits a decision, if any."""
+    """Yield a sentence on sessions whose exclusion awaits a decision; nothing without such sessions."""
     if proposals:
-        who = listed(
+        sessions = listed(
             [
                 f"{proposal.participant}, session {proposal.session} ({proposal.rule.replace('_', ' ')})"
                 for proposal in proposals
             ]
         )
         yield (
-            f"Under a planned rule, {who} would be excluded; no decision has been made yet (see “Planned exclusions”)."
+            f"Under a planned rule, {sessions} would be excluded; no decision has been made yet (see “Planned "
+            "exclusions”)."
         )
 
 
-def _page(
+def _render_page(
     study: Study,
     results: Results,
     numbers: Mapping[str, Sequence[Numbers]],
@@ -377,7 +381,7 @@ def _page(
     on_first = failures.value("figures on the first page", lambda: figures_shown(cards(results, numbers), drawn), set())
     presented = failures.value("the presented liquids", lambda: presented_in(study), {})
     others = [picture for picture in drawn if picture.name not in on_first]
-    sections_: list[tuple[str, Callable[[], Iterable[str]]]] = [
+    all_sections: list[tuple[str, Callable[[], Iterable[str]]]] = [
         ("Hypotheses", lambda: contrast_section(results)),
         *((block.title, partial(sections.block, block, results, others, failures)) for block in results.blocks),
         *(
@@ -385,8 +389,8 @@ def _page(
             for where, title in sections.places(results).items()
         ),
     ]
-    shown = len(sections_)
-    sections_ += [
+    open_sections = len(all_sections)
+    all_sections += [
         ("What the verdicts mean", lambda: sections.verdicts_mean(results)),
         ("Groups", lambda: sections.groups(study, results)),
         ("Sites", lambda: sections.groups(study, results, "site")),
@@ -406,18 +410,18 @@ def _page(
     first = try_part(
         failures, "first page", Markup(), lambda: [first_page(results, texts["limits"], numbers, drawn, presented)]
     )
-    made = [
-        (title, try_part(failures, f"section “{title}”", heading(2, title), make), place < shown)
-        for place, (title, make) in enumerate(sections_)
+    rendered = [
+        (title, try_part(failures, f"section “{title}”", heading(2, title), make), place < open_sections)
+        for place, (title, make) in enumerate(all_sections)
     ]
     body = render(
         "body.html",
         title=study.title,
-        facts=_facts(study),
+        facts=_facts_sentences(study),
         marks=_marks(study),
         parts=[
             {"title": title, "html": html, "chunks": chunks(html[1:]), "open": is_open}
-            for title, html, is_open in made
+            for title, html, is_open in rendered
             if html
         ],
         failures=[str(failure) for failure in failures.found],
@@ -429,29 +433,32 @@ def _page(
     )
 
 
-def _facts(study: Study) -> str:
+def _facts_sentences(study: Study) -> str:
     """Return sentences with the study's name, sample size, and the dates of the included sessions."""
     people = counted(study.n, "participant")
     rows = study.participants
     days = sorted({str(at)[:10] for at in rows.loc[rows["counted"], "started_at"]})
-    when = (
+    dates = (
         "" if not days else f"Sessions on {days[0]}." if len(days) == 1 else f"Sessions from {days[0]} to {days[-1]}."
     )
     groups = listed([f"{count} {group}" for group, count in group_counts(study).items()])
-    of_groups = f" ({groups})" if groups else ""
+    group_note = f" ({groups})" if groups else ""
     took_part = rows["participant"].nunique()
     planned = (study.protocol.get("analysis") or {}).get("participants")
     notes = ["all were included"] if study.n == took_part > 1 else []
-    if notes and (out := int((~rows["counted"]).sum())):
-        notes = [f"all were included, but {out} of {len(rows)} sessions {'was' if out == 1 else 'were'} not"]
-    if out := took_part - study.n:
-        notes = [f"{out} of {took_part} {'was' if out == 1 else 'were'} not included ({_why_not_included(study)})"]
+    if notes and (left_out := int((~rows["counted"]).sum())):
+        notes = [f"all were included, but {left_out} of {len(rows)} sessions {'was' if left_out == 1 else 'were'} not"]
+    if left_out := took_part - study.n:
+        notes = [
+            f"{left_out} of {took_part} {'was' if left_out == 1 else 'were'} not included ({_why_not_included(study)})"
+        ]
     notes += [] if planned is None else [f"{planned} were planned"]
-    others = f" {capitalised('; '.join(notes))}." if notes else ""
-    return f"Study {study.name}, {version_words(study)}. {people[:1].upper()}{people[1:]}{of_groups}.{others} {when}"
+    notes_sentence = f" {capitalised('; '.join(notes))}." if notes else ""
+    sample = f"{people[:1].upper()}{people[1:]}{group_note}"
+    return f"Study {study.name}, {version_words(study)}. {sample}.{notes_sentence} {dates}"
 
 
-_WHY: Final = {
+_EXCLUSION_REASONS: Final = {
     "below_chance": "answers below chance",
     "threshold_beyond_levels": "thresholds beyond the levels",
     "constant_answers": "constant answers",
@@ -461,16 +468,18 @@ _WHY: Final = {
 
 
 def _why_not_included(study: Study) -> str:
-    """Return the number of participants without an included session, by reason."""
+    """Return a phrase with the number of participants without an included session for each reason."""
     rows = study.participants
     absent = rows[~rows["participant"].isin(study.people)]
     rules = {row.participant: row.rule_or_person for row in study.exclusions if row.trial is None}
     excluded = set(absent.loc[absent["excluded"], "participant"])
-    why = [
-        _WHY.get(rules.get(person, ""), "a researcher's decision") if person in excluded else "unfinished session"
+    reasons = [
+        _EXCLUSION_REASONS.get(rules.get(person, ""), "a researcher's decision")
+        if person in excluded
+        else "unfinished session"
         for person in sorted(set(absent["participant"]))
     ]
-    counts = ", ".join(f"{words}: {count}" for words, count in Counter(why).most_common())
+    counts = ", ".join(f"{reason}: {count}" for reason, count in Counter(reasons).most_common())
     return f"{counts}; see “How the study was run”"
 
 
@@ -482,7 +491,7 @@ def _marks(study: Study) -> list[tuple[str, str]]:
 
 
 def _reproduction_sentences(study: Study, results: Results) -> Iterator[str]:
-    """Yield the requirements for reproducing the numbers."""
+    """Yield the section on reproducing the report: settings, versions and hashes."""
     yield heading(2, "Reproducing this report")
     decided = results.decided
     bound = decided.equivalence_bound
@@ -494,7 +503,7 @@ def _reproduction_sentences(study: Study, results: Results) -> Iterator[str]:
         ("Seed of the analysis", str(results.seed)),
         *((f"Version of {library}", version) for library, version in versions().items()),
         *((f"Plug-in {package}", ", ".join(names)) for package, names in plug_ins(study).items()),
-        ("Key opened", "; ".join(map(_opened, reveals_of(study.folder))) or "no"),
+        ("Key opened", "; ".join(map(_reveal_text, reveals_of(study.folder))) or "no"),
     ]
     yield table(("Setting", "Value"), rows, words=2)
     hashes = files(study)
@@ -514,6 +523,6 @@ def _reproduction_sentences(study: Study, results: Results) -> Iterator[str]:
     )
 
 
-def _opened(reveal: Mapping[str, str]) -> str:
+def _reveal_text(reveal: Mapping[str, str]) -> str:
     site = f"site {reveal['site']}, " if "site" in reveal else ""
     return f"{site}{reveal['at']} by {reveal['by']}: {reveal['reason']}"

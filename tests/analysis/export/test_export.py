@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from study_app.analysis.export.table_files import table_bytes
-from study_app.analysis.export.tables import Delivered
+from study_app.analysis.export.tables import ExportTable
 from study_app.analysis.export_study import export
 from study_app.errors import AnalysisError
 from study_app.store.files.columns import SEALED
@@ -109,7 +109,7 @@ def test_a_text_is_no_formula_in_a_spreadsheet_and_a_negative_number_a_number(re
     assert {unguard_formula(row["exclusion_reason"]) for row in found} == {"=1+1"}
     frame = pd.DataFrame({"text": ["-1"], "number": [-1.5]})
     columns = (Column("text", "text", ""), Column("number", "number", ""))
-    assert table_bytes(Delivered("numbers", columns, frame)) == b"text,number\n'-1,-1.5\n"
+    assert table_bytes(ExportTable("numbers", columns, frame)) == b"text,number\n'-1,-1.5\n"
 
 
 def test_an_export_replaces_the_one_before_it_and_leaves_other_files(rek: Results, to: Path) -> None:

@@ -13,7 +13,7 @@ import pytest
 from click.testing import CliRunner
 
 from study_app.analysis.export import psychds_dataset
-from study_app.analysis.export.psychds_dataset import FOLDER, _footage, variables
+from study_app.analysis.export.psychds_dataset import FOLDER, _footage, merged_variables
 from study_app.analysis.export_study import export
 from study_app.cli import commands
 from study_app.errors import AnalysisError
@@ -200,7 +200,7 @@ def test_descriptions_name_standard_properties_authors_and_licence(kitchen: Path
 
 
 def test_units_and_ranges_hold_in_every_table() -> None:
-    (one,) = variables(
+    (one,) = merged_variables(
         {
             "study-x_description-a_data.csv": (Column("n", "integer", "Points.", unit="s", minimum=1, maximum=7),),
             "study-x_description-b_data.csv": (optional("n", "number", "Seconds.", minimum=0),),

@@ -21,7 +21,7 @@ from study_app.analysis.data.blocks import Item, Setting
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.export import psychds_dataset, spss, table_files
 from study_app.analysis.export.table_files import codebook_bytes, credit_lines, file_name
-from study_app.analysis.export.tables import Delivered, exported_tables, names_of_sealed, wide_table
+from study_app.analysis.export.tables import ExportTable, exported_tables, sealed_interval_columns, wide_table
 from study_app.protocol.source.files import StudySource, _is_of
 from study_app.store.files.columns import INTERVALS
 from study_app.store.files.csv_files import Column, header, optional, unsealed_columns
@@ -253,14 +253,14 @@ def test_missing_answers_have_the_code_of_their_reason() -> None:
         }
     )
     coded = spss._code_missing_answers(pd.Series([4, None, None, None, None], dtype="Float64"), people, rows)
-    labels = spss._levels({4: "four"}, "unsure")
+    labels = spss._value_labels({4: "four"}, "unsure")
     assert [labels[int(value)] for value in coded] == ["four", "unsure", "Excluded", "No answer", "No answer"]
-    assert spss._levels({}, "")[int(coded[1])] == "Cannot judge"
+    assert spss._value_labels({}, "")[int(coded[1])] == "Cannot judge"
 
 
 def test_names_in_sav_are_valid_and_differ_without_case() -> None:
     names = ["a b", "A_b", "all", "1st", "x" * 70, "x" * 71, "é"]
-    short = list(spss._names_of(names).values())
+    short = list(spss._spss_names(names).values())
     assert short == ["a_b", "A_b_2", "v_all", "v_1st", "x" * 64, f"{'x' * 62}_2", "v"]
 
 
@@ -285,7 +285,7 @@ def test_each_column_of_sav_has_its_label_format_measure_and_values(made: Study,
     frame = pd.DataFrame({name: pd.array(values, dtype=types[name]) for name, values in rows.items()})
     path = tmp_path / "x.sav"
     labels = {1: "low", 97: "Excluded", 99: "No answer"}
-    path.write_bytes(spss.sav(replace(made, version="2.5"), Delivered("t", COLUMNS, frame), {"a_whole": labels}))
+    path.write_bytes(spss.sav(replace(made, version="2.5"), ExportTable("t", COLUMNS, frame), {"a_whole": labels}))
     found, about = pyreadstat.read_sav(path, user_missing=True)
     assert about.file_label == "Made up (made_up 2.5)"
     assert about.column_names_to_labels == {
@@ -353,10 +353,10 @@ def test_the_codebook_describes_columns_doubts_and_credits(made: Study) -> None:
     assert text.startswith('{\n  "study": {\n    "name": "made_up",\n    "title": "Ölε",\n')
     assert not [one.name for one in (*exported_tables(greek), wide_table(greek)[0]) if "site" in one.frame]
     of_levels: Any = replace(made, levels=(made.blocks[0],))
-    sealed = names_of_sealed(of_levels)
+    sealed = sealed_interval_columns(of_levels)
     assert sealed == {*header(INTERVALS)} - {*header(unsealed_columns(INTERVALS))} != set()
-    assert names_of_sealed(made) == set()
-    table = Delivered("trials", COLUMNS, pd.DataFrame())
+    assert sealed_interval_columns(made) == set()
+    table = ExportTable("trials", COLUMNS, pd.DataFrame())
     assert file_name(made, table, "sav") == "study-made_up_description-trials_data.sav"
 
 

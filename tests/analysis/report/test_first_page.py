@@ -14,15 +14,15 @@ from scipy.stats import binom
 from study_app.analysis.data.blocks import AFTER, Block, Decided, Item, LevelBlock, Setting
 from study_app.analysis.evaluate import evaluate, evaluate_block
 from study_app.analysis.figures.summary_figures import Numbers, place_of
-from study_app.analysis.findings.delays import ContrastsWithControl, DetectionThreshold, Lowest, LowestDelay
-from study_app.analysis.findings.finding import of_tables
+from study_app.analysis.findings.delays import ContrastsWithControl, DetectionThreshold, LowestDelay, LowestTrend
+from study_app.analysis.findings.finding import answers_from_tables
 from study_app.analysis.findings.recognition import LiquidRecognition, RecognitionResult, recognised
-from study_app.analysis.findings.statement_tests import DelayTrend, Effects, Pairs, with_gates
+from study_app.analysis.findings.statement_tests import DelayTrend, Effects, Pairs, add_gates
 from study_app.analysis.page_layout import Drawing
 from study_app.analysis.report import first_page as pages
 from study_app.analysis.report import sections
 from study_app.analysis.report.first_page import Card, Presented, first_page, presented_in
-from study_app.analysis.report.sections import CLAIMS, answers, empty_studies
+from study_app.analysis.report.sections import CLAIMS, answers, false_claims_sentence
 from study_app.analysis.results import GroupAnswers, QuestionResult, Results, lead_phrase
 from study_app.analysis.statistics.recognition_tests import recognition
 from study_app.protocol.trials.designs import default_design
@@ -84,7 +84,7 @@ def primary_later() -> Results:
 def changed(results: Results, finding: Any, change: Callable[[int, Any], Any]) -> Results:
     """Return results in which each entry of a finding is changed, or left out where that gives None."""
     (block,) = results.blocks
-    entries = (change(number, one) for number, one in enumerate(finding.of(block)))
+    entries = (change(number, one) for number, one in enumerate(finding.value_in(block)))
     return replace(results, blocks=(finding.add_to(block, tuple(one for one in entries if one is not None)),))
 
 
@@ -233,7 +233,7 @@ def test_a_form_has_a_card_only_if_it_says_more_than_a_hypothesis(blocks: str, p
     by_setting = tuple((f"After {block}", _ASKED_AFTER[block]) for block in blocks)
     raw = Numbers("raw", (0.0, 100.0), True, by_setting, "raw", tuple(blocks))
     presented = {block: Presented("", {"": of}) for block, of in zip("ab", _OF_DELAYS, strict=True)}
-    made = list(pages._questions(results, {"load": [raw]}, presented))
+    made = list(pages._question_cards(results, {"load": [raw]}, presented))
     assert len(made) == n
     if blocks == "ab" and made:
         assert "after a (60 ms of visual delay) and 30.0 [" in made[0].sentences[0]
@@ -326,7 +326,7 @@ def test_who_may_differ_more_is_told_of_the_delays_up_to_the_stated_one() -> Non
 
 
 def test_lowest_delays_are_told_by_statement_and_the_shortest_in_the_figure_of_the_threshold() -> None:
-    def with_surer_steps(number: int, lowest: Lowest) -> Lowest:
+    def with_surer_steps(number: int, lowest: LowestTrend) -> LowestTrend:
         """Return the first two steps of one statement, and the first of the other, with a p that six digits keep."""
         steps = [
             replace(step, trend=replace(step.trend, p=1e-9)) if at < 2 - number else step
@@ -358,7 +358,7 @@ def test_the_figure_of_differences_has_the_intervals_of_the_equivalence_tests(al
     rows = {line.split("\t")[0]: line.split("\t")[1:] for line in picture.numbers.splitlines()}
     level = f"{100 - 200 * alpha:.0f} %"
     lows, highs = (rows[f"{end} end of the {level} interval"] for end in ("lower", "upper"))
-    tested = ContrastsWithControl.of(block)
+    tested = ContrastsWithControl.value_in(block)
     assert len(lows) == len(tested) == 6
     for contrast, low, high in zip(tested, lows, highs, strict=True):
         ends = contrast.found.interval
@@ -369,7 +369,7 @@ def test_the_figure_of_differences_has_the_intervals_of_the_equivalence_tests(al
 
 @pytest.mark.parametrize(("participants", "n"), [(1, 5), (10, 12), (200, 24)])
 def test_the_measured_rate_is_that_of_the_nearest_size(participants: int, n: int) -> None:
-    told = empty_studies(participants)
+    told = false_claims_sentence(participants)
     assert f"with {n} participants" in told
     claims, studies = CLAIMS[n]
     assert f"In {studies} simulated studies" in told
@@ -392,14 +392,14 @@ def test_a_claim_needs_the_test_over_all_statements_corrected_over_the_blocks() 
     single = {item.id: rng.integers(1, 8, (14, 4, 1)).astype(float) for item in items}
     single[ITEMS[0]] = np.clip(np.arange(1, 5)[:, None] + rng.integers(0, 3, (14, 4, 1)), 1, 7).astype(float)
     decided = replace(DECIDED, primary=ITEMS[:1])
-    asked = of_tables(block, decided, tuple(map(str, range(14))), single)
-    (one,) = with_gates([asked])
-    two = with_gates([replace(asked, values={ITEMS[1]: asked.values[ITEMS[1]]}), asked])[1]
+    asked = answers_from_tables(block, decided, tuple(map(str, range(14))), single)
+    (one,) = add_gates([asked])
+    two = add_gates([replace(asked, values={ITEMS[1]: asked.values[ITEMS[1]]}), asked])[1]
     assert one.over_all is not None
     assert one.gate == one.over_all.p
     assert two.gate > one.gate  # Holm, over both blocks
     for gate, verdict in ((0.05, "shown"), (0.051, "not shown")):
-        (tested,) = (one for one in DelayTrend.of(evaluate_block(None, replace(asked, gate=gate))) if one.primary)
+        (tested,) = (one for one in DelayTrend.value_in(evaluate_block(None, replace(asked, gate=gate))) if one.primary)
         assert (tested.verdict, tested.p_adjusted) == (verdict, gate)
 
 

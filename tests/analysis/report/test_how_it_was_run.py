@@ -84,10 +84,10 @@ def conduct() -> Iterator[str]:
     yield text_of(sections.conduct(shown, results(shown, blocks=())))
     yield methods.late_exclusions(shown)
     yield methods.late_exclusions(replace(shown, exclusions=out[:1]))
-    yield methods._exclusions(shown)
-    yield methods._exclusions(replace(LIQUIDS, exclusions=out))
-    yield methods._exclusions(replace(LIQUIDS, exclusions=(exclusion("P1", by="fast_answers"),), settings={}))
-    yield from (" ".join(sections._first([*map(str, range(count))])) for count in (20, 23))
+    yield methods._exclusion_sentences(shown)
+    yield methods._exclusion_sentences(replace(LIQUIDS, exclusions=out))
+    yield methods._exclusion_sentences(replace(LIQUIDS, exclusions=(exclusion("P1", by="fast_answers"),), settings={}))
+    yield from (" ".join(sections._first_lines([*map(str, range(count))])) for count in (20, 23))
 
 
 def delivered() -> Iterator[str]:
@@ -102,16 +102,16 @@ def delivered() -> Iterator[str]:
         ("b", None, None, 14, 13, 7, 5, -0.5, 2.26, None), ("b", "D2", 0.0, 5, 5, 5, 4, 0.5, 1.0, 2.0),
     ]  # fmt: skip
     found = results(shown, delivered=[Delivered(**dict(zip(fields, row, strict=True))) for row in rows])
-    yield text_of(sections._delivered_delay_lines(shown, found))
-    yield text_of(sections._delivered_delay_lines(replace(shown, settings={}), found)).rpartition("Trials that exceed")[
+    yield text_of(sections._delivered_delays_part(shown, found))
+    yield text_of(sections._delivered_delays_part(replace(shown, settings={}), found)).rpartition("Trials that exceed")[
         2
     ]
-    yield text_of(sections._delivered_delay_lines(replace(shown, settings={}), found)).partition("Delay error is")[0]
-    yield "; ".join(sections._limit(what, 7.0) for what in ("frame_gap_ms", "hz", "withheld_percent"))
+    yield text_of(sections._delivered_delays_part(replace(shown, settings={}), found)).partition("Delay error is")[0]
+    yield "; ".join(sections._limit_text(what, 7.0) for what in ("frame_gap_ms", "hz", "withheld_percent"))
     yield "; ".join(sections._signed_ms(value) for value in (None, 0.0, 1.5, -1.5))
-    yield from methods._delays(shown, found)
+    yield from methods._delay_sentences(shown, found)
     found.delivered = [replace(one, achieved_ms=None) for one in found.delivered]
-    yield from methods._delays(shown, found)
+    yield from methods._delay_sentences(shown, found)
 
 
 def lost_trials() -> Iterator[str]:
@@ -120,8 +120,8 @@ def lost_trials() -> Iterator[str]:
     levels: Any = (SimpleNamespace(id="b", title="Tracks"),)
     some = replace(DELAYS, levels=levels, participants=people, protocol={"limits": {MISSING_PERCENT: 12.5}})
     none = replace(some, participants=people[1:], protocol={})
-    yield from (text_of(sections._missing_trials(one)) for one in (some, none, replace(none, levels=())))
-    yield methods._missing_trials(none)
+    yield from (text_of(sections._missing_trials_part(one)) for one in (some, none, replace(none, levels=())))
+    yield methods._missing_trials_sentence(none)
 
 
 def groups() -> Iterator[str]:
@@ -146,24 +146,24 @@ def methods_of_a_study() -> Iterator[str]:
     scene = {"scale": 4.0, "body": {"diameter_m": 0.068}}
     device = replace(base, protocol={"device": {"rate_hz": 2000.0, "force_limit_n": 3.5}, "scene": scene})
     used = base.participants.assign(device=["falcon:2", "mouse", None])
-    yield methods._apparatus(replace(device, participants=used))
-    yield methods._apparatus(replace(device, participants=used[1:], estimator="device"))
-    yield methods._apparatus(replace(device, participants=used.assign(device="answers-only"), estimator=None))
+    yield methods._apparatus_sentence(replace(device, participants=used))
+    yield methods._apparatus_sentence(replace(device, participants=used[1:], estimator="device"))
+    yield methods._apparatus_sentence(replace(device, participants=used.assign(device="answers-only"), estimator=None))
     tables = {
         f"liquid{number}": {"density_kg_m3": 900 + number, "drag": {"damping_nspm": None}, "effects": ()}
         for number in (1, 2)
     }
-    yield methods._liquids(replace(base, liquids=tables))
-    yield methods._liquids(replace(base, liquids={"liquid2": tables["liquid2"]}))
+    yield methods._liquid_sentence(replace(base, liquids=tables))
+    yield methods._liquid_sentence(replace(base, liquids={"liquid2": tables["liquid2"]}))
     two = replace(base, blocks=(base.blocks[0], replace(base.blocks[0], id="c", title="Second")))
     for order in ("fixed", "random", "balanced"):
-        yield methods._block_order(replace(two, protocol={"study": {"block_order": order}, "groups": GROUPS}))
-    yield methods._block_order(replace(two, protocol={}))
+        yield methods._block_order_sentence(replace(two, protocol={"study": {"block_order": order}, "groups": GROUPS}))
+    yield methods._block_order_sentence(replace(two, protocol={}))
     members = base.participants.assign(group=["new", "new", "old"])
-    yield methods._groups(replace(base, protocol={"study": {}, "groups": GROUPS}))
+    yield methods._group_sentence(replace(base, protocol={"study": {}, "groups": GROUPS}))
     existing = {"study": {"group_assignment": "pre-existing"}, "groups": GROUPS}
-    yield methods._groups(replace(base, protocol=existing, participants=members))
-    yield f"{methods._block_order(base)}{methods._groups(base)}none"
+    yield methods._group_sentence(replace(base, protocol=existing, participants=members))
+    yield f"{methods._block_order_sentence(base)}{methods._group_sentence(base)}none"
     for order in ("fixed", "shuffled", "constrained", "williams", "latin"):
         for of in (LIQUIDS, DELAYS):
             shown_in = replace(of, protocol={"blocks": {"b": {"order": order}}})
@@ -184,7 +184,7 @@ def planned() -> Iterator[str]:
     rules: Any = SimpleNamespace(proposals=(row,), included=kept, left_out=out)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(sections, "conclusions", lambda results: told[results.name])
-        patch.setattr(sections, "of_levels", lambda results: (f"Track: {results.name}",))
+        patch.setattr(sections, "level_sentences", lambda results: (f"Track: {results.name}",))
         yield text_of(sections.planned_section(rules))
         rules.left_out = kept
         yield text_of(sections.planned_section(rules)).rpartition("AK ")[2]
@@ -314,12 +314,12 @@ def hypotheses() -> Iterator[str]:
     ):
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(sections, "equality_limits", lambda *_values, **_kinds: (None, 6.0))
-            yield from sections._low_power(results(LIQUIDS, contrasts=rows))
-            yield from sections._near_chance(results(LIQUIDS, contrasts=rows))
+            yield from sections._low_power_sentences(results(LIQUIDS, contrasts=rows))
+            yield from sections._chance_level_sentences(results(LIQUIDS, contrasts=rows))
     trials = LIQUIDS.trials.assign(worst_gap_ms=[31.0, 5.0, 40.0, *[3.0] * 6], lateness_p99_ms=[9.0, *[1.0] * 8])
     kept = {"worst_gap_ms": 20.0, "lateness_ms": 2.0}
-    yield sections._violated_limits(replace(LIQUIDS, trials=trials), kept)
-    yield sections._violated_limits(replace(LIQUIDS, trials=trials[3:]), kept) + "none"
+    yield sections._violated_limits_sentence(replace(LIQUIDS, trials=trials), kept)
+    yield sections._violated_limits_sentence(replace(LIQUIDS, trials=trials[3:]), kept) + "none"
 
 
 PARTS = (
@@ -372,11 +372,11 @@ def test_methods_name_what_means_were_used_for(
 ) -> None:
     for name in ("Effects", "ContrastsWithControl", "DelayTrend", "MeanTests"):
         monkeypatch.setattr(
-            methods, name, SimpleNamespace(**dict.fromkeys(("of", "tested"), lambda _, n=name: n in found))
+            methods, name, SimpleNamespace(**dict.fromkeys(("value_in", "tested"), lambda _, n=name: n in found))
         )
     contrasts = [SimpleNamespace(contrast=SimpleNamespace(blocks=[*blocks]))] if blocks else []
     given: Any = SimpleNamespace(contrasts=contrasts, decided=SimpleNamespace(trends=trends))
-    *shown, used = methods._means(given, [result_of(LIQUIDS)])
+    *shown, used = methods._mean_sentences(given, [result_of(LIQUIDS)])
     assert [line.startswith("Mean differences from the first condition") for line in shown] == [True] * (
         "Effects" in found
     )
@@ -386,5 +386,5 @@ def test_methods_name_what_means_were_used_for(
 @pytest.mark.parametrize(("settings", "are"), [({}, "are"), (LIQUIDS.settings, "were")])
 def test_conditions_are_codes_or_were_until_the_key_was_opened(settings: dict[Any, Any], are: str) -> None:
     shown = replace(LIQUIDS, settings=settings)
-    (told,) = (line for line in methods._design(shown, results(shown)) if line.startswith("Conditions"))
+    (told,) = (line for line in methods._design_sentences(shown, results(shown)) if line.startswith("Conditions"))
     assert told == f"Conditions {are} identified only by codes{' until the key was opened' if settings else ''}."

@@ -18,7 +18,7 @@ from study_app.analysis.report import methods as methods_module
 from study_app.analysis.report import sections
 from study_app.analysis.report.first_page import cards
 from study_app.analysis.report.methods import methods
-from study_app.analysis.report.sections import empty_studies, limits, none_found
+from study_app.analysis.report.sections import false_claims_sentence, limits, no_findings_sentence
 from study_app.analysis.results import Failures
 from study_app.analysis.statistics.outcome import alpha_of_looks
 from study_app.analysis.wording import all_of
@@ -106,7 +106,7 @@ def check_report(made: Study) -> None:
     for line in limits(made, results):
         check(line, told)
     check(results.decided.look_words(len(results.people)), told)
-    check(empty_studies(made.n), told)
+    check(false_claims_sentence(made.n), told)
     check(methods(made, results), told)
     assert "  " not in methods(made, results)
     shown = cards(replace(results, contrasts=()))  # theirs are checked one by one
@@ -114,7 +114,7 @@ def check_report(made: Study) -> None:
         for sentence in card.sentences:
             check(sentence, told)
     if not cards(results):
-        check(none_found(results), told)
+        check(no_findings_sentence(results), told)
 
 
 @pytest.mark.slow
@@ -147,7 +147,7 @@ def test_a_form_is_completed_between_the_blocks_if_main_blocks_are_exchanged(
         study: Any = SimpleNamespace(
             protocol={"study": {"languages": ["en"], "block_order": order}, "blocks": blocks, "questionnaires": {}}
         )
-        assert methods_module._form_times(study, tuple(steps.split()), "form") == times
+        assert methods_module._form_times_phrase(study, tuple(steps.split()), "form") == times
 
 
 def test_missing_trials_are_those_of_included_sessions() -> None:
@@ -156,7 +156,7 @@ def test_missing_trials_are_those_of_included_sessions() -> None:
     counted = [included for included, *_ in sessions]
     participants = pd.DataFrame({"counted": [*counted, True], "missing": [*missing, None]})
     study: Any = SimpleNamespace(levels=["block"], participants=participants)
-    assert methods_module._missing_trials(study).startswith("5 of 50 main trials were lost because ")
+    assert methods_module._missing_trials_sentence(study).startswith("5 of 50 main trials were lost because ")
 
 
 @pytest.mark.slow
@@ -195,7 +195,7 @@ def test_a_form_is_named_with_its_questions_and_the_times_at_which_it_is_complet
     head = {"study": {"languages": ["en"], "block_order": "fixed"}, "blocks": blocks, "questionnaires": {}}
     questions = (*asked("load", "Workload", 3), *asked("b", "Second", 5), *asked("end", "Goodbye", 1))
     study: Any = SimpleNamespace(others=SimpleNamespace(questions=questions), protocol=head | {"groups": groups})
-    assert list(methods_module._questionnaires(study)) == [
+    assert list(methods_module._form_sentences(study)) == [
         "Participants completed the questionnaire “Workload” (three questions) before the first block or after the "
         "last block, depending on the group or session.",
         "Participants completed the questionnaire “Goodbye” (1 question) after the last block, in the group late.",
@@ -220,7 +220,7 @@ def test_a_form_of_some_sessions_is_named_with_them(sequences: dict[str, list[li
     question: Any = SimpleNamespace(where=SimpleNamespace(id="load", title="Workload", is_form=True))
     head = {"study": {"languages": ["en"], "block_order": "fixed"}, "blocks": blocks, "questionnaires": {}}
     study: Any = SimpleNamespace(others=SimpleNamespace(questions=(question,)), protocol=head | own)
-    (said,) = methods_module._questionnaires(study)
+    (said,) = methods_module._form_sentences(study)
     assert said == f"Participants completed the questionnaire “Workload” (1 question) before the first block, {when}."
 
 
@@ -239,7 +239,7 @@ def test_recordings_are_counted_with_the_reasons_and_the_trials_beyond_limits(
 ) -> None:
     names = ("recorded", "trials", "judged", "invalid")
     measured: Any = SimpleNamespace(unread=("lost",), **dict(zip(names, counts, strict=True)))
-    assert sentence in sections._recordings(measured)
+    assert sentence in sections._recordings_sentence(measured)
 
 
 def test_orders_are_shown_by_position_for_blocks_with_several_orders() -> None:
@@ -257,7 +257,7 @@ def test_orders_are_shown_by_position_for_blocks_with_several_orders() -> None:
         "d": order(6, ("O1",), ((6,),), (1,), True),
     }
     results: Any = SimpleNamespace(blocks=blocks, orders=orders)
-    text = " ".join(re.sub(r"<[^>]+>", " ", "".join(map(str, sections._orders(results)))).split())
+    text = " ".join(re.sub(r"<[^>]+>", " ", "".join(map(str, sections._trial_orders_part(results)))).split())
     assert text == (
         "Trial orders A (seven orders): positions were not balanced; each condition occurred 2 to 5 times in each "
         "position and followed every other condition equally often. Position L1 L2 1 3 4 2 5 2 B (nine orders): each "
@@ -277,7 +277,9 @@ def test_common_methods_name_adjustment_alpha_and_missing_answers() -> None:
     untested = replace(block("c", {}), findings={})
     for count, holm in ((1, "."), (2, ", Holm-adjusted across two blocks.")):
         said = list(
-            methods_module._common(replace(evaluated, decided=decided, performance=None), [*blocks[:count], untested])
+            methods_module._common_sentences(
+                replace(evaluated, decided=decided, performance=None), [*blocks[:count], untested]
+            )
         )
         assert said[0].endswith(f"in its block{holm}")
         assert said[1] == (
@@ -285,9 +287,11 @@ def test_common_methods_name_adjustment_alpha_and_missing_answers() -> None:
         )
         assert f"{count + 1} participants with a missing answer" in said[-1].lower()
     changed = replace(evaluated, decided=replace(decided, changed=True), performance=None)
-    assert "changed between sessions" in list(methods_module._common(changed, blocks))[1]
+    assert "changed between sessions" in list(methods_module._common_sentences(changed, blocks))[1]
     unplanned = replace(evaluated, decided=replace(decided, made=False), performance=None)
-    assert list(methods_module._common(unplanned, blocks))[1].startswith("The analysis was not specified beforehand")
+    assert list(methods_module._common_sentences(unplanned, blocks))[1].startswith(
+        "The analysis was not specified beforehand"
+    )
 
 
 def test_answers_are_placed_by_person_setting_and_time() -> None:
@@ -326,6 +330,6 @@ def test_a_sample_is_whole_only_if_each_condition_of_each_block_has_everybody() 
     made = replace(study(liquids(2), list(everybody(liquids(2), 3, lambda p, s, c, i: 4))), sites=("A", "B"))
     partly = replace(made, blocks=(*made.blocks, replace(made.blocks[0], id="c")))
     for sample, ends in ((made, ", each in all conditions."), (partly, ", but some did not complete all conditions.")):
-        said = methods_module._sample(sample)
+        said = methods_module._sample_sentence(sample)
         assert said.startswith("Three participants (SIMULATED, not people) took part in “Made up” (protocol made_up, v")
         assert said.endswith(f" at the sites A and B{ends}")

@@ -29,7 +29,7 @@ TESTS = {
 WRITING = {
     "figures.answer_figures.answers_picture": "figure liquids",
     "report.write_report.methods": "texts: methods",
-    "report.write_report.sections.of_levels": "texts: findings",
+    "report.write_report.sections.level_sentences": "texts: findings",
     "report.write_report.r_script": "report.R",
     "report.write_report.motion_csv": "motion.csv",
     "findings.delays.LowestDelay.section": "shortest delay with a trend",
@@ -63,7 +63,7 @@ def test_a_test_that_fails_takes_no_other_with_it(opened: Results, monkeypatch: 
         (absent,) = (one for one in found.absent if one.what == what)
         assert "ValueError: f(a) and f(b) must have different signs" in absent.why
         json.dumps(as_json_types(results), allow_nan=False)
-        assert OverAll.of(found) is not None or "over all" in what
+        assert OverAll.value_in(found) is not None or "over all" in what
         assert results.performance is not None
 
 

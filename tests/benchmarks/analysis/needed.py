@@ -53,7 +53,7 @@ def main(studies: str = "200", *sizes: str) -> int:
             ]
             _, results = report(planned, planned.decided, given, study, Failures())
             for block, result in zip(planned.blocks, results, strict=True):
-                tests = (*SettingsDiffer.of(result), *DelayTrend.of(result))
+                tests = (*SettingsDiffer.value_in(result), *DelayTrend.value_in(result))
                 found.update((n, block.id, one.item) for one in tests if one.verdict in FOUND)
     print("block, statement         n   power %   shown in %  [Wilson]")
     failed = False
