@@ -37,7 +37,7 @@ from study_app.protocol.trials.designs import Design, ForcedChoice, Rated
 from study_app.protocol.trials.methods import TrialResult
 from study_app.protocol.trials.stimuli import DELAYS, FORCE_DELAY, OF_LINK, Stimulated
 from study_app.psychophysics.families import Floats
-from study_app.psychophysics.people import ASSUMED, UNIFORM, Person, draw_person, normal
+from study_app.psychophysics.people import ASSUMED, UNIFORM, Person, draw_normal, draw_person
 
 _NO_OPINION: Final = 4.0
 _LEAST_SPEED_MPS: Final = 0.01
@@ -105,10 +105,10 @@ def rater(draw: Draw, participants: SimulatedParticipants = REHEARSED) -> Rater:
     The noise of participants is uniformly distributed from 77 % to 123 % of the mean.
     """
     return Rater(
-        leaning=participants.bias_sd * normal(draw),
+        leaning=participants.bias_sd * draw_normal(draw),
         noise=participants.noise_sd / MEAN_NOISE * (LEAST_NOISE + NOISE_RANGE * draw()),
-        strength=max(0.5, 1 + 0.1 * normal(draw)),
-        threshold_s=max(0.06, 0.13 + 0.015 * normal(draw)),
+        strength=max(0.5, 1 + 0.1 * draw_normal(draw)),
+        threshold_s=max(0.06, 0.13 + 0.015 * draw_normal(draw)),
     )
 
 
@@ -307,7 +307,7 @@ class Comparison:
 
     def noisy(self, sensed: float, draw: Draw) -> float:
         """Return the perceived value with noise."""
-        noise, observer = normal(draw), self.observer
+        noise, observer = draw_normal(draw), self.observer
         return (
             sensed + observer.delay_noise_s * noise if self.delays else sensed * (1 + observer.resistance_noise * noise)
         )

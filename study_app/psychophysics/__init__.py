@@ -1,4 +1,6 @@
-"""Psychophysics without a study: delivered levels, psychometric functions, adaptive methods. Numpy only.
+"""Psychophysics that does not depend on a study: delivered levels, psychometric functions, adaptive methods.
+
+The package only uses numpy.
 
 Read ``families`` (the functions), ``grid`` (the posterior) and ``adaptive`` (the choice of the next level) first.
 

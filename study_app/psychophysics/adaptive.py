@@ -1,15 +1,15 @@
-"""Adaptive methods: the level that a track presents next, and many tracks of simulated observers at once.
+"""Adaptive methods: the choice of a track's next level, and tracks of many simulated observers at once.
 
-**Up–down staircases**: the level falls after successes in a row and rises after each failure. The ratio of the steps is
-that of García-Pérez 1998, at which a rule converges to the same percentage whatever the observer's spread; equal steps
-converge to percentages that depend on it.
+**Up–down staircases**: the level falls after a number of successes in a row and rises after each failure. With the
+ratio of steps by García-Pérez 1998, a rule converges to the same percentage for all widths of the observer's function;
+with equal steps, the percentage depends on the width.
 
-**QUEST+**: the next level is the one whose answer is expected to leave the least uncertainty. Watson 2017 minimises the
-entropy of all parameters. Prins 2013 minimises that of the threshold's marginal alone, so that levels are not spent on
-the width or the lapse rate; that is the default here.
+**QUEST+**: the next level minimises the expected uncertainty after its answer. Watson 2017 minimises the entropy of all
+parameters. Prins 2013 minimises that of the threshold's marginal distribution, so that no trials are spent on the width
+or the lapse rate; this is the default here.
 
-**Simulated observers** answer by a psychometric function, so that their tracks show the best performance of a method.
-Levels are in the coordinate u; answers follow from uniform numbers that the caller draws.
+**Simulated observers** answer according to a psychometric function, so their tracks show the best performance of a
+method. Levels are in the coordinate u; the caller provides the uniform random numbers.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from study_app.psychophysics.families import Family, Floats, success
 from study_app.psychophysics.grid import Grid, Values, fit, quantile, tables
-from study_app.psychophysics.person_fit import Given, preferred
+from study_app.psychophysics.person_fit import PersonAnswers, with_preference
 
 # The level presented, in the coordinate u, and whether it was a success; in the order of presentation.
 _Answer: TypeAlias = tuple[float, bool]
@@ -32,7 +32,7 @@ _Answer: TypeAlias = tuple[float, bool]
 RATIOS: Final = {1: 0.2845, 2: 0.5488, 3: 0.7393, 4: 0.8415}
 """Ratio of the step down to the step up, by the number of successes in a row before a step down."""
 _DROPPED: Final = 2
-"""Number of first reversals left out, which depend on the start of the track."""
+"""Number of first reversals that are left out, because they depend on the first level of the track."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,16 +70,16 @@ class Staircase:
         if not answers:
             return self.begin
         last = answers[-1][0]
-        return min(max(last + self._moves(answers)[-1], self.low), self.high)
+        return min(max(last + self._steps(answers)[-1], self.low), self.high)
 
     def reversals_at(self, answers: Sequence[_Answer]) -> list[int]:
         """Return the indices of the trials at which the direction changed."""
-        places, before = [], 0.0
-        for place, move in enumerate(self._moves(answers)):
-            if move * before < 0.0:
-                places.append(place)
-            before = move or before
-        return places
+        trials, last_move = [], 0.0
+        for trial, move in enumerate(self._steps(answers)):
+            if move * last_move < 0.0:
+                trials.append(trial)
+            last_move = move or last_move
+        return trials
 
     def reversals(self, answers: Sequence[_Answer]) -> list[float]:
         """Return the levels of the trials at which the direction changed."""
@@ -90,23 +90,23 @@ class Staircase:
 
         The first two and those at an end of the domain are excluded.
         """
-        kept = [level for level in self.reversals(answers)[_DROPPED:] if self.low < level < self.high]
-        count = min(len(kept), average) // 2 * 2
-        return sum(kept[-count:]) / count if count else None
+        levels = [level for level in self.reversals(answers)[_DROPPED:] if self.low < level < self.high]
+        count = min(len(levels), average) // 2 * 2
+        return sum(levels[-count:]) / count if count else None
 
-    def _moves(self, answers: Sequence[_Answer]) -> list[float]:
-        """Return the step that each answer causes; 0 while successes in a row are too few."""
-        moves, successes = [], 0
-        for _, right in answers:
-            successes = successes + 1 if right else 0
-            if not right:
-                moves.append(self.step_up)
+    def _steps(self, answers: Sequence[_Answer]) -> list[float]:
+        """Return the step after each answer; 0 after a success that does not complete a row."""
+        steps, successes = [], 0
+        for _, correct in answers:
+            successes = successes + 1 if correct else 0
+            if not correct:
+                steps.append(self.step_up)
             elif successes == self.down_after:
-                moves.append(-self.ratio * self.step_up)
+                steps.append(-self.ratio * self.step_up)
                 successes = 0
             else:
-                moves.append(0.0)
-        return moves
+                steps.append(0.0)
+        return steps
 
 
 def converges_to(down_after: int, ratio: float) -> float:
@@ -117,7 +117,7 @@ def converges_to(down_after: int, ratio: float) -> float:
 _Learn: TypeAlias = Literal["threshold", "all"]
 
 _TIE_NATS: Final = 1e-9
-"""Expected entropies closer than this are equal: rounding on another processor shifts them by 1e-15."""
+"""Tolerance for equal expected entropies, which rounding on other processors changes by about 1e-15."""
 
 
 @dataclass(frozen=True)
@@ -133,7 +133,7 @@ class Search:
     learn : {"threshold", "all"}
         The parameters whose entropy is minimised.
     noise : bool
-        Whether the first of the levels is that of noise trials, which is never chosen.
+        Whether the first level is that of noise trials, which the search never chooses.
     """
 
     grid: Grid
@@ -147,7 +147,7 @@ class Search:
         return tables(self.grid, self.levels)[0]
 
     def expected_entropy(self, posteriors: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the entropy [nat] expected after an answer, (tracks, levels), of posteriors (tracks, …)."""
+        """Return the expected entropy [nat] after an answer, of shape (tracks, levels), from posteriors (tracks, …)."""
         cells = posteriors.reshape(len(posteriors), len(self.grid.thresholds), -1)
         psi = self.psi.reshape(len(self.levels), *cells.shape[1:])
         if self.learn == "threshold":
@@ -158,7 +158,7 @@ class Search:
             before, axis = cells.reshape(len(cells), 1, -1), -1
         return _weighted_entropy(succeeded, axis) + _weighted_entropy(before - succeeded, axis)
 
-    def next_of(self, posteriors: NDArray[np.float64]) -> NDArray[np.int64]:
+    def choose_levels(self, posteriors: NDArray[np.float64]) -> NDArray[np.int64]:
         """Return the index of each track's next level, (tracks,); the lowest in case of a tie."""
         first = int(self.noise)
         entropy = self.expected_entropy(posteriors)[:, first:]
@@ -166,11 +166,11 @@ class Search:
 
     def next(self, successes: ArrayLike, failures: ArrayLike) -> int:
         """Return the index of the next level to present, from counts of answers to each level."""
-        return int(self.next_of(fit(self.levels, successes, failures, self.grid).weights[None])[0])
+        return int(self.choose_levels(fit(self.levels, successes, failures, self.grid).weights[None])[0])
 
 
 def _weighted_entropy(joint: NDArray[np.float64], axis: int) -> NDArray[np.float64]:
-    """Return p × the entropy of joint/p, for the sum p over an axis of ``joint``."""
+    """Return p times the entropy of ``joint`` / p, where p is the sum of ``joint`` over an axis."""
     total, terms = joint.sum(axis=axis), np.log(np.maximum(joint, 1e-300))
     terms *= joint
     return np.asarray(total * np.log(total) - terms.sum(axis=axis), float)
@@ -198,20 +198,20 @@ class Answers(NamedTuple):
     done: Floats
 
     def first(self, trials: int | None) -> Answers:
-        """Return the answers to the first trials of each track, or (None) to all."""
+        """Return the answers to the first trials of each track; None means all trials."""
         return Answers(**{name: of_tracks[:, :trials] for name, of_tracks in self._asdict().items()})
 
-    def given(self, places: Floats) -> list[Given]:
+    def person_answers(self, places: Floats) -> list[PersonAnswers]:
         """Return the answers of each track, with levels in u rounded to the nearest of the ascending ``places``."""
-        nearest, known = np.searchsorted((places[1:] + places[:-1]) / 2, self.levels), ~np.isnan(self.levels)
+        nearest, presented = np.searchsorted((places[1:] + places[:-1]) / 2, self.levels), ~np.isnan(self.levels)
         of_tracks = {**self._asdict(), "places": nearest}
         return [
-            Given(**{**{name: values[track][own] for name, values in of_tracks.items()}, "levels": places})
-            for track, own in enumerate(known)
+            PersonAnswers(**{**{name: values[track][trials] for name, values in of_tracks.items()}, "levels": places})
+            for track, trials in enumerate(presented)
         ]
 
 
-# The level of the next trial of each track, and whether the track goes on; followed by whether answers are successes.
+# Yields the level of the next trial of each track and whether the track continues; receives whether answers succeed.
 Choice: TypeAlias = Generator[tuple[Floats, NDArray[np.bool_]], NDArray[np.bool_], None]
 
 
@@ -260,21 +260,21 @@ class Observers:
         thresholds = self.thresholds + np.asarray(self.moves, float) * (np.asarray(done, float) - 0.5)
         return success(self.family, levels, thresholds, self.width, self.guess, self.lapse)
 
-    def answers(self, draws: Floats, chosen: Choice) -> Answers:
-        """Return the answers, using uniform numbers (tracks, trials); each level is chosen from the earlier answers."""
+    def answers(self, draws: Floats, choices: Choice) -> Answers:
+        """Return the answers to levels from ``choices``, using uniform numbers ``draws`` (tracks, trials)."""
         tracks, trials = draws.shape
         levels, successes, before = np.full(draws.shape, np.nan), np.zeros(draws.shape, bool), np.zeros(draws.shape)
         towards = np.zeros(draws.shape) if self.towards is None else self.towards
         done = np.broadcast_to(np.arange(trials) / max(1, trials - 1), draws.shape)
-        said, (now, running) = np.zeros(tracks), next(chosen)
+        last_answers, (current, running) = np.zeros(tracks), next(choices)
         for trial in range(trials):
-            psi = self.probability(now, done[0, trial])
-            psi = preferred(psi, self.lapse, towards[:, trial] * (self.criterion + self.repeats * said))
-            right, before[:, trial] = draws[:, trial] < psi, said
-            levels[running, trial], successes[:, trial] = now[running], right & running
-            said = np.where(right, towards[:, trial], -towards[:, trial])
+            psi = self.probability(current, done[0, trial])
+            psi = with_preference(psi, self.lapse, towards[:, trial] * (self.criterion + self.repeats * last_answers))
+            correct, before[:, trial] = draws[:, trial] < psi, last_answers
+            levels[running, trial], successes[:, trial] = current[running], correct & running
+            last_answers = np.where(correct, towards[:, trial], -towards[:, trial])
             if trial + 1 < trials:
-                now, running = chosen.send(right)
+                current, running = choices.send(correct)
         return Answers(levels=levels, successes=successes, towards=towards, before=before, done=done)
 
 
@@ -294,11 +294,11 @@ def constant_tracks(levels: Sequence[float], repetitions: int, observers: Observ
     """
     tracks = len(draws)
 
-    def chosen() -> Choice:
+    def choose() -> Choice:
         for level in np.tile(np.asarray(levels, float), repetitions):
             yield np.full(tracks, level), np.ones(tracks, bool)
 
-    return observers.answers(draws, chosen())
+    return observers.answers(draws, choose())
 
 
 def staircase_tracks(
@@ -315,26 +315,26 @@ def staircase_tracks(
     draws : (tracks, trials) array
         Uniform numbers in [0, 1).
     stop : tuple of int, optional
-        Number of reversals after which a track ends, and its least number of answers.
+        Number of reversals after which a track ends, and the smallest number of answers.
     """
     tracks = len(draws)
 
-    def chosen() -> Choice:
-        now, running = np.full(tracks, staircase.begin), np.ones(tracks, bool)
-        in_a_row, reversals, before = np.zeros(tracks, int), np.zeros(tracks, int), np.zeros(tracks)
+    def choose() -> Choice:
+        current, running = np.full(tracks, staircase.begin), np.ones(tracks, bool)
+        in_a_row, reversals, last_move = np.zeros(tracks, int), np.zeros(tracks, int), np.zeros(tracks)
         for answered in count(1):
-            right = yield now, running
-            in_a_row = np.where(right, in_a_row + 1, 0)
+            correct = yield current, running
+            in_a_row = np.where(correct, in_a_row + 1, 0)
             steps_down = in_a_row == staircase.down_after
-            move = np.where(right, np.where(steps_down, -staircase.ratio * staircase.step_up, 0.0), staircase.step_up)
+            move = np.where(correct, np.where(steps_down, -staircase.ratio * staircase.step_up, 0.0), staircase.step_up)
             in_a_row[steps_down] = 0
-            reversals += move * before < 0.0
-            before = np.where(move != 0.0, move, before)
-            now = np.clip(now + move, staircase.low, staircase.high)
+            reversals += move * last_move < 0.0
+            last_move = np.where(move != 0.0, move, last_move)
+            current = np.clip(current + move, staircase.low, staircase.high)
             if stop is not None:
                 running = running & ((answered < stop[1]) | (reversals < stop[0]))
 
-    return observers.answers(draws, chosen())
+    return observers.answers(draws, choose())
 
 
 def search_tracks(
@@ -360,13 +360,13 @@ def search_tracks(
     noise : (tracks, noise trials) array, optional
         Uniform numbers for noise trials; the search uses their answers from the first trial on.
     stop : tuple, optional
-        Width of the 95 % interval [u] at which a track ends, and its least number of answers.
+        Width of the 95 % interval [u] at which a track ends, and the smallest number of answers.
     """
-    tracks, at = len(draws), np.asarray(search.levels, float)
+    tracks, levels = len(draws), np.asarray(search.levels, float)
 
-    def chosen() -> Choice:
+    def choose() -> Choice:
         running = np.ones(tracks, bool)
-        psi = search.psi.reshape(len(at), len(search.grid.thresholds), -1)
+        psi = search.psi.reshape(len(levels), len(search.grid.thresholds), -1)
         posterior = np.tile(search.grid.prior.reshape(1, *psi.shape[1:]), (tracks, 1, 1))
         if noise is not None:
             yes = (noise < observers.guess).sum(axis=1)[:, None, None]
@@ -375,11 +375,11 @@ def search_tracks(
         for trial in count():
             posterior /= posterior.sum(axis=(1, 2), keepdims=True)
             if stop is not None and trial >= stop[1]:
-                thresholds, of_each = search.grid.thresholds, posterior.sum(axis=2)
-                ends = [[quantile(thresholds, one, p) for p in (0.025, 0.975)] for one in of_each]
+                thresholds, marginals = search.grid.thresholds, posterior.sum(axis=2)
+                ends = [[quantile(thresholds, weights, p) for p in (0.025, 0.975)] for weights in marginals]
                 running = running & (np.diff(np.asarray(ends, float), axis=1)[:, 0] > stop[0])
-            place = search.next_of(posterior) if trial or begin is None else np.full(tracks, begin)
-            right = yield at[place], running
-            posterior *= np.where(right[:, None, None], psi[place], 1.0 - psi[place])
+            place = search.choose_levels(posterior) if trial or begin is None else np.full(tracks, begin)
+            correct = yield levels[place], running
+            posterior *= np.where(correct[:, None, None], psi[place], 1.0 - psi[place])
 
-    return observers.answers(draws, chosen())
+    return observers.answers(draws, choose())

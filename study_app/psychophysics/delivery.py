@@ -1,8 +1,8 @@
-"""The levels delivered to the hand in an interval, computed from its samples, for session and analysis alike.
+"""The levels delivered to the hand in an interval, computed from its samples; used by sessions and the analysis.
 
-Velocity and acceleration of the hand come from its positions by a cubic Savitzky-Golay filter (Savitzky & Golay 1964,
-Analytical Chemistry 36, 1627) over ±20 ms, independent of the servo's own velocity estimator. Samples are first
-interpolated to even times, so that late ticks do not distort the curve.
+Velocity and acceleration of the hand are computed from its positions by a cubic Savitzky-Golay filter (Savitzky & Golay
+1964, Analytical Chemistry 36, 1627) over ±20 ms, independent of the servo's own velocity estimator. Samples are first
+interpolated to equally spaced times, so that late ticks do not distort the result.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ Vectors = NDArray[np.float64]
 _HALF_S: Final = 0.02
 """Half width of the filter [s]."""
 EARLIER: Final = 5
-"""Greatest negative lag of the sent force relative to the force model's [rows]."""
+"""The largest number of rows by which the sent force may precede the force of the model."""
 _LEAST_SPEED_MPS: Final = 1e-4
-"""Least speed of a moving hand: below it no damping can be computed. [choice]"""
+"""The lowest speed of a hand at which damping is computed. [choice]"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,9 +50,9 @@ class Motion:
         return float(np.sqrt(np.einsum("ij,ij->", self.velocity_mps, self.velocity_mps) / rows))
 
     def after(self, from_s: float, to_s: float = math.inf) -> Motion:
-        """Return the motion between two times [s]."""
-        later = (self.times_s >= from_s) & (self.times_s <= to_s)
-        return Motion(self.times_s[later], self.velocity_mps[later], self.acceleration_mps2[later])
+        """Return the rows of the motion between two times [s]."""
+        between = (self.times_s >= from_s) & (self.times_s <= to_s)
+        return Motion(self.times_s[between], self.velocity_mps[between], self.acceleration_mps2[between])
 
 
 def motion(times_s: NDArray[np.float64], position_m: Vectors, period_s: float, half_s: float = _HALF_S) -> Motion:
@@ -86,9 +86,9 @@ def motion(times_s: NDArray[np.float64], position_m: Vectors, period_s: float, h
     return Motion(even_s[half:-half], np.array(rates[0]).T / period_s, np.array(rates[1]).T / period_s**2)
 
 
-def interpolate_vectors(wanted_s: NDArray[np.float64], times_s: NDArray[np.float64], vectors: Vectors) -> Vectors:
+def interpolate_vectors(target_s: NDArray[np.float64], times_s: NDArray[np.float64], vectors: Vectors) -> Vectors:
     """Return vectors (n, 3) interpolated linearly at other times: (m, 3)."""
-    return np.array([np.interp(wanted_s, times_s, axis) for axis in vectors.T]).T
+    return np.array([np.interp(target_s, times_s, axis) for axis in vectors.T]).T
 
 
 def damping(force_n: Vectors, moved: Motion) -> tuple[float, float] | None:
@@ -107,8 +107,8 @@ def damping(force_n: Vectors, moved: Motion) -> tuple[float, float] | None:
         None if the hand was at rest, or moved at constant velocity.
     """
     v, a = moved.velocity_mps, moved.acceleration_mps2
-    vv, va, aa = (float(np.einsum("ij,ij->", one, other)) for one, other in ((v, v), (v, a), (a, a)))
-    fv, fa = (-float(np.einsum("ij,ij->", force_n, one)) for one in (v, a))
+    vv, va, aa = (float(np.einsum("ij,ij->", first, second)) for first, second in ((v, v), (v, a), (a, a)))
+    fv, fa = (-float(np.einsum("ij,ij->", force_n, vectors)) for vectors in (v, a))
     determinant = vv * aa - va * va
     if moved.rms_speed_mps < _LEAST_SPEED_MPS or determinant <= 1e-9 * vv * aa:
         return None
@@ -123,15 +123,15 @@ def sent_share(sent_n: Vectors, model_n: Vectors) -> float | None:
     sent_n, model_n : array (n, 3)
         The force sent to the hand, and the sum of the effects before any limit [N].
     """
-    asked = float(np.einsum("ij,ij->", model_n, model_n))
-    return float(np.einsum("ij,ij->", sent_n, model_n)) / asked if asked > 0 else None
+    model_square = float(np.einsum("ij,ij->", model_n, model_n))
+    return float(np.einsum("ij,ij->", sent_n, model_n)) / model_square if model_square > 0 else None
 
 
 def lag(sent_n: Vectors, model_n: Vectors, most: int) -> float | None:
     """Return the lag of the sent force behind the model force [rows], by least squares; None without force.
 
-    Each lag in whole rows has the residual of F_sent = g F_model with the best gain g; a parabola through the least
-    residual and its neighbours gives the fraction.
+    For each lag in whole rows, F_sent = g F_model is fitted with the best gain g; a parabola through the smallest
+    residual and its neighbours gives the fraction of a row.
 
     Parameters
     ----------
@@ -145,17 +145,19 @@ def lag(sent_n: Vectors, model_n: Vectors, most: int) -> float | None:
         return None
     products = sum(np.correlate(model_n[:, axis], compared[:, axis], "valid") for axis in range(3))
     squares = np.concatenate([[0.0], np.cumsum(np.einsum("ij,ij->i", model_n, model_n))])
-    of_model = squares[len(compared) :] - squares[: len(squares) - len(compared)]
-    explained = np.where((of_model > 0) & (products > 0), products**2 / np.where(of_model > 0, of_model, 1.0), 0.0)
-    at_best = int(np.argmax(explained))
-    if explained[at_best] == 0.0:
+    model_squares = squares[len(compared) :] - squares[: len(squares) - len(compared)]
+    explained = np.where(
+        (model_squares > 0) & (products > 0), products**2 / np.where(model_squares > 0, model_squares, 1.0), 0.0
+    )
+    best = int(np.argmax(explained))
+    if explained[best] == 0.0:
         return None
     fraction = 0.0
-    if 0 < at_best < len(explained) - 1:
-        before, here, after = explained[at_best - 1 : at_best + 2]
-        bend = before - 2 * here + after
-        fraction = 0.0 if bend >= 0 else 0.5 * float(before - after) / float(bend)
-    return most - (at_best + fraction)
+    if 0 < best < len(explained) - 1:
+        before, middle, after = explained[best - 1 : best + 2]
+        curvature = before - 2 * middle + after
+        fraction = 0.0 if curvature >= 0 else 0.5 * float(before - after) / float(curvature)
+    return most - (best + fraction)
 
 
 def difference(errors: Sequence[float | None], comparisons: Sequence[bool]) -> float | None:
@@ -174,9 +176,9 @@ def difference(errors: Sequence[float | None], comparisons: Sequence[bool]) -> f
         None unless both were presented and measured.
     """
     pairs = list(zip(errors, comparisons, strict=True))
-    of_comparisons = _mean(error for error, compared in pairs if compared)
-    of_standards = _mean(error for error, compared in pairs if not compared)
-    return None if of_comparisons is None or of_standards is None else of_comparisons - of_standards
+    comparison_mean = _mean(error for error, compared in pairs if compared)
+    standard_mean = _mean(error for error, compared in pairs if not compared)
+    return None if comparison_mean is None or standard_mean is None else comparison_mean - standard_mean
 
 
 def _mean(values: Iterable[float | None]) -> float | None:
@@ -186,7 +188,7 @@ def _mean(values: Iterable[float | None]) -> float | None:
 
 @cache
 def _taps(half: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the convolution kernels over 2 half + 1 positions for slope and curvature of their cubic, per sample."""
+    """Return the kernels over 2 half + 1 positions for slope and curvature of the fitted cubic, per sample."""
     places = np.arange(-half, half + 1) / half
     powers = np.linalg.pinv(np.vander(places, 4, increasing=True))
     return powers[1][::-1] / half, 2 * powers[2][::-1] / half**2

@@ -1,4 +1,4 @@
-"""Detection theory: P(correct) of a design from d′ and the inverse, d′ and bias from counts of answers.
+"""Detection theory: P(correct) of a design from d′, and d′ and bias from counts of answers.
 
 Rates use the log-linear correction (Hautus 1995), so that a rate of 0 or 1 has a finite d′. Models of the designs:
 Macmillan & Creelman 2005, Detection Theory, chapters 1, 7, 9 and 10; oddity: Frijters 1979, Br. J. Math. Stat.
@@ -25,8 +25,8 @@ Model: TypeAlias = Literal["differencing", "independent"]
 NORMAL: Final = NormalDist()
 _NODES: Final = 200
 _ENDS: Final = 9.0
-"""Range of integrals over the normal density, in standard deviations from its mean."""
-_MOST: Final = 20.0
+"""Limits of integrals over the normal density [standard deviations]."""
+_MAX_D_PRIME: Final = 20.0
 """The largest d′ in searches."""
 _TOLERANCE: Final = 1e-10
 
@@ -38,8 +38,8 @@ class Sensitivity:
     Attributes
     ----------
     d_prime : float
-        Under ``model``. Below chance it is negative: minus the d′ of a share that is as far above chance. Without this,
-        the mean over observers who guess would be above 0.
+        Under ``model``. Below chance, it is minus the d′ of a share equally far above chance, so that the mean over
+        observers who guess is 0.
     criterion : float or None
         c of yes–no and of two-interval forced choice, k of the differencing model of same–different; else None.
     variance : float or None
@@ -77,7 +77,7 @@ def proportion_correct(task: str, d_prime: float) -> float:
 
 @lru_cache(maxsize=4096)  # 50 ms for oddity
 def d_prime_at(task: str, proportion: float) -> float:
-    """Return d′ at a P(correct), by bisection to 1e-10; below chance, minus the d′ as far above it."""
+    """Return d′ for a P(correct), by bisection to 1e-10; below chance, minus the d′ equally far above chance."""
     chance = PROPORTIONS[task](0.0)
     distance = _inverse(PROPORTIONS[task], chance + abs(proportion - chance))
     return distance if proportion >= chance else 0.0 - distance
@@ -85,7 +85,7 @@ def d_prime_at(task: str, proportion: float) -> float:
 
 def forced_choice(d_prime: float, intervals: int) -> float:
     """Return P(the comparison is the largest of ``intervals``): ∫ φ(x − d′) Φ(x)^(m−1) dx."""
-    x, weights = _rule(-_ENDS, _ENDS)
+    x, weights = _quadrature(-_ENDS, _ENDS)
     return float((weights * normal_cdf(x + d_prime) ** (intervals - 1)).sum())
 
 
@@ -175,8 +175,8 @@ def rating(noise: ArrayLike, signal: ArrayLike) -> Sensitivity | None:
     Parameters
     ----------
     noise, signal : array
-        The ratings of the lowest level, and of another one. AUC is the Mann–Whitney share of pairs in which the
-        second is higher, ties counting half, with the log-linear correction over the pairs.
+        The ratings of the lowest level and of another level. AUC is the Mann–Whitney share of pairs in which the
+        signal is rated higher; ties count half, and the share has the log-linear correction.
     """
     low, high = np.sort(np.asarray(noise, float)), np.asarray(signal, float)
     if not low.size or not high.size:
@@ -188,7 +188,7 @@ def rating(noise: ArrayLike, signal: ArrayLike) -> Sensitivity | None:
 
 def _inverse(proportion_of: Callable[[float], float], proportion: float) -> float:
     """Return the d′ at which an increasing function reaches ``proportion``; 0 if it is reached at 0."""
-    low, high = 0.0, _MOST
+    low, high = 0.0, _MAX_D_PRIME
     if proportion <= proportion_of(low):
         return 0.0
     while high - low > _TOLERANCE:
@@ -198,25 +198,25 @@ def _inverse(proportion_of: Callable[[float], float], proportion: float) -> floa
 
 
 @cache
-def _rule(low: float, high: float) -> tuple[Floats, Floats]:
-    """Return the nodes of Gauss–Legendre quadrature, and their weights times the normal density."""
+def _quadrature(low: float, high: float) -> tuple[Floats, Floats]:
+    """Return the nodes of Gauss–Legendre quadrature, and the weights multiplied by the normal density."""
     nodes, weights = np.polynomial.legendre.leggauss(_NODES)
     x = 0.5 * (low + high) + 0.5 * (high - low) * nodes
     return x, 0.5 * (high - low) * weights * np.exp(-0.5 * x**2) / math.sqrt(2.0 * math.pi)
 
 
-def _abx(d_prime: float, divisor: float) -> float:
-    """Return P(correct): both comparisons have the correct sign, or both have the wrong one."""
+def _abx_correct(d_prime: float, divisor: float) -> float:
+    """Return P(correct) of ABX: the signs of both comparisons are correct, or both are incorrect."""
     first, second = NORMAL.cdf(d_prime / math.sqrt(2.0)), NORMAL.cdf(d_prime / divisor)
     return first * second + (1.0 - first) * (1.0 - second)
 
 
-def _oddity(d_prime: float) -> float:
+def _oddity_correct(d_prime: float) -> float:
     """Return P(correct) of the triangle test: 2 ∫₀^∞ [Φ(−z√3 + d′√⅔) + Φ(−z√3 − d′√⅔)] φ(z) dz."""
-    z, weights = _rule(0.0, _ENDS)
-    away = d_prime * math.sqrt(2.0 / 3.0)
+    z, weights = _quadrature(0.0, _ENDS)
+    shift = d_prime * math.sqrt(2.0 / 3.0)
     return float(
-        2.0 * (weights * (normal_cdf(-z * math.sqrt(3.0) + away) + normal_cdf(-z * math.sqrt(3.0) - away))).sum()
+        2.0 * (weights * (normal_cdf(-z * math.sqrt(3.0) + shift) + normal_cdf(-z * math.sqrt(3.0) - shift))).sum()
     )
 
 
@@ -230,11 +230,11 @@ PROPORTIONS: Final[Mapping[str, Callable[[float], float]]] = {
     "2ifc": lambda d_prime: NORMAL.cdf(d_prime / math.sqrt(2.0)),
     "3ifc": partial(forced_choice, intervals=3),
     "4ifc": partial(forced_choice, intervals=4),
-    "abx differencing": partial(_abx, divisor=math.sqrt(6.0)),
-    "abx independent": partial(_abx, divisor=2.0),
-    "oddity": _oddity,
+    "abx differencing": partial(_abx_correct, divisor=math.sqrt(6.0)),
+    "abx independent": partial(_abx_correct, divisor=2.0),
+    "oddity": _oddity_correct,
     "samedifferent differencing": _same_different_differencing,
     "samedifferent independent": lambda d_prime: 0.5 * (1.0 + (2.0 * NORMAL.cdf(d_prime / 2.0) - 1.0) ** 2),
     "yesno": lambda d_prime: NORMAL.cdf(d_prime / 2.0),
 }
-"""P(correct) from d′, by design and model."""
+"""Functions from d′ to P(correct), by design and model."""

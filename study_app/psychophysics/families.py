@@ -1,7 +1,7 @@
-"""Psychometric functions: success over level, between guessing and lapsing.
+"""Psychometric functions: the probability of success as a function of level, guess rate and lapse rate.
 
 ψ(u) = γ + (1 − γ − λ) F(u), with the threshold α (F = ½), the width ω (F from 0.05 to 0.95), the guess rate γ and the
-lapse rate λ. The coordinate u of a level is log10 of it or the level itself, as the levels are spaced.
+lapse rate λ. The coordinate u of a level is its log10 if levels are spaced logarithmically, otherwise the level itself.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ KAPPA: Final = math.log10(math.log(20.0) / math.log(20.0 / 19.0))
 Z_95: Final = NormalDist().inv_cdf(0.95)
 _LOGIT_95: Final = math.log(19.0)
 CLIP: Final = 1e-9
-"""ψ stays this far from 0 and 1, so that one answer cannot exclude a cell."""
+"""Smallest distance of ψ from 0 and 1, so that a single answer cannot exclude a cell."""
 
 _erfc: Final = np.vectorize(math.erfc, otypes=[float])
 
@@ -39,7 +39,7 @@ def rise(family: Family, u: ArrayLike, threshold: ArrayLike, width: ArrayLike) -
     family : "weibull" | "normal" | "logistic"
         The shape.
     u : array
-        Levels, in the coordinate of their spacing.
+        Levels, in the coordinate u.
     threshold : array
         The level at which F is one half.
     width : array

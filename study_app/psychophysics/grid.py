@@ -1,7 +1,7 @@
-"""The fit of a psychometric function: the posterior of its parameters over a grid, from counts of answers per level.
+"""The fit of a psychometric function: the posterior of its parameters on a grid, from counts of answers per level.
 
-It has no state and does not depend on the order of the answers. Sums use `numpy.einsum`, not BLAS, whose threads
-stall on busy cores; only `adaptive` multiplies matrices, too small for threads.
+The fit does not depend on the order of the answers. Sums use `numpy.einsum`, not BLAS, whose threads stall on busy
+cores; only `adaptive` multiplies matrices, which are too small for threads.
 """
 
 from __future__ import annotations
@@ -20,16 +20,16 @@ from study_app.psychophysics.families import CLIP, Family, success
 Values = tuple[float, ...]
 
 Z_95: Final = 1.959964
-"""Half the 95 % interval of a normal distribution [standard deviations]."""
+"""Half-width of the 95 % interval of a normal distribution [standard deviations]."""
 _Z_99: Final = 2.575829
 
 FREE_GUESSES: Final[Values] = (0.01, 0.02, 0.05, 0.1, 0.2, 0.3)
-"""Guess rates if the answers to noise trials determine it."""
+"""Guess rates of the grid if noise trials determine the guess rate."""
 
 
 _OUTER_SHARE: Final = 0.05
 _OPEN_MASS: Final = 0.005
-"""An end of an interval is open where more of the posterior lies in the outer share of the grid. [choice]"""
+"""The largest posterior mass in the outer share of the grid at which an interval's end is not open. [choice]"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -87,11 +87,11 @@ class Grid:
         u = np.asarray(levels, float).reshape(-1, 1, 1, 1, 1)
         lapses = np.array(self.lapses)[:, None]
         guesses = lapses if self.guesses is None else np.array(self.guesses)
-        found = success(
+        psi = success(
             self.family, u, np.array(self.thresholds)[:, None, None, None], np.array(self.widths)[:, None, None],
             guesses, lapses,
         )  # fmt: skip
-        return np.clip(np.broadcast_to(found, (u.shape[0], *self.shape)), CLIP, 1.0 - CLIP)
+        return np.clip(np.broadcast_to(psi, (u.shape[0], *self.shape)), CLIP, 1.0 - CLIP)
 
 
 class Others(NamedTuple):
@@ -123,7 +123,7 @@ class Posterior:
         return np.asarray(np.einsum("abcd->a", self.weights), float)
 
     def reweighted(self, factors: NDArray[np.float64]) -> Posterior:
-        """Return the posterior for a prior multiplied by ``factors`` (widths, lapses)."""
+        """Return the posterior if the prior is multiplied by ``factors`` (widths, lapses)."""
         weights = self.weights * factors[:, :, None]
         return Posterior(self.grid, weights / weights.sum())
 
@@ -138,9 +138,9 @@ class Posterior:
 
     @property
     def interval(self) -> tuple[float, float]:
-        """The ends of the 95 % interval of the person's threshold [u]: equal-tailed, widened by `session_sd`."""
-        middle, own = self.threshold, Z_95 * self.session_sd
-        below, above = (math.hypot(self.quantile(share) - middle, own) for share in (0.025, 0.975))
+        """The equal-tailed 95 % interval of the person's threshold [u], widened by `session_sd`."""
+        middle, session_reach = self.threshold, Z_95 * self.session_sd
+        below, above = (math.hypot(self.quantile(share) - middle, session_reach) for share in (0.025, 0.975))
         return middle - below, middle + above
 
     @property
@@ -151,7 +151,7 @@ class Posterior:
 
     @cached_property
     def session_sd(self) -> float:
-        """The standard deviation between the person's threshold and that of this session [u]."""
+        """The standard deviation of the person's threshold between sessions [u]."""
         constant, share = self.grid.session_sd
         return math.hypot(constant, share * self.threshold)
 
@@ -163,7 +163,7 @@ class Posterior:
 
     @property
     def others(self) -> Others:
-        """The medians of the other parameters, as `families.success` takes them."""
+        """The medians of the other parameters, which `families.success` accepts as arguments."""
         width = _median(self.grid.widths, np.einsum("abcd->b", self.weights))
         lapse = _median(self.grid.lapses, np.einsum("abcd->c", self.weights))
         guesses = self.grid.guesses
@@ -172,8 +172,8 @@ class Posterior:
 
     def success(self, levels: ArrayLike) -> NDArray[np.float64]:
         """Return ψ at ``levels`` [u] of the function with all median parameters, clipped."""
-        found = success(self.grid.family, levels, self.threshold, **self.others._asdict())
-        return np.asarray(np.clip(found, CLIP, 1.0 - CLIP), float)
+        psi = success(self.grid.family, levels, self.threshold, **self.others._asdict())
+        return np.asarray(np.clip(psi, CLIP, 1.0 - CLIP), float)
 
     def band(self, levels: ArrayLike) -> NDArray[np.float64]:
         """Return the ends of the pointwise 95 % band of ψ at ``levels`` [u], shape (2, levels)."""
@@ -213,7 +213,7 @@ def log_likelihood(
     """Return the log likelihood of each cell from counts of answers (k,) and log ψ and log(1 − ψ) (k, …)."""
     total = np.zeros(log_success.shape[1:])
     for counts, logarithms in ((successes, log_success), (failures, log_failure)):
-        answered = np.flatnonzero(counts)  # few of the levels
+        answered = np.flatnonzero(counts)  # only few levels have answers
         total += np.einsum("k,kabcd->abcd", np.asarray(counts, float)[answered], logarithms[answered])
     return total
 
@@ -232,24 +232,27 @@ def tables(grid: Grid, levels: Values) -> tuple[NDArray[np.float64], ...]:
 
 
 ALIKE: Final = 0.6
-"""Of the standard deviation of log widths so much is between people of one group; the rest is shared. [choice]"""
+"""Share of the standard deviation of log widths that is between people of a group; the rest is common. [choice]"""
 _APART: Final = (0.05, 0.1, 0.2)
 """Standard deviations of the thresholds of people of one group [range of thresholds]. [choice]"""
 MEAN_LAPSE: Final = 0.03
 """The mean lapse rates of groups are exponentially distributed with this mean. [choice]"""
 NEAR_MODE: Final = 2
-"""Estimates of several people weight what they share by this power of its posterior: a lapse rate is not below zero,
-so that the mean is too high if few answers are lapses, and thresholds would be too low. [choice]"""
+"""Power of the posterior of shared parameters with which estimates of several people are weighted.
+
+A lapse rate cannot be negative, so its posterior mean is too high if there are few lapses, and thresholds would be too
+low. [choice]
+"""
 GROUP_LAPSES: Final = (0.002, 0.01, 0.02, 0.03, 0.045, 0.065, 0.09, 0.12)
-"""The mean lapse rates of a group; each person's is about it as `_lapse_weights` has it."""
+"""Mean lapse rates of groups; `_lapse_weights` is the distribution of a person's rate around the mean."""
 MANY_LAPSES: Final = 0.09
-"""The group's threshold is also given for this mean lapse rate, unless the answers exclude it. [choice]"""
+"""A mean lapse rate for which the group's threshold is also computed, unless the answers exclude it. [choice]"""
 
 
 def _lapse_weights(lapses: Values, mean: float) -> NDArray[np.float64]:
     """Return the prior weight of each lapse rate in a group with this mean: Erlang's distribution of order 2.
 
-    ``lapses`` are ascending; each represents the rates that are nearest to it.
+    ``lapses`` ascend; each represents the rates nearest to it.
     """
     edges = 2 / mean * np.array([0.0, *(np.array(lapses[1:]) + lapses[:-1]) / 2, np.inf])
     beyond = np.append((1 + edges[:-1]) * np.exp(-edges[:-1]), 0.0)
@@ -257,15 +260,15 @@ def _lapse_weights(lapses: Values, mean: float) -> NDArray[np.float64]:
 
 
 def group_lapse_weights() -> NDArray[np.float64]:
-    """Return the prior weight of each of `GROUP_LAPSES`, which represent the rates that are nearest to them."""
+    """Return the prior weight of each of `GROUP_LAPSES`; each represents the rates nearest to it."""
     edges = np.array([0.0, *(np.array(GROUP_LAPSES[1:]) + GROUP_LAPSES[:-1]) / 2, np.inf])
     return np.asarray(-np.diff(np.exp(-edges / MEAN_LAPSE)), float)
 
 
 def lapse_prior(lapses: Values) -> Values:
     """Return the prior weight of each lapse rate for a person in an unknown group."""
-    of_means = [_lapse_weights(lapses, mean) for mean in GROUP_LAPSES]
-    return tuple((group_lapse_weights() @ np.array(of_means)).tolist())
+    weights_by_mean = [_lapse_weights(lapses, mean) for mean in GROUP_LAPSES]
+    return tuple((group_lapse_weights() @ np.array(weights_by_mean)).tolist())
 
 
 class GroupPriors(NamedTuple):
@@ -274,7 +277,7 @@ class GroupPriors(NamedTuple):
     Attributes
     ----------
     factors : (people, widths, lapses) array
-        The prior of width and lapse rate that follows from the answers of the others, over that of their grid.
+        The prior of width and lapse rate given the answers of the others, divided by that of the grid.
     variance : float
         Mean square error of the group's mean threshold due to common parameters [u²].
     below, above : float
@@ -291,13 +294,13 @@ class GroupPriors(NamedTuple):
 
 
 def group_priors(flat: Sequence[Posterior], width_prior: tuple[float, float]) -> GroupPriors:
-    """Return each person's prior of width and lapse rate that follows from the answers of the others.
+    """Return each person's prior of width and lapse rate, given the answers of the others.
 
-    Widths of a group are log-normal about a centre, which is itself log-normal; lapse rates are distributed about a
-    mean, which is exponential; thresholds are normal about a mean with a flat prior. Answers near a threshold contain
-    little information about a person's lapse rate, which shifts the threshold: the pooled answers contain more, and the
-    remaining uncertainty is an error that all share. A single person has `width_prior` and `lapse_prior`, except for
-    the part beyond the grid.
+    Widths of a group are log-normal around a centre that is itself log-normal; lapse rates are distributed around an
+    exponential mean; thresholds are normal around a mean with a flat prior. A person's answers near the threshold
+    contain little information on the lapse rate, which shifts the threshold. The answers of a group contain more, and
+    the remaining uncertainty is an error that all members share. A single person has `width_prior` and `lapse_prior`,
+    apart from the part beyond the grid.
 
     Parameters
     ----------
@@ -309,34 +312,36 @@ def group_priors(flat: Sequence[Posterior], width_prior: tuple[float, float]) ->
     grid = flat[0].grid
     thresholds, widths = np.array(grid.thresholds), np.log(grid.widths)
     median, log_factor = math.log(width_prior[0]), math.log(width_prior[1])
-    of_width = np.exp(-0.5 * ((widths - widths[:, None]) / (ALIKE * log_factor)) ** 2)  # (centres, widths)
-    of_width /= of_width.sum(axis=1, keepdims=True)
-    of_lapse = np.array([_lapse_weights(grid.lapses, mean) for mean in GROUP_LAPSES]) / grid.lapse_prior
+    width_given_centre = np.exp(-0.5 * ((widths - widths[:, None]) / (ALIKE * log_factor)) ** 2)  # (centres, widths)
+    width_given_centre /= width_given_centre.sum(axis=1, keepdims=True)
+    lapse_given_mean = np.array([_lapse_weights(grid.lapses, mean) for mean in GROUP_LAPSES]) / grid.lapse_prior
     log_centres = -0.5 * ((widths - median) / log_factor) ** 2 / (1.0 - ALIKE**2)
     log_shared = (log_centres[:, None] + np.log(group_lapse_weights())).ravel()  # (centres × means of lapses)
-    apart = np.array(_APART)[:, None, None] * np.ptp(thresholds)
-    about = np.exp(-0.5 * ((thresholds - thresholds[::2, None]) / apart) ** 2).reshape(-1, len(thresholds))
-    about /= about.sum(axis=1, keepdims=True)  # (means and spreads, thresholds)
-    joint = np.array([np.einsum("abcd->abc", one.weights) for one in flat])
-    given_shared = np.einsum("cw,pawl->pacl", of_width, joint)
-    given_shared = np.einsum("kl,pacl->pack", of_lapse, given_shared).reshape(*joint.shape[:2], -1)
-    evidence = np.log(np.maximum(np.einsum("ma,pas->pms", about, given_shared), 1e-300))
-    of_others = log_shared + evidence.sum(axis=0) - evidence
-    weights = np.exp(of_others - of_others.max(axis=(1, 2), keepdims=True)).sum(axis=1)
+    threshold_sds = np.array(_APART)[:, None, None] * np.ptp(thresholds)
+    threshold_given_mean = np.exp(-0.5 * ((thresholds - thresholds[::2, None]) / threshold_sds) ** 2).reshape(
+        -1, len(thresholds)
+    )
+    threshold_given_mean /= threshold_given_mean.sum(axis=1, keepdims=True)  # (means and spreads, thresholds)
+    joint = np.array([np.einsum("abcd->abc", person.weights) for person in flat])
+    given_shared = np.einsum("cw,pawl->pacl", width_given_centre, joint)
+    given_shared = np.einsum("kl,pacl->pack", lapse_given_mean, given_shared).reshape(*joint.shape[:2], -1)
+    evidence = np.log(np.maximum(np.einsum("ma,pas->pms", threshold_given_mean, given_shared), 1e-300))
+    evidence_of_others = log_shared + evidence.sum(axis=0) - evidence
+    weights = np.exp(evidence_of_others - evidence_of_others.max(axis=(1, 2), keepdims=True)).sum(axis=1)
     weights **= NEAR_MODE if len(flat) > 1 else 1
     weights = (weights / weights.sum(axis=1, keepdims=True)).reshape(len(flat), len(widths), -1)
-    factors = np.einsum("pck,cw,kl->pwl", weights, of_width, of_lapse)
-    of_all = log_shared + evidence.sum(axis=0)
-    shared = np.exp(of_all - of_all.max()).sum(axis=0)
+    factors = np.einsum("pck,cw,kl->pwl", weights, width_given_centre, lapse_given_mean)
+    evidence_of_all = log_shared + evidence.sum(axis=0)
+    shared = np.exp(evidence_of_all - evidence_of_all.max()).sum(axis=0)
     shared /= shared.sum()
     means = (np.einsum("pas,a->ps", given_shared, thresholds) / given_shared.sum(axis=1)).mean(axis=0)
     errors = means - np.average(means, weights=shared**NEAR_MODE)
     order = np.argsort(errors)
     places = np.cumsum(shared[order]) - shared[order] / 2
     low, high = np.interp((0.025, 0.975), places, errors[order])
-    of_lapses = shared.reshape(len(widths), -1)  # (centres, means of lapses)
-    likelihoods, many = of_lapses.sum(axis=0) / group_lapse_weights(), GROUP_LAPSES.index(MANY_LAPSES)
-    excluded = math.log(likelihoods.max() / max(likelihoods[many], 1e-300)) > _Z_99**2 / 2
+    shared_by_lapse = shared.reshape(len(widths), -1)  # (centres, means of lapses)
+    likelihoods, many_lapses = shared_by_lapse.sum(axis=0) / group_lapse_weights(), GROUP_LAPSES.index(MANY_LAPSES)
+    excluded = math.log(likelihoods.max() / max(likelihoods[many_lapses], 1e-300)) > _Z_99**2 / 2
     return GroupPriors(
         factors=np.asarray(factors, float),
         variance=float(shared @ errors**2),
@@ -344,7 +349,11 @@ def group_priors(flat: Sequence[Posterior], width_prior: tuple[float, float]) ->
         above=max(0.0, float(high)),
         if_many_lapses=None
         if excluded
-        else float(errors.reshape(of_lapses.shape)[:, many] @ of_lapses[:, many] / of_lapses[:, many].sum()),
+        else float(
+            errors.reshape(shared_by_lapse.shape)[:, many_lapses]
+            @ shared_by_lapse[:, many_lapses]
+            / shared_by_lapse[:, many_lapses].sum()
+        ),
     )
 
 

@@ -1,6 +1,6 @@
-"""People: in what they differ from the observers that the analysis assumes, and how precisely a few are measured.
+"""Simulated people, who may differ from the observers that the analysis assumes, and expected precision.
 
-Validation, `power`, `check`, rehearsals and benchmarks draw their observers from here.
+Validation, `power`, `check`, rehearsals and benchmarks use these observers.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ _WIDTHS: Final = (0.5, 2.5)
 LAPSES_MOST: Final = 0.05
 _PREFERENCE_SD: Final = 0.25
 _CHANGE: Final = 1.2
-"""Of people drawn at random: ends of log-uniform widths, the most lapses, standard deviation of a criterion and of a
-preference for the last answer, and factor (one standard deviation) of a change. [choice]"""
+"""Distributions of random people: limits of log-uniform widths, largest lapse rate, standard deviation of criterion and
+of preference for the last answer, and factor (one standard deviation) of the change. [choice]"""
 UNIFORM: Final = 12
-"""A nearly normal number is the sum of so many uniform ones, less six."""
+"""The number of uniform numbers whose sum, minus six, is nearly normal."""
 
 
 class Person(NamedTuple):
@@ -37,9 +37,9 @@ class Person(NamedTuple):
     Attributes
     ----------
     width : float
-        Of the psychometric function, as a share of that of an observer whose d′ is proportional to the level.
+        Width of the psychometric function, relative to that of an observer whose d′ is proportional to the level.
     lapse : float
-        Share of random answers, of which one in k is correct with k alternatives.
+        Share of random answers; with k alternatives, one in k of them is correct.
     criterion, repeats : float
         Preference for the first interval, and for the last answer [SD of the decision].
     change : float
@@ -52,17 +52,17 @@ class Person(NamedTuple):
     repeats: float = 0.0
     change: float = 1.0
 
-    def wrong(self, answers: int) -> float:
-        """Return the lapse rate: the share of wrong answers at any level, with one correct answer among ``answers``."""
+    def lapse_rate(self, answers: int) -> float:
+        """Return the share of wrong answers at any level, if one of ``answers`` possible answers is correct."""
         return self.lapse * (1.0 - 1.0 / answers)
 
-    def at(self, done: float) -> float:
+    def relative_threshold(self, done: float) -> float:
         """Return the threshold relative to its mean after a fraction ``done`` of the block."""
         return float(self.change ** (done - 0.5))
 
-    def sensed(self, level: float, done: float) -> float:
+    def perceived_intensity(self, level: float, done: float) -> float:
         """Return a level's perceived intensity relative to the mean threshold: 1 at threshold, for unit width."""
-        return float((level / self.at(done)) ** (1.0 / self.width))
+        return float((level / self.relative_threshold(done)) ** (1.0 / self.width))
 
 
 ASSUMED: Final = Person()
@@ -79,12 +79,12 @@ KINDS: Final = {
 }
 """People who differ in one respect each."""
 ALONE: Final = {name: person for name, person in KINDS.items() if not person.criterion and not person.repeats}
-"""Those without a preference: where there are not two intervals, one of them correct."""
+"""Kinds without a preference, for designs other than two intervals of which one is correct."""
 MIXED: Final = "a mix of these"
-"""Of a group of people drawn at random."""
+"""The kind of a group of random people."""
 
 
-def normal(draw: Callable[[], float]) -> float:
+def draw_normal(draw: Callable[[], float]) -> float:
     """Return an approximately standard normal number from uniform numbers in [0, 1)."""
     return sum(draw() for _ in range(UNIFORM)) - UNIFORM / 2
 
@@ -95,14 +95,14 @@ def draw_person(draw: Callable[[], float]) -> Person:
     return Person(
         width=low * (high / low) ** draw(),
         lapse=LAPSES_MOST * draw(),
-        criterion=_PREFERENCE_SD * normal(draw),
-        repeats=_PREFERENCE_SD * normal(draw),
-        change=_CHANGE ** normal(draw),
+        criterion=_PREFERENCE_SD * draw_normal(draw),
+        repeats=_PREFERENCE_SD * draw_normal(draw),
+        change=_CHANGE ** draw_normal(draw),
     )
 
 
-def of_kind(kind: str, draw: Callable[[], float]) -> Person:
-    """Return a person of a kind: of `KINDS`, or `MIXED`."""
+def person_of_kind(kind: str, draw: Callable[[], float]) -> Person:
+    """Return a person of a kind from `KINDS`, or a random person for `MIXED`."""
     return draw_person(draw) if kind == MIXED else KINDS[kind]
 
 
@@ -135,14 +135,14 @@ class Expected:
     standards : int
         Number of standards in the group's mean.
     halves : mapping of str to sequence of float
-        Half the 95 % intervals of participants, in u, for each kind of participant; infinite if nothing is measured.
+        Half-widths of participants' 95 % intervals, in u, for each kind; infinite if nothing is measured.
     spreads : mapping of str to float
-        Standard deviation of the estimate's error, in u, for each kind of participant; infinite if nothing is measured.
+        Standard deviation of the estimate's error, in u, for each kind; infinite if nothing is measured.
     threshold : float
         Approximate threshold, as a level; or the assumed d′, d_a or exponent.
     shared : mapping of str to float
-        For each kind the variance of a group's mean due to common width and lapse rate, multiplied by the number of
-        people: that of 20 is about half that of 10.
+        For each kind, the variance of a group's mean due to the common width and lapse rate, multiplied by the number
+        of people, because it is about inversely proportional to that number.
     """
 
     spacing: Literal["log", "linear"]
@@ -171,9 +171,9 @@ class Expected:
     @property
     def worst(self) -> tuple[str, float]:
         """The kind of participants with the widest interval, and the median of its half width."""
-        return max(((kind, float(np.median(halve))) for kind, halve in self.halves.items()), key=lambda one: one[1])
+        return max(((kind, float(np.median(halve))) for kind, halve in self.halves.items()), key=lambda kind: kind[1])
 
-    def of_group(self, participants: int, trials: float | None = None) -> float:
+    def group_half_width(self, participants: int, trials: float | None = None) -> float:
         """Return the relative half width of the 95 % interval of a group's mean over all standards, median over kinds.
 
         Parameters
@@ -181,8 +181,8 @@ class Expected:
         participants : int
             Number of participants; the result is infinite below two.
         trials : float, optional
-            Of each standard; variances of errors are taken to be inversely proportional to their number. What people
-            share is an error that the standards have in common.
+            Trials of each standard; variances of errors are assumed to be inversely proportional to it. The error that
+            people share is common to all standards.
         """
         if participants < 2:
             return math.inf
@@ -202,13 +202,13 @@ class Expected:
     def participants_for(self, precision: float, most: int = 1000) -> int | None:
         """Return the fewest participants for a relative half width of ``precision``; None: more than ``most``."""
         sizes = range(2, most + 1)
-        place = bisect_left(sizes, -precision, key=lambda n: -self.of_group(n))
+        place = bisect_left(sizes, -precision, key=lambda n: -self.group_half_width(n))
         return sizes[place] if place < len(sizes) else None
 
     def trials_for(self, precision: float, participants: int, most: int = 1000) -> int | None:
         """Return the fewest sufficient trials per standard, in steps of ten; None if participants differ too much."""
-        found = (n for n in range(10, most + 1, 10) if self.of_group(participants, n) <= precision)
-        return next(found, None)
+        sufficient = (n for n in range(10, most + 1, 10) if self.group_half_width(participants, n) <= precision)
+        return next(sufficient, None)
 
 
 @cache

@@ -1,8 +1,7 @@
-"""The fit to the answers of one person, without preferences for an answer and without the change over the trials.
+"""The fit to the answers of one person, corrected for preferences and for a change of the threshold over the trials.
 
-A preference for one of two intervals, or for the last answer, and a threshold that changes make answers worse than they
-would be at the same threshold in its middle. Both are estimated from the answers, and the posterior is that without
-them.
+A preference for one of two intervals or for the last answer, and a changing threshold, reduce the share of correct
+answers. Both are estimated from the answers, and their effects are removed from the posterior.
 """
 
 from __future__ import annotations
@@ -22,31 +21,33 @@ from study_app.psychophysics.grid import Grid, Posterior, Values, log_likelihood
 PREFERENCE_SD: Final = 0.4
 """Standard deviation of preferences between people [SD of the decision]. [choice]"""
 CHANGE_PRIOR: Final = 1.5
-"""Factor by which a threshold changes from the first trial to the last (one standard deviation). [choice]"""
+"""Prior of the change of a threshold from the first trial to the last, as a factor (one SD). [choice]"""
 BEYOND_CHANCE: Final = 2.0
-"""A change that is named is one from so many standard errors on."""
+"""The smallest change that counts as significant [standard errors]."""
 _PREFERENCE_STEP: Final = 0.1
-"""Preferences are rounded to so much [SD of the decision], so that people have tables in common."""
+"""Step to which preferences are rounded [SD of the decision], so that people can share tables."""
 _PASSES: Final = 2
-"""Fits after which preferences are estimated: the first threshold is too high."""
+"""Number of fits with new estimates of preferences; the first threshold is too high."""
 _CHANGES: Final = np.linspace(-2.5, 2.5, 9)
 _CHANGE_WEIGHTS: Final = np.exp(-0.5 * _CHANGES**2)
-"""The changes over which a posterior is a mean [SD of the prior], and the prior weight of each."""
+"""The changes over which a posterior is averaged [SD of the prior], and their prior weights."""
 EARLY_TRIALS: Final = 15.0
-"""Practice is taken to fade to 1/e in so many trials. [choice]"""
+"""Number of trials in which an effect of practice is assumed to fall to 1/e. [choice]"""
 BURST_TRIALS: Final = 10
-"""People are taken to answer at random for at most so many consecutive trials. [choice]"""
+"""The most consecutive trials in which people are assumed to answer at random. [choice]"""
 _BURST_ODDS: Final = 1 / 200
 """Prior odds that such a burst begins at a trial. [choice]"""
 MOST_CLUSTERED: Final = 0.8
-"""Standard errors by which errors may cluster: at most 5 % of groups as the analysis assumes them exceed it. The fit
-takes up part of every cluster. [choice]"""
+"""Limit of the clustering of errors [standard errors], which at most 5 % of groups exceed if the model is correct.
+
+It is low because the fit absorbs part of every cluster. [choice]
+"""
 _SCORING_STEPS: Final = 10
 _STEP: Final = 0.01
-"""By so many widths a threshold is moved to differentiate the function."""
+"""Step of the threshold in numerical derivatives [widths]."""
 
 
-class Given(NamedTuple):
+class PersonAnswers(NamedTuple):
     """The answers of one person.
 
     Attributes
@@ -70,10 +71,10 @@ class Given(NamedTuple):
     before: Floats
     done: Floats
 
-    def first(self, n: int) -> Given:
+    def first(self, n: int) -> PersonAnswers:
         """Return the first n answers."""
-        of_trials = {name: values[:n] for name, values in self._asdict().items()}
-        return Given(**{**of_trials, "levels": self.levels})
+        first = {name: values[:n] for name, values in self._asdict().items()}
+        return PersonAnswers(**{**first, "levels": self.levels})
 
     def fit(self, grid: Grid, *, two_intervals: bool) -> PersonFit:
         """Return the fit to the answers.
@@ -87,21 +88,21 @@ class Given(NamedTuple):
         """
         shifts = np.zeros(len(self.places))
         parts = _likelihoods(self, shifts, grid)
-        found = posterior(grid, np.add.reduce([*parts.values()]))
+        fitted = posterior(grid, np.add.reduce([*parts.values()]))
         for _ in range(_PASSES if two_intervals else 0):
-            moved = _preferences(self, found)
-            if np.array_equal(moved, shifts):
+            new_shifts = _preferences(self, fitted)
+            if np.array_equal(new_shifts, shifts):
                 break
-            shifts, parts = moved, _likelihoods(self, moved, grid)
-            found = posterior(grid, np.add.reduce([*parts.values()]))
-        score, information = _time_score(self, found, shifts, self.done)
-        decade = 1.0 if grid.log else abs(found.threshold) * math.log(10)
-        sd, named = math.log10(CHANGE_PRIOR) * decade, score**2 > BEYOND_CHANCE**2 * information
+            shifts, parts = new_shifts, _likelihoods(self, new_shifts, grid)
+            fitted = posterior(grid, np.add.reduce([*parts.values()]))
+        score, information = _time_score(self, fitted, shifts, self.done)
+        decade_u = 1.0 if grid.log else abs(fitted.threshold) * math.log(10)
+        sd, has_changed = math.log10(CHANGE_PRIOR) * decade_u, score**2 > BEYOND_CHANCE**2 * information
         change = score / (information + sd**-2) if sd else 0.0
         constant, share = grid.session_sd
-        if named:
+        if has_changed:
             grid = replace(grid, session_sd=(math.hypot(constant, change / math.sqrt(12)), share))
-        return PersonFit(self, shifts, change, named, _posterior(parts, sd * _CHANGES, grid, _CHANGE_WEIGHTS))
+        return PersonFit(self, shifts, change, has_changed, _posterior(parts, sd * _CHANGES, grid, _CHANGE_WEIGHTS))
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,67 +111,72 @@ class PersonFit:
 
     Attributes
     ----------
-    given : Given
+    answers : PersonAnswers
         The answers.
     shifts : (n,) array
         Shift of each decision towards the correct answer due to a preference [SD].
     change : float
         Most probable rise of the threshold from the first trial to the last, in u.
-    named : bool
+    has_changed : bool
         Whether the change is significant; the threshold's uncertainty then includes the standard deviation of a
         uniform change, in addition to that between sessions.
     flat : Posterior
-        The posterior without both, with a flat prior on the width; its grid has the prior of the width.
+        The posterior corrected for both, with a flat prior on the width; its grid has the actual prior of the width.
     """
 
-    given: Given
+    answers: PersonAnswers
     shifts: Floats
     change: float
-    named: bool
+    has_changed: bool
     flat: Posterior
 
-    def expected(self, fitted: Posterior) -> Floats:
+    def expected(self, posterior: Posterior) -> Floats:
         """Return the share of successes in each trial (n,) predicted by the function with all median parameters."""
-        psi = fitted.success(self.given.levels)
-        return preferred(psi[self.given.places], fitted.others.lapse, self.shifts)
+        psi = posterior.success(self.answers.levels)
+        return with_preference(psi[self.answers.places], posterior.others.lapse, self.shifts)
 
-    def after(self, n: int) -> Posterior:
-        """Return the posterior from the first n answers, with preferences and change from all, like ``flat``."""
+    def posterior_after(self, n: int) -> Posterior:
+        """Return the posterior from the first n answers, with the preferences and the change found from all answers."""
         if n == len(self.shifts):
             return self.flat
         grid = self.flat.grid
-        return _posterior(_likelihoods(self.given.first(n), self.shifts[:n], grid), np.array([self.change]), grid)
+        return _posterior(_likelihoods(self.answers.first(n), self.shifts[:n], grid), np.array([self.change]), grid)
 
 
-def _likelihoods(given: Given, shifts: Floats, grid: Grid) -> dict[float, NDArray[np.float64]]:
+def _likelihoods(answers: PersonAnswers, shifts: Floats, grid: Grid) -> dict[float, NDArray[np.float64]]:
     """Return the log likelihood of the answers before (−1), at (0) and after (1) the middle trial."""
-    flat, u, k = replace(grid, width_prior=None, session_sd=(0.0, 0.0)), tuple(given.levels.tolist()), len(given.levels)
-    found, halves = dict.fromkeys((-1.0, 0.0, 1.0), np.zeros(grid.shape)), np.sign(given.done - 0.5)
+    flat = replace(grid, width_prior=None, session_sd=(0.0, 0.0))
+    u, k = tuple(answers.levels.tolist()), len(answers.levels)
+    log_likelihoods = dict.fromkeys((-1.0, 0.0, 1.0), np.zeros(grid.shape))
+    halves = np.sign(answers.done - 0.5)
     for half, shift in {*zip(halves.tolist(), shifts.tolist(), strict=True)}:
-        at = (halves == half) & (shifts == shift)
-        right, wrong = (np.bincount(given.places[at & one], minlength=k) for one in (given.successes, ~given.successes))
-        logarithms = _moved_tables(flat, u, shift) if shift else tables(flat, u)[1:]
-        found[half] = found[half] + log_likelihood(right, wrong, *logarithms)
-    return found
+        selected = (halves == half) & (shifts == shift)
+        right, wrong = (
+            np.bincount(answers.places[selected & outcomes], minlength=k)
+            for outcomes in (answers.successes, ~answers.successes)
+        )
+        logarithms = _shifted_tables(flat, u, shift) if shift else tables(flat, u)[1:]
+        log_likelihoods[half] = log_likelihoods[half] + log_likelihood(right, wrong, *logarithms)
+    return log_likelihoods
 
 
 def _posterior(
     parts: dict[float, NDArray[np.float64]], changes: Floats, grid: Grid, weights: ArrayLike = 1.0
 ) -> Posterior:
-    """Return the posterior of the threshold at the middle trial, where each half uses its own mean threshold.
+    """Return the posterior of the threshold at the middle trial; each half of the trials has its own mean threshold.
 
     It is averaged over ``changes`` of the threshold from the first trial to the last [u], with prior ``weights``.
     """
     cells = changes / 4 / (grid.thresholds[1] - grid.thresholds[0])
     flat = replace(grid, width_prior=None)
     logarithms = [
-        np.log(weight) + np.add.reduce([_further(likelihood, half * moved) for half, likelihood in parts.items()])
+        np.log(weight) + np.add.reduce([_shift_cells(likelihood, half * moved) for half, likelihood in parts.items()])
         for moved, weight in zip(cells, np.broadcast_to(weights, cells.shape), strict=True)
     ]
     return replace(posterior(flat, np.logaddexp.reduce(logarithms)), grid=grid)
 
 
-def _further(values: NDArray[np.float64], cells: float) -> NDArray[np.float64]:
+def _shift_cells(values: NDArray[np.float64], cells: float) -> NDArray[np.float64]:
     """Return the values shifted by a number of threshold cells, interpolated; the end values are repeated."""
     last = len(values) - 1
     at = np.clip(np.arange(len(values)) + cells, 0, last)
@@ -179,14 +185,14 @@ def _further(values: NDArray[np.float64], cells: float) -> NDArray[np.float64]:
     return np.asarray(values[low] * (1.0 - share) + values[low + 1] * share, float)
 
 
-def _time_score(given: Given, fitted: Posterior, shifts: Floats, course: Floats) -> tuple[float, float]:
+def _time_score(answers: PersonAnswers, fitted: Posterior, shifts: Floats, course: Floats) -> tuple[float, float]:
     """Return score and information, at zero change, for a threshold that changes like ``course`` (n,) [1/u, 1/u²].
 
-    ``found`` is the fit of these answers for a constant threshold, ``shifts`` (n,) are those of the decisions [SD].
+    ``fitted`` is the posterior for a constant threshold; ``shifts`` (n,) are the shifts of the decisions [SD].
     """
-    y, u, others = given.successes.astype(float), given.levels, fitted.others
+    y, u, others = answers.successes.astype(float), answers.levels, fitted.others
     below, above, psi = (
-        preferred(success(fitted.grid.family, u, at, **others._asdict())[given.places], others.lapse, shifts)
+        with_preference(success(fitted.grid.family, u, at, **others._asdict())[answers.places], others.lapse, shifts)
         for at in (fitted.threshold - _STEP * others.width, fitted.threshold + _STEP * others.width, fitted.threshold)
     )
     psi, slope = np.clip(psi, CLIP, 1.0 - CLIP), (above - below) / (2 * _STEP * others.width)
@@ -201,28 +207,30 @@ def early_change(fits: Sequence[tuple[PersonFit, Posterior]]) -> float | None:
     """Return the rise of a group's thresholds after the first trials in standard errors; None if unknown.
 
     The time course decays exponentially over `EARLY_TRIALS`, like practice; scores and information are summed over all
-    members, each with his or her own posterior.
+    members, each with a separate posterior.
     """
     return _standard_errors(
         [
-            _time_score(fit.given, found, fit.shifts, -np.exp(-np.arange(len(fit.shifts)) / EARLY_TRIALS))
-            for fit, found in fits
+            _time_score(fit.answers, posterior, fit.shifts, -np.exp(-np.arange(len(fit.shifts)) / EARLY_TRIALS))
+            for fit, posterior in fits
         ]
     )
 
 
 def error_bursts(fits: Sequence[tuple[PersonFit, Posterior]]) -> float | None:
-    """Return by how many standard errors more errors than expected follow errors; None: not known.
+    """Return the clustering of errors in standard errors, positive if errors follow errors; None if unknown.
 
-    Each error, less what the function expects, is weighted by the probability that the person was answering at random
-    just before. Its variance given the answers before is known, even if these chose the level.
+    Each error, minus the expected error rate, is weighted by the probability that the person answered at random just
+    before. Its variance given the previous answers is known, even if these determined the level.
     """
-    return _standard_errors([_burst_score(fit.given.successes, fit.expected(found), found) for fit, found in fits])
+    return _standard_errors(
+        [_burst_score(fit.answers.successes, fit.expected(posterior), posterior) for fit, posterior in fits]
+    )
 
 
-def _burst_score(successes: NDArray[np.bool_], psi: Floats, found: Posterior) -> tuple[float, float]:
-    """Return the weighted sum of errors beyond those expected, (n,), and its variance."""
-    guesses, n = found.grid.guesses or (), len(psi)
+def _burst_score(successes: NDArray[np.bool_], psi: Floats, fitted: Posterior) -> tuple[float, float]:
+    """Return the weighted sum of errors minus expected errors, and its variance."""
+    guesses, n = fitted.grid.guesses or (), len(psi)
     chance, evidence = guesses[0] if len(guesses) == 1 else 0.5, np.zeros(n)
     ratios = np.log(np.where(successes, chance / psi, (1.0 - chance) / (1.0 - psi)))
     total = np.concatenate(([0.0], np.cumsum(ratios)))
@@ -251,30 +259,32 @@ def _shift_probabilities(shares: ArrayLike, shift: ArrayLike) -> Floats:
     return np.asarray(np.interp(deviates + np.asarray(shift, float), z, of_z), float)
 
 
-def _preferences(given: Given, fitted: Posterior) -> Floats:
+def _preferences(answers: PersonAnswers, fitted: Posterior) -> Floats:
     """Return the shift of each decision between two intervals towards the correct one due to preferences (n,) [SD].
 
     It is a probit regression with lapses, in which the contribution of the levels is fixed. Its coefficients are the
-    preference for the first interval and that for the previous answer, with a normal prior: removing chance preferences
-    would bias thresholds downwards. Without lapses, errors in easy trials of people whose functions are wider than
-    assumed would appear to be preferences. ``fitted`` is the posterior of these answers.
+    preferences for the first interval and for the previous answer. They have a normal prior, because removing
+    preferences that are due to chance would bias thresholds downwards. Without lapses, errors in easy trials would
+    appear to be preferences if a person's function is wider than assumed. ``fitted`` is the posterior of these answers.
     """
-    (z, of_z), first, lapse = _normal_table(), given.towards, fitted.others.lapse
-    unbiased = ((fitted.success(given.levels) - lapse) / (1.0 - 2.0 * lapse))[given.places]
-    sensed, said = first * np.interp(np.clip(unbiased, 0.5, 0.999), of_z, z), np.where(given.successes, first, -first)
-    both = np.abs(first) if np.ptp(first) else np.zeros(len(first))  # one order alone does not show which is preferred
-    causes, weights = np.column_stack([both, given.before]), np.zeros(2)
+    (z, of_z), first, lapse = _normal_table(), answers.towards, fitted.others.lapse
+    unbiased = ((fitted.success(answers.levels) - lapse) / (1.0 - 2.0 * lapse))[answers.places]
+    evidence = first * np.interp(np.clip(unbiased, 0.5, 0.999), of_z, z)
+    chosen = np.where(answers.successes, first, -first)
+    both_orders = bool(np.ptp(first))  # with only one order, the preference for an interval is unknown
+    constant = np.abs(first) if both_orders else np.zeros(len(first))
+    predictors, weights = np.column_stack([constant, answers.before]), np.zeros(2)
     for _ in range(_SCORING_STEPS):
-        agreed = said * (sensed + causes @ weights)
-        share = np.clip(lapse + (1.0 - 2.0 * lapse) * np.interp(agreed, z, of_z), CLIP, 1.0 - CLIP)
-        slope = (1.0 - 2.0 * lapse) * np.exp(-0.5 * agreed**2) / math.sqrt(2 * math.pi)
-        information = (causes.T * (slope**2 / (share * (1.0 - share)))) @ causes + np.eye(2) / PREFERENCE_SD**2
-        weights += np.linalg.solve(information, causes.T @ (said * slope / share) - weights / PREFERENCE_SD**2)
-    return np.asarray(first * np.round(causes @ weights / _PREFERENCE_STEP) * _PREFERENCE_STEP + 0.0, float)
+        decision = chosen * (evidence + predictors @ weights)
+        share = np.clip(lapse + (1.0 - 2.0 * lapse) * np.interp(decision, z, of_z), CLIP, 1.0 - CLIP)
+        slope = (1.0 - 2.0 * lapse) * np.exp(-0.5 * decision**2) / math.sqrt(2 * math.pi)
+        information = (predictors.T * (slope**2 / (share * (1.0 - share)))) @ predictors + np.eye(2) / PREFERENCE_SD**2
+        weights += np.linalg.solve(information, predictors.T @ (chosen * slope / share) - weights / PREFERENCE_SD**2)
+    return np.asarray(first * np.round(predictors @ weights / _PREFERENCE_STEP) * _PREFERENCE_STEP + 0.0, float)
 
 
-def preferred(psi: ArrayLike, lapse: ArrayLike, shift: ArrayLike) -> Floats:
-    """Return ψ for two intervals if a preference shifts the decision by ``shift`` towards the correct one [SD]."""
+def with_preference(psi: ArrayLike, lapse: ArrayLike, shift: ArrayLike) -> Floats:
+    """Return ψ for two intervals if a preference shifts the decision towards the correct one by ``shift`` [SD]."""
     psi, lapse = np.asarray(psi, float), np.asarray(lapse, float)
     if not np.any(shift):
         return psi
@@ -285,8 +295,8 @@ def preferred(psi: ArrayLike, lapse: ArrayLike, shift: ArrayLike) -> Floats:
 
 
 @lru_cache(maxsize=32)
-def _moved_tables(grid: Grid, levels: Values, shift: float) -> tuple[Floats, Floats]:
-    """Return log ψ and log(1 − ψ) at each level in each cell for two intervals, whose guess rate is one half."""
+def _shifted_tables(grid: Grid, levels: Values, shift: float) -> tuple[Floats, Floats]:
+    """Return log ψ and log(1 − ψ) of each level and cell for two intervals with decisions shifted by ``shift`` [SD]."""
     unbiased = replace(grid, lapses=(0.0,), lapse_prior=(1.0,)).success(levels)
     lapses = np.array(grid.lapses)[:, None]
     psi = np.clip(lapses + (1.0 - 2.0 * lapses) * _shift_probabilities(unbiased, shift), CLIP, 1.0 - CLIP)

@@ -214,18 +214,18 @@ def log10_of(percent):
 )  # thresholds of people who differ by a factor of 1.2, with a standard deviation of 28 % at 60 trials
 def test_a_groups_interval_is_students_over_errors_and_people(participants, trials, percent):
     one = Expected(spacing="log", trials=60, standards=1, halves={}, spreads={"": 0.28 / math.log(10)}, threshold=0.2)
-    assert 100 * one.of_group(participants, trials) == pytest.approx(percent, abs=1.5)
+    assert 100 * one.group_half_width(participants, trials) == pytest.approx(percent, abs=1.5)
 
 
 def test_the_min_sample_and_trials_for_a_precision():
     one = Expected(spacing="log", trials=20, standards=1, halves={}, spreads={"": 0.2}, threshold=0.2)
     people = one.participants_for(0.15)
-    assert one.of_group(people) <= 0.15 < one.of_group(people - 1)
+    assert one.group_half_width(people) <= 0.15 < one.group_half_width(people - 1)
     trials = one.trials_for(0.15, 20)
-    assert one.of_group(20, trials) <= 0.15 < one.of_group(20, trials - 10)
+    assert one.group_half_width(20, trials) <= 0.15 < one.group_half_width(20, trials - 10)
     assert one.trials_for(0.05, 10) is None  # people differ by more
     assert one.participants_for(0.001) is None
-    assert one.of_group(1) == math.inf
+    assert one.group_half_width(1) == math.inf
 
 
 def test_percentages_are_those_of_garcia_perez():

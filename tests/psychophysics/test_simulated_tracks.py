@@ -94,6 +94,6 @@ def test_staircase_tracks_present_the_levels_of_the_rule(down_after, stop):
 def test_constant_tracks_are_answered_with_the_probability_of_the_level():
     found = constant_tracks(LEVELS, 4000, observers(2), draws(4000 * 15, 2))
     expected = observers(2).probability(np.array(LEVELS)[:, None]).T
-    for one, shares in zip(found.given(np.array(LEVELS)), expected, strict=True):
+    for one, shares in zip(found.person_answers(np.array(LEVELS)), expected, strict=True):
         assert (np.bincount(one.places) == 4000).all()
         assert np.abs(np.bincount(one.places, one.successes) / 4000 - shares).max() < 4 * math.sqrt(0.25 / 4000)

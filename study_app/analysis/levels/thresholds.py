@@ -42,7 +42,7 @@ from study_app.psychophysics.person_fit import (
     EARLY_TRIALS,
     MOST_CLUSTERED,
     PREFERENCE_SD,
-    Given,
+    PersonAnswers,
     PersonFit,
     early_change,
     error_bursts,
@@ -122,7 +122,7 @@ class ThresholdEstimate:
         return bool(self.change)
 
 
-def given_by(stimulus: Stimulus, rows: pd.DataFrame) -> Given:
+def person_answers(stimulus: Stimulus, rows: pd.DataFrame) -> PersonAnswers:
     """Return a participant's answers from rows of `tracks`, with mean delivered levels in the coordinate u."""
     requested, places = np.unique(rows["level"].to_numpy(dtype=float), return_inverse=True)
     delivered_levels = rows["level_delivered"].astype("Float64").to_numpy(dtype=float, na_value=math.nan)
@@ -131,7 +131,7 @@ def given_by(stimulus: Stimulus, rows: pd.DataFrame) -> Given:
     delivered = np.bincount(places[is_known], delivered_levels[is_known], minlength=k) / np.maximum(measured, 1)
     has_place = (measured > 0) & ((delivered > 0) | (stimulus.spacing == "linear"))
     mean_levels = np.where(has_place & (requested != 0), delivered, requested)
-    return Given(
+    return PersonAnswers(
         levels=np.array([stimulus.coordinate(float(level)) for level in mean_levels]),
         places=places,
         successes=rows["success"].to_numpy(dtype=bool),
@@ -273,7 +273,7 @@ def _flat_fits(block: LevelBlock, rows: pd.DataFrame) -> dict[Any, PersonFit]:
     fits = {}
     for person, person_rows in rows.groupby("participant"):
         grid = stimulus.analysis_grid(block.design, assumed, person_rows["session"].nunique())
-        fits[person] = given_by(stimulus, person_rows).fit(grid, two_intervals=two_intervals)
+        fits[person] = person_answers(stimulus, person_rows).fit(grid, two_intervals=two_intervals)
     return fits
 
 
@@ -282,7 +282,7 @@ def _estimate_participant(
 ) -> ThresholdEstimate:
     """Return a participant's threshold; ``all_rows`` includes the rows that are not analysed."""
     fit, posterior, rows = fitted.fit, fitted.posterior, fitted.rows
-    given, grid = fit.given, posterior.grid
+    given, grid = fit.answers, posterior.grid
     level_of, threshold, (low, high) = stimulus.level_of, posterior.threshold, posterior.interval
     others = posterior.others
     psi, (lowest, highest) = fit.expected(posterior), stimulus.domain
@@ -307,7 +307,7 @@ def _estimate_participant(
         open_end=_OPEN_ENDS[posterior.open_ends],
         fit_p=p_of_fit(np.bincount(cells, given.successes), np.bincount(cells), psi[first]),
         drift=drift(given.successes, psi),
-        change=10.0**decades - 1.0 if fit.named else 0.0,
+        change=10.0**decades - 1.0 if fit.has_changed else 0.0,
         reversal_mean=_reversal_mean(block, stimulus, all_rows),
         target_percent=None if block.method is None else block.method.target_percent,
         compared=None if math.isnan(compared) else level_of(compared),
@@ -419,7 +419,7 @@ def track_courses(block: LevelBlock, opened: pd.DataFrame, most: int) -> Iterato
     for standard, fitted in sorted(fits, key=lambda fit: fit[1].person)[:most]:
         person_rows, ends = fitted.rows, []
         for n in range(1, len(person_rows) + 1):
-            posterior = fitted.fit.after(n).reweighted(fitted.factors)
+            posterior = fitted.fit.posterior_after(n).reweighted(fitted.factors)
             ends.append([stimulus.level_of(end) for end in posterior.interval])
         low, high = np.array(ends).T
         yield TrackCourse(
@@ -427,7 +427,7 @@ def track_courses(block: LevelBlock, opened: pd.DataFrame, most: int) -> Iterato
             standard=None if pd.isna(standard) else float(standard),
             tracks=np.array([int(name.rpartition("/")[2]) for name in person_rows["track"]], np.int64),
             levels=person_rows["level"].to_numpy(dtype=float),
-            successes=fitted.fit.given.successes,
+            successes=fitted.fit.answers.successes,
             reversals=person_rows["reversal"].astype("boolean").to_numpy(dtype=bool, na_value=False),
             catches=person_rows["catch"].fillna(False).to_numpy(dtype=bool),
             noises=~person_rows["arrangement"].str.contains("C").to_numpy(dtype=bool),

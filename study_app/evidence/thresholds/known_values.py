@@ -44,8 +44,8 @@ from study_app.psychophysics.people import (
     LAPSES_MOST,
     MIXED,
     Person,
-    normal,
-    of_kind,
+    draw_normal,
+    person_of_kind,
 )
 from study_app.session.replay import replay
 from study_app.session.simulated.rehearsal import rehearse
@@ -226,7 +226,7 @@ class _KnownValue(ABC):
     def _draw_deviations(self, people: int, seed: int, number: int) -> tuple[list[float], Draw]:
         """Return the participants' deviations from the mean, in ln of `BETWEEN_PEOPLE`, and the random generator."""
         draw = stream(seed, f"validate/{self.name}/{number}/people").random
-        return [math.log(BETWEEN_PEOPLE) * normal(draw) for _ in range(people)], draw
+        return [math.log(BETWEEN_PEOPLE) * draw_normal(draw) for _ in range(people)], draw
 
     def _simulate_answers(
         self, observers: Sequence[Observer], seed: int, number: int, sense: Callable[[Any], float] = as_requested

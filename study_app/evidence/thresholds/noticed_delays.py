@@ -24,7 +24,7 @@ from study_app.protocol.randomization import Draw, stream
 from study_app.protocol.simulated import NO_FEATURES, Observer, Rater, rate, rater
 from study_app.protocol.trials import LINEAR_WIDTH
 from study_app.psychophysics.families import success
-from study_app.psychophysics.people import normal
+from study_app.psychophysics.people import draw_normal
 
 JND_S: Final = 0.045
 """Just-noticeable difference of a delay at 75 % correct in two intervals [s] (Vogels 2004)."""
@@ -131,7 +131,7 @@ def rate_delays(people: Sequence[Person], criterion_s: float, adapted_s: float, 
 
 
 def _rating(person: Person, delay_s: float, draw: Draw) -> int:
-    perceived_s = delay_s + person.observer.delay_noise_s * normal(draw)
+    perceived_s = delay_s + person.observer.delay_noise_s * draw_normal(draw)
     return rate([_STATEMENT], replace(NO_FEATURES, delay_s=perceived_s), person.rater, draw)[_STATEMENT]
 
 

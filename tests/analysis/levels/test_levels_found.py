@@ -158,7 +158,7 @@ def test_only_pairs_with_a_correct_answer_are_fitted_as_two_intervals(
     monkeypatch: pytest.MonkeyPatch, kind: str, correct: bool, two: bool
 ) -> None:
     fitted = SimpleNamespace(fit=lambda grid, *, two_intervals: (grid, two_intervals))
-    monkeypatch.setattr(thresholds, "given_by", lambda *_: fitted)
+    monkeypatch.setattr(thresholds, "person_answers", lambda *_: fitted)
     stimulus = SimpleNamespace(analysis_grid=lambda *_: "grid")
     block: Any = SimpleNamespace(
         stimulus=stimulus, assumed="a", design=SimpleNamespace(kind=kind), has_correct_answer=correct

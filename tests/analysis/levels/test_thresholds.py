@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.stats import norm
 
-from study_app.analysis.levels.thresholds import ThresholdEstimate, Thresholds, given_by, thresholds
+from study_app.analysis.levels.thresholds import ThresholdEstimate, Thresholds, person_answers, thresholds
 from study_app.analysis.results import LevelsResult
 from study_app.analysis.statistics.thresholds import group_mean, p_of_fit
 from study_app.protocol.model import Published
@@ -21,7 +21,7 @@ from study_app.psychophysics.grid import evenly, fit, group_priors
 from study_app.psychophysics.person_fit import (
     BURST_TRIALS,
     MOST_CLUSTERED,
-    Given,
+    PersonAnswers,
     PersonFit,
     early_change,
     error_bursts,
@@ -99,7 +99,7 @@ def test_levels_that_are_evenly_spaced_have_widths_and_thresholds_in_their_unit(
 
 def test_a_level_that_was_not_measured_counts_as_requested() -> None:
     one = rows({"P001": 0.2}).assign(level_delivered=pd.NA).astype({"level_delivered": "Float64"})
-    assert given_by(STIMULUS, one.assign(towards=0.0, before=0.0)).levels == pytest.approx(np.log10(LEVELS))
+    assert person_answers(STIMULUS, one.assign(towards=0.0, before=0.0)).levels == pytest.approx(np.log10(LEVELS))
 
 
 def test_noise_trials_determine_the_guess_rate_of_yes_no() -> None:
@@ -167,7 +167,7 @@ def test_a_threshold_that_changes_is_named_with_its_size_and_widens_the_interval
     assert one.change == pytest.approx(-0.75, abs=0.15)
     assert (other.drifts, other.change) == (False, 0.0)
     assert math.log(one.high / one.low) > 1.3 * math.log(other.high / other.low)
-    found = given_by(STIMULUS, learns.assign(towards=0.0, before=0.0)).fit(GRID, two_intervals=False)
+    found = person_answers(STIMULUS, learns.assign(towards=0.0, before=0.0)).fit(GRID, two_intervals=False)
     assert found.change == pytest.approx(math.log10(1 + one.change), abs=0.02)
     in_middle = np.log10(levels) + np.repeat([found.change / 4, -found.change / 4], len(levels) // 2)  # then easier
     right = learns["success"].to_numpy(dtype=float)
@@ -200,7 +200,7 @@ def test_errors_in_easy_trials_of_people_with_wide_functions_are_no_preferences(
         places, towards = draw.integers(0, len(levels), n), draw.permuted(np.tile((1.0, -1.0), n // 2))
         right = sensed[places] + draw.normal(size=n) > 0
         before = np.append(0.0, np.where(right, towards, -towards)[:-1])
-        given = Given(levels, places, right, towards, before, np.linspace(0, 1, n))
+        given = PersonAnswers(levels, places, right, towards, before, np.linspace(0, 1, n))
         squares += (given.fit(GRID, two_intervals=True).shifts ** 2).tolist()
     information = np.mean(norm.pdf(sensed) ** 2 / (norm.cdf(sensed) * norm.cdf(-sensed)))
     by_chance = math.sqrt(2 / (n * information))  # the standard errors of two preferences
@@ -247,7 +247,7 @@ def test_an_end_of_an_interval_that_the_answers_leave_open_is_marked(planted: fl
     _, *own = thresholds(block(), frame)
     low, high = STIMULUS.domain
     wider = replace(GRID, thresholds=evenly(low - 1.5, high + 1.5, 199))
-    answers = [given_by(STIMULUS, one.assign(towards=0.0, before=0.0)) for _, one in frame.groupby("participant")]
+    answers = [person_answers(STIMULUS, one.assign(towards=0.0, before=0.0)) for _, one in frame.groupby("participant")]
     flat = [one.fit(wider, two_intervals=False).flat for one in answers]
     for one, fitted, factors in zip(own, flat, group_priors(flat, WIDTH_PRIOR).factors, strict=True):
         _, further = fitted.reweighted(factors).interval
@@ -293,7 +293,7 @@ def fitted(u: Floats, right: NDArray[np.bool_]) -> PersonFit:
     """Return the fit to the answers at the levels of each trial."""
     levels, places = np.unique(u, return_inverse=True)
     nothing, done = np.zeros(len(u)), np.linspace(0, 1, len(u))
-    given = Given(levels=levels, places=places, successes=right, towards=nothing, before=nothing, done=done)
+    given = PersonAnswers(levels=levels, places=places, successes=right, towards=nothing, before=nothing, done=done)
     return given.fit(GRID, two_intervals=False)
 
 
@@ -354,7 +354,7 @@ def test_clusters_are_weighted_by_the_answers_just_before() -> None:
     fits = [fitted(draw.choice([-1.0, -0.7, -0.4], 40), draw.random(40) < 0.75) for _ in range(3)]
     score = information = 0.0
     for person in fits:
-        psi, right = person.expected(person.flat), person.given.successes
+        psi, right = person.expected(person.flat), person.answers.successes
         for trial in range(40):
             evidence = 0.0
             for begin in range(max(0, trial - BURST_TRIALS + 1), trial):

@@ -88,7 +88,7 @@ def test_the_errors_are_those_that_check_expects() -> None:
     alone = expected(plan)
     assert alone is not None
     assert found.spread == pytest.approx(alone.spread * math.log(10), rel=0.15)
-    assert found.half(0) == pytest.approx(alone.of_group(20), rel=0.15)
+    assert found.half(0) == pytest.approx(alone.group_half_width(20), rel=0.15)
 
 
 def test_exponents_and_d_primes_have_the_spread_that_check_expects() -> None:
@@ -107,7 +107,7 @@ def test_exponents_and_d_primes_have_the_spread_that_check_expects() -> None:
         assert plan is not None
         alone = expected_mean(plan.with_trials(trials))
         assert found.found[block, trials].spread == pytest.approx(alone.spread / alone.threshold, rel=0.15)
-        assert found.found[block, trials].half(1) == pytest.approx(alone.of_group(20), rel=0.15)
+        assert found.found[block, trials].half(1) == pytest.approx(alone.group_half_width(20), rel=0.15)
         assert found.found[block, trials].half(0) > 3 * found.found[block, trials].half(1)  # two have an interval
         said = threshold_markdown(found)
         assert f"mean {'exponent of 0.44' if block == 'thickness' else 'd′ of 1'}" in said
@@ -164,7 +164,7 @@ def test_ratings_have_the_spread_that_check_expects() -> None:
         assert plan is not None
         alone, of = expected_mean(plan.with_trials(trials)), found.found["thicker", trials]
         assert of.spread == pytest.approx(alone.spread, rel=0.15)
-        assert of.half(1) == pytest.approx(alone.of_group(20), rel=0.15)
+        assert of.half(1) == pytest.approx(alone.group_half_width(20), rel=0.15)
         assert of.half(0) > 1.5 * of.half(1)
     said = threshold_markdown(found)
     assert "mean d_a of 1" in said

@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from study_app.analysis.levels.thresholds import given_by
+from study_app.analysis.levels.thresholds import person_answers
 from study_app.analysis.planning.power_curves import interval
 from study_app.protocol.trials.designs import default_design
 from study_app.protocol.trials.stimuli import SESSION_SD, WIDTH_PRIOR, Stimulus
@@ -87,7 +87,7 @@ def fitted(own: pd.DataFrame, correct: np.ndarray, stimulus: Stimulus, grid: Gri
     rows = pd.DataFrame({"level": own["stimulus"], "success": correct, "towards": towards})
     before = np.concatenate(([0.0], np.where(correct, towards, -towards)[:-1]))
     rows = rows.assign(level_delivered=rows["level"], before=before)
-    flat = given_by(stimulus, rows).fit(grid, two_intervals=True).flat
+    flat = person_answers(stimulus, rows).fit(grid, two_intervals=True).flat
     return flat.reweighted(group_priors([flat], WIDTH_PRIOR).factors[0])
 
 

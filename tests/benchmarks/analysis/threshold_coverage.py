@@ -95,8 +95,8 @@ def answered(case: Case, planted: np.ndarray, draw: np.random.Generator, trials:
     firsts = draw.permuted(np.tile((True, False), (len(planted), trials // 2)), axis=1)
     for trial, first in enumerate(firsts.T):
         posterior /= posterior.sum(axis=(1, 2), keepdims=True)
-        place = np.where(catch[:, trial], len(search.levels) - 1, search.next_of(posterior))
-        now = planted * person.at(trial / (trials - 1))
+        place = np.where(catch[:, trial], len(search.levels) - 1, search.choose_levels(posterior))
+        now = planted * person.relative_threshold(trial / (trials - 1))
         ratio = np.log1p(np.array(stimulus.grid)[place]) / np.log1p(now)
         sensed = NormalDist().inv_cdf(0.75) * ratio ** (1 / person.width)
         towards_first = np.where(first, sensed, -sensed) + person.criterion + person.repeats * last

@@ -122,10 +122,10 @@ def test_the_planned_participants_are_said_before_those_a_precision_requires(dec
     protocol = study(more=f"analysis = {{ {table} }}\n")
     found = expected_of(plan_of(protocol))
     said = dict(precision_rows(protocol, protocol.blocks["thicker"]))["Expected precision"]
-    planned = f"; ±{100 * found.of_group(31):.0f} % for 31 participants"
+    planned = f"; ±{100 * found.group_half_width(31):.0f} % for 31 participants"
     required = f"; ±20 % requires {found.participants_for(0.2)} participants"
     assert [text for text in (planned, required) if text in said] == (
         [planned] if decided[0] else [required] if decided[1] else []
     )
     warned = list(imprecise(protocol, protocol.blocks["thicker"]))
-    assert bool(warned) == (None not in decided and found.of_group(31) > 0.15)
+    assert bool(warned) == (None not in decided and found.group_half_width(31) > 0.15)
