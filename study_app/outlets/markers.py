@@ -34,7 +34,7 @@ CODES: Final[Mapping[str, int]] = {
     "resumed": 43,
     "broke": 44,
 }
-"""The trigger code of each event that has one: a byte; 0 is the idle state of a port."""
+"""The trigger codes of events. A code is a byte; 0 is the idle state of a port."""
 _UNCODED: Final = frozenset(
     (
         "page_shown",
@@ -50,32 +50,46 @@ _UNCODED: Final = frozenset(
         "device_reconnected",
     )
 )
-"""Events that are markers without a trigger code."""
-_SAID: Final = ("trial", "attempt", "interval", "block", "phase", "code", "item", "form", "page", "target", "by")
+"""Events whose markers have no trigger code."""
+_MARKER_FIELDS: Final = (
+    "trial",
+    "attempt",
+    "interval",
+    "block",
+    "phase",
+    "code",
+    "item",
+    "form",
+    "page",
+    "target",
+    "by",
+)
 """The fields of an event that a marker contains; ``code`` is the blinded one, such as L2."""
-ROOM: Final = 1000
-"""Greatest number of waiting markers."""
+MAX_WAITING: Final = 1000
+"""Maximum number of queued markers."""
 HANGS_S: Final = 5.0
-"""A sink that takes longer over one marker counts as lost at the next. [choice]"""
+"""Time limit for sending a marker: a sink that exceeds it counts as lost when the next one is queued. [choice]"""
 _ADVICE: Final = "sending has stopped; check the connection, then end and resume the session"
 PATIENCE_S: Final = 1.0
+"""Time limit for sending the queued markers when a sink is closed."""
 HIGH_S: Final = 0.010
+"""Duration of a code on a port."""
 LOW_S: Final = 0.004
-"""Least time at 0 between two codes, so that an amplifier at 500 Hz samples it."""
+"""Minimum time at 0 between two codes, so that an amplifier at 500 Hz samples it."""
 
 
 @dataclass(frozen=True, slots=True)
 class Marker:
     """An event for other programs.
 
-    ``time_ns`` is its time on the servo's clock, ``t_s`` that on the session's, as in the journal. ``byte`` is its
-    trigger code, None for an event without one.
+    ``time_ns`` is the event's time on the servo's clock, ``t_s`` that on the session's clock, as in the journal.
+    ``fields`` has the permitted fields of the journal's line. ``byte`` is the trigger code, None if the event has none.
     """
 
     event: str
     time_ns: int
     t_s: float
-    said: tuple[tuple[str, Any], ...] = ()
+    fields: tuple[tuple[str, Any], ...] = ()
 
     @property
     def byte(self) -> int | None:
@@ -83,7 +97,7 @@ class Marker:
 
     @property
     def text(self) -> str:
-        line = {"event": self.event, **dict(self.said), "t_s": round(self.t_s, 6)}
+        line = {"event": self.event, **dict(self.fields), "t_s": round(self.t_s, 6)}
         if self.byte is not None:
             line["trigger"] = self.byte
         return json.dumps(line, ensure_ascii=False, separators=(",", ":"))
@@ -103,8 +117,8 @@ def marker_of(event: str, t_s: float, origin_ns: int, fields: Mapping[str, Any])
     """
     if event not in CODES and event not in _UNCODED:
         return None
-    said = tuple((name, fields[name]) for name in _SAID if fields.get(name) is not None)
-    return Marker(event, origin_ns + round(t_s * 1e9), t_s, said)
+    permitted = tuple((name, fields[name]) for name in _MARKER_FIELDS if fields.get(name) is not None)
+    return Marker(event, origin_ns + round(t_s * 1e9), t_s, permitted)
 
 
 class Sink(Protocol):
@@ -135,8 +149,8 @@ class Sink(Protocol):
 class SinkKind:
     """The descriptor of a kind of sink.
 
-    ``name`` is the part of an address before the colon, ``example`` an address; ``open`` receives the part after the
-    colon and the servo's clock [ns].
+    ``name`` is the part of an address before the colon, ``example`` an example address; ``open`` takes the part after
+    the colon and the servo's clock [ns].
     """
 
     name: str
@@ -161,8 +175,8 @@ class SinkThread:
         self._waiting: deque[Marker] = deque()
         self._changed = threading.Condition()
         self._closing = False
-        self._since_s: float | None = None  # of the marker that is being sent
-        self._thread = threading.Thread(target=self._work, name=f"outlet {sink.title}", daemon=True)
+        self._send_began_s: float | None = None  # for the marker that is being sent
+        self._thread = threading.Thread(target=self._send_markers, name=f"outlet {sink.title}", daemon=True)
         self._thread.start()
 
     def mark(self, marker: Marker) -> None:
@@ -170,14 +184,14 @@ class SinkThread:
         with self._changed:
             if self.lost or self._closing:
                 return
-            since_s = self._since_s  # read once, since the thread may clear it at any time
-            taken_s = 0.0 if since_s is None else perf_counter() - since_s
+            began_s = self._send_began_s  # read once, since the thread may clear it at any time
+            taken_s = 0.0 if began_s is None else perf_counter() - began_s
             if taken_s > HANGS_S:
                 self._give_up(
                     f"a marker had still not been sent after {taken_s:.1f} s (limit {HANGS_S:g} s): {_ADVICE}"
                 )
-            elif len(self._waiting) >= ROOM:
-                self._give_up(f"the queue of unsent markers is full ({ROOM:,}): {_ADVICE}")
+            elif len(self._waiting) >= MAX_WAITING:
+                self._give_up(f"the queue of unsent markers is full ({MAX_WAITING:,}): {_ADVICE}")
             else:
                 self._waiting.append(marker)
                 self._changed.notify_all()
@@ -188,11 +202,11 @@ class SinkThread:
             self._changed.notify_all()
         self._thread.join(patience_s)
 
-    def _work(self) -> None:
+    def _send_markers(self) -> None:
         try:
-            while (marker := self._next()) is not None:
+            while (marker := self._next_marker()) is not None:
                 self.sink.send(marker)
-                self._since_s = None
+                self._send_began_s = None
         except OutletError as error:
             with self._changed:
                 self._give_up(str(error))
@@ -209,12 +223,12 @@ class SinkThread:
         self._waiting.clear()
         self._changed.notify_all()
 
-    def _next(self) -> Marker | None:
+    def _next_marker(self) -> Marker | None:
         with self._changed:
             self._changed.wait_for(lambda: self._waiting or self._closing or self.lost)
             if not self._waiting:
                 return None
-            self._since_s = perf_counter()
+            self._send_began_s = perf_counter()
             return self._waiting.popleft()
 
 
@@ -239,14 +253,14 @@ class TriggerSink:
     Parameters
     ----------
     port : TriggerPort
-        An open port; it is set to 0.
+        An open port; it is set to 0 at the start.
     now_ns : callable
         The servo's clock [ns].
 
     Raises
     ------
     OutletError
-        The port does not accept a byte; it is closed then.
+        The port does not accept a byte; the port has been closed.
 
     Attributes
     ----------
@@ -260,7 +274,7 @@ class TriggerSink:
         self._port = port
         self._now_ns = now_ns
         self.delays_ns: list[int] = []
-        self._clear = 0.0
+        self._ready_s = 0.0  # when the port has been at 0 for long enough
         try:
             port.write(0)
         except OutletError:
@@ -276,15 +290,15 @@ class TriggerSink:
         return {"address": self._port.address, "high_ms": 1e3 * HIGH_S, "codes": dict(CODES)}
 
     def send(self, marker: Marker) -> None:
-        """Send the code of an event, and 0 after `HIGH_S`; an event without a code sends nothing."""
+        """Send the code of an event, and 0 after `HIGH_S`; do nothing for an event without a code."""
         if marker.byte is None:
             return
-        time.sleep(max(0.0, self._clear - time.perf_counter()))
+        time.sleep(max(0.0, self._ready_s - time.perf_counter()))
         self._port.write(marker.byte)
         self.delays_ns.append(self._now_ns() - marker.time_ns)
         time.sleep(HIGH_S)
         self._port.write(0)
-        self._clear = time.perf_counter() + LOW_S
+        self._ready_s = time.perf_counter() + LOW_S
 
     def close(self) -> None:
         self._port.close()

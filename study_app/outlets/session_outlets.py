@@ -1,6 +1,6 @@
-"""The outlets of a session: opened before it, fed with its events, and closed after it.
+"""The outlets of a session, which are opened before it, get its events and are closed after it.
 
-An outlet that cannot be opened or fails later is in `Outlets.lost` with the reason; the session continues without it.
+If an outlet cannot be opened or fails later, `Outlets.lost` gives the reason; the session continues without it.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -11,11 +11,11 @@ from typing import Any, Final, Literal, Protocol, TypeAlias
 from study_app.discovery import Registry, Returns
 from study_app.errors import OutletError
 from study_app.outlets.markers import Marker, Sink, SinkKind, SinkThread
-from study_app.outlets.sinks import SINKS as OWN
+from study_app.outlets.sinks import SINKS as BUILT_IN_SINKS
 from study_app.outlets.streams import SampleStream
 
 SampleChoice: TypeAlias = Literal["off", "single-blind", "always"]
-"""The studies in which samples are streamed: none, those that are not double-blind, all."""
+"""Which studies stream samples: none, those that are not double-blind, or all."""
 
 
 class _SampledServo(Protocol):
@@ -31,9 +31,9 @@ class _SampledServo(Protocol):
 class OutletStatus:
     """The state of an outlet, for the pre-flight.
 
-    ``listens`` tells whether a program receives it, None if unknown; ``lost`` is the reason why it does not work, or
-    "". ``withheld`` means that it is off because the study is double-blind, ``shows_force`` that it shows the force in
-    a double-blind study.
+    ``listens`` is whether a program receives its data, None if unknown; ``lost`` is the reason why it does not work, or
+    "". ``withheld`` means that it is off because the study is double-blind, ``shows_force`` that it reveals the force
+    in a double-blind study.
     """
 
     title: str
@@ -44,7 +44,7 @@ class OutletStatus:
 
 
 _IS_SINK: Final = Returns("a sink", lambda value: callable(value.send) and callable(value.close))
-SINKS: Final = Registry("outlet", {kind.name: kind for kind in OWN}, SinkKind, "name", {"open": _IS_SINK})
+SINKS: Final = Registry("outlet", {kind.name: kind for kind in BUILT_IN_SINKS}, SinkKind, "name", {"open": _IS_SINK})
 """The kinds of sinks by name."""
 
 
@@ -77,25 +77,25 @@ def open_sink(address: str, now_ns: Callable[[], int]) -> Sink:
 
 
 class Outlets:
-    """The outlets of a session: markers to sinks, by their addresses, and samples; `mark` never waits."""
+    """The outlets of a session: sinks of markers at ``addresses``, and a stream of samples; `mark` never waits."""
 
     def __init__(self, addresses: Sequence[str], samples: SampleChoice, servo: _SampledServo, blinding: str) -> None:
         self._failed: dict[str, str] = {}
         self._threads: list[SinkThread] = []
         self._samples: SampleStream | None = None
-        self._double = blinding == "double"
-        self._withheld = self._double and samples == "single-blind"
+        self._is_double_blind = blinding == "double"
+        self._is_withheld = self._is_double_blind and samples == "single-blind"
         for address in addresses:
             kind = SINKS.get(address.partition(":")[0])
             with self._store_failure("Triggers" if kind is None else kind.title):
                 self._threads.append(SinkThread(open_sink(address, servo.now_ns)))
-        if samples != "off" and not self._withheld:
+        if samples != "off" and not self._is_withheld:
             with self._store_failure(SampleStream.title):
                 self._samples = SampleStream(servo.telemetry, servo.rate_hz, servo.now_ns)
 
     @contextmanager
     def _store_failure(self, title: str) -> Iterator[None]:
-        """Store the reason if an outlet cannot be opened, whatever the error, since no session depends on it."""
+        """Catch any error of opening an outlet, which no session depends on, and store it as the reason."""
         try:
             yield
         except OutletError as error:
@@ -105,7 +105,7 @@ class Outlets:
 
     @property
     def described(self) -> dict[str, Any]:
-        descriptions = {sink.title: dict(sink.described) for sink in self._open()}
+        descriptions = {sink.title: dict(sink.described) for sink in self._open_outlets()}
         return descriptions | {title: {"failed": reason} for title, reason in self._failed.items()}
 
     @property
@@ -123,12 +123,12 @@ class Outlets:
                 title=sink.title,
                 listens=sink.listens,
                 lost=lost.get(sink.title, ""),
-                shows_force=self._double and sink is self._samples,
+                shows_force=self._is_double_blind and sink is self._samples,
             )
-            for sink in self._open()
+            for sink in self._open_outlets()
         ]
         statuses += [OutletStatus(title=title, lost=reason) for title, reason in self._failed.items()]
-        if self._withheld:
+        if self._is_withheld:
             statuses.append(OutletStatus(title=SampleStream.title, withheld=True))
         return tuple(statuses)
 
@@ -143,7 +143,7 @@ class Outlets:
         if self._samples is not None:
             self._samples.close()
 
-    def _open(self) -> Iterator[Sink | SampleStream]:
+    def _open_outlets(self) -> Iterator[Sink | SampleStream]:
         yield from (thread.sink for thread in self._threads)
         if self._samples is not None:
             yield self._samples

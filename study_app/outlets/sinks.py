@@ -1,8 +1,8 @@
 """Sinks of markers: a stream of the Lab Streaming Layer, and trigger codes on a parallel or serial port.
 
-The parallel port is one of Linux, by the ioctl calls of ``ppdev``: eight data lines and a strobe. The code is written
-to the data lines before the strobe is pulsed, so that a receiver that latches on the strobe reads settled lines; one
-that polls the lines reads them while the code is held. The serial port (pyserial, extra ``triggers``) gets one byte,
+The parallel port needs Linux and its ``ppdev`` driver; it has eight data lines and a strobe. The code is written to the
+data lines before the strobe is pulsed, so that a receiver that latches on the strobe reads settled lines; one that
+polls the lines reads them while the code is held. The serial port (pyserial, extra ``triggers``) gets one byte,
 8N1, without flow control.
 """
 
@@ -13,7 +13,7 @@ from typing import Any, Final
 
 from study_app.errors import OutletError
 from study_app.outlets.markers import CODES, Marker, SinkKind, TriggerPort, TriggerSink
-from study_app.outlets.streams import MARKERS, ClockMapping, close_outlet, library, stream_info
+from study_app.outlets.streams import MARKERS, ClockMapping, close_outlet, import_pylsl, stream_info
 
 # linux/ppdev.h
 PPCLAIM: Final = 0x708B
@@ -33,7 +33,7 @@ class _MarkerStream:
     title = "LSL markers"
 
     def __init__(self, now_ns: Callable[[], int]) -> None:
-        lsl = library()
+        lsl = import_pylsl()
         info = stream_info(lsl, MARKERS, "Markers", ("marker",), 0.0, "string")
         codes = info.desc().append_child("triggers")
         for event, byte in CODES.items():
@@ -130,7 +130,7 @@ class _SerialPort:
         try:
             self._port: Any = serial.Serial(name, int(baud or _BAUD), write_timeout=_TIMEOUT_S)
         except (*self._failures, ValueError, OverflowError) as error:
-            raise OutletError(f"{self.address} cannot be opened: {_cause(error)}") from error
+            raise OutletError(f"{self.address} cannot be opened: {_error_text(error)}") from error
 
     def write(self, byte: int) -> None:
         """Send a byte; returns when the driver has sent it.
@@ -144,14 +144,14 @@ class _SerialPort:
             self._port.write(bytes((byte,)))
             self._port.flush()
         except self._failures as error:
-            raise OutletError(f"{self.address} failed: {_cause(error)}") from error
+            raise OutletError(f"{self.address} failed: {_error_text(error)}") from error
 
     def close(self) -> None:
         self._port.close()
 
 
-def _cause(error: Exception) -> str:
-    """Return the system's message: of the error's number, or as pyserial quotes it on Windows; else the error's own."""
+def _error_text(error: Exception) -> str:
+    """Return the system's message by the error's number, or as quoted by pyserial on Windows; else the error's text."""
     number = getattr(error, "errno", None)
     if isinstance(number, int):
         return os.strerror(number)
@@ -159,13 +159,14 @@ def _cause(error: Exception) -> str:
     return str(error) if quoted is None else quoted[2]
 
 
-def _port(kind: Callable[[str], TriggerPort]) -> Callable[[str, Callable[[], int]], TriggerSink]:
+def _port_opener(kind: Callable[[str], TriggerPort]) -> Callable[[str, Callable[[], int]], TriggerSink]:
+    """Return a function that opens a sink on a port of this kind."""
     return lambda place, now_ns: TriggerSink(kind(place), now_ns)
 
 
 SINKS: Final = (
     SinkKind("lsl", _MarkerStream.title, example="lsl", open=lambda _place, now_ns: _MarkerStream(now_ns)),
-    SinkKind("parallel", ParallelPort.title, example="parallel:/dev/parport0", open=_port(ParallelPort)),
-    SinkKind("serial", _SerialPort.title, example="serial:/dev/ttyUSB0", open=_port(_SerialPort)),
+    SinkKind("parallel", ParallelPort.title, example="parallel:/dev/parport0", open=_port_opener(ParallelPort)),
+    SinkKind("serial", _SerialPort.title, example="serial:/dev/ttyUSB0", open=_port_opener(_SerialPort)),
 )
 """The kinds of sinks."""

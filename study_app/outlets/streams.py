@@ -1,9 +1,9 @@
-"""Streams of the Lab Streaming Layer (extra ``lsl``), and the servo's samples as one of them, at the servo's rate.
+"""Streams of the Lab Streaming Layer (extra ``lsl``), and a stream of the servo's samples at the servo's rate.
 
 A separate thread reads the telemetry like the recorder's readers, so the servo's thread never calls the library, and
 neither a window nor the disk delays the stream. It runs from before the first page to the end of the session, with or
-without recordings. Every sample has the time at which the device was read, by a mapping of the servo's clock to that of
-the library, measured at the start and while it runs.
+without recordings. Every sample has the time at which the device was read; the servo's clock is mapped to the
+library's by measurements at the start and while the stream runs.
 """
 
 import platform
@@ -28,14 +28,16 @@ _MEASURE_EVERY_S: Final = 5.0
 _READINGS: Final = 8
 _SEND_EVERY_S: Final = 0.01
 PATIENCE_S: Final = 1.0
-_STREAMED: Final = tuple(sorted((it for it in SAMPLE_FIELDS if it.stream), key=lambda it: it.name == "tick"))
-"""Fields of a sample in the order of their channels: the tick's number comes last, as it came last into the stream."""
+_STREAMED: Final = tuple(
+    sorted((field for field in SAMPLE_FIELDS if field.stream), key=lambda field: field.name == "tick")
+)
+"""Fields of a sample in the order of their channels; the tick is last, since it was added last."""
 TICKS: Final = 2**24
-"""Ticks are numbered modulo this, the first integer beyond which 32-bit floats are not exact: after 4.7 h from 0 on."""
+"""Ticks are numbered modulo this, up to which 32-bit floats are exact; they restart at 0 after 4.7 h."""
 CHANNELS: Final = tuple(f"{name} {field.unit}".rstrip() for field in _STREAMED for name in field.named(field.stream))
 
 
-def library() -> Any:
+def import_pylsl() -> Any:
     """Return the module ``pylsl``.
 
     Raises
@@ -53,14 +55,14 @@ def library() -> Any:
 def stream_info(lsl: Any, name: str, kind: str, labels: Sequence[str], rate_hz: float, form: str) -> Any:
     """Return the description of a stream: its name, its channels and the sender, without session data.
 
-    ``labels`` are those of the channels, followed by a blank and the unit if there is one.
+    ``labels`` are the names of the channels, each followed by a space and the unit if it has one.
     """
     source = f"{name} of {platform.node()}"
     info = lsl.StreamInfo(name, kind, len(labels), rate_hz, form, source)
-    about = info.desc()
-    about.append_child_value("manufacturer", "liquid-study")
-    about.append_child_value("version", study_app.__version__)
-    channels = about.append_child("channels")
+    description = info.desc()
+    description.append_child_value("manufacturer", "liquid-study")
+    description.append_child_value("version", study_app.__version__)
+    channels = description.append_child("channels")
     for label in labels:
         title, _, unit = label.partition(" ")
         channel = channels.append_child("channel")
@@ -71,17 +73,17 @@ def stream_info(lsl: Any, name: str, kind: str, labels: Sequence[str], rate_hz: 
 
 
 def close_outlet(outlet: Any) -> None:
-    """Wait for delivery of the last samples if a program receives them; the outlet ends with its last reference."""
+    """Wait until a receiving program has the last samples; the library closes the outlet with its last reference."""
     if outlet is not None and outlet.have_consumers():
         time.sleep(_DELIVERY_S)
 
 
 class ClockMapping:
-    """The offset between two clocks, as an interval that certainly contains it.
+    """The offset between two clocks, with bounds that are certain.
 
-    A reading of the other clock between two of the servo's bounds the offset. Bounds of later readings are intersected
-    with earlier ones; if the intersection is empty, the clocks have drifted and the newest bounds count. Use it from
-    one thread.
+    A reading of the other clock between two readings of the servo's clock bounds the offset. The bounds of later
+    readings are intersected with the earlier ones; if the intersection is empty, the clocks have drifted, and only the
+    newest bounds count. Call it from only one thread.
     """
 
     def __init__(self, now_ns: Callable[[], int], other_s: Callable[[], float]) -> None:
@@ -104,7 +106,7 @@ class ClockMapping:
         self._due_s = time.perf_counter() + _MEASURE_EVERY_S
 
     def measure_if_due(self) -> None:
-        """Measure it again if the last measurement is older than `_MEASURE_EVERY_S`."""
+        """Measure the offset again if the last measurement is older than `_MEASURE_EVERY_S`."""
         if time.perf_counter() >= self._due_s:
             self.measure()
 
@@ -121,7 +123,8 @@ class ClockMapping:
 
 def channels_of(samples: Any) -> NDArray[np.float32]:
     """Return the channels of the stream for samples (array of ``layout.SAMPLE``)."""
-    columns = [samples[it.name] % TICKS if it.name == "tick" else samples[it.name] for it in _STREAMED]
+    names = [field.name for field in _STREAMED]
+    columns = [samples[name] % TICKS if name == "tick" else samples[name] for name in names]
     return np.column_stack(columns).astype(np.float32)
 
 
@@ -131,18 +134,18 @@ class SampleStream:
     Parameters
     ----------
     telemetry : Telemetry
-        The servo's (``haptics.runtime.telemetry``).
+        The servo's telemetry (``haptics.runtime.telemetry``).
     rate_hz : float
-        Its nominal rate.
+        The servo's nominal rate.
     now_ns : callable
-        Its clock [ns].
+        The servo's clock [ns].
 
     Attributes
     ----------
     sent : int
         Number of samples sent so far.
     lost : str
-        The reason why samples are missing; empty while none are.
+        The reason why samples are missing; empty if none are.
 
     Raises
     ------
@@ -153,14 +156,14 @@ class SampleStream:
     title = "LSL samples"
 
     def __init__(self, telemetry: Any, rate_hz: float, now_ns: Callable[[], int]) -> None:
-        lsl = library()
+        lsl = import_pylsl()
         self.mapping = ClockMapping(now_ns, lsl.local_clock)
         self._outlet: Any = lsl.StreamOutlet(stream_info(lsl, SAMPLES, "Haptics", CHANNELS, rate_hz, "float32"))
         self._reader = telemetry.reader()
         self.sent = 0
         self.lost = ""
         self._ending = threading.Event()
-        self._thread = threading.Thread(target=self._work, name="outlet LSL samples", daemon=True)
+        self._thread = threading.Thread(target=self._send_samples, name="outlet LSL samples", daemon=True)
         self._thread.start()
 
     @property
@@ -176,7 +179,7 @@ class SampleStream:
         self._ending.set()
         self._thread.join(PATIENCE_S)
 
-    def _work(self) -> None:
+    def _send_samples(self) -> None:
         try:
             while not self._ending.wait(_SEND_EVERY_S):
                 self.send_new()
@@ -187,7 +190,7 @@ class SampleStream:
         self._outlet = None
 
     def send_new(self) -> None:
-        """Send the samples since the previous call; called in the stream's thread."""
+        """Send the samples since the previous call; only for the stream's thread."""
         samples = self._reader.read()
         if self._reader.dropped:
             self.lost = (

@@ -33,7 +33,7 @@ class Sink:
         return {"address": "test:port"}
 
     def send(self, given: Marker) -> None:
-        trial = dict(given.said).get("trial")
+        trial = dict(given.fields).get("trial")
         if trial == self.fails_at:
             raise OutletError("test:port failed: it was unplugged")
         if trial == self.hangs_at:

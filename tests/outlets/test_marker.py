@@ -137,7 +137,7 @@ def test_a_sink_that_is_idle_for_long_hangs_not(clock: Clock) -> None:
     thread = SinkThread(sink)
     for trial in (1, 2, 3):
         thread.mark(marker(trial))
-        wait_until(lambda: not thread._waiting and thread._since_s is None)
+        wait_until(lambda: not thread._waiting and thread._send_began_s is None)
         clock.now_s += 2 * HANGS_S
     thread.close(5)
     assert (len(sink.sent), thread.lost) == (3, "")
@@ -151,7 +151,7 @@ def test_a_marker_may_be_sent_while_the_next_one_is_handed_over(clock: Clock) ->
 
     def finish() -> None:
         sink.go_on.set()
-        wait_until(lambda: thread._since_s is None)
+        wait_until(lambda: thread._send_began_s is None)
 
     clock.read = finish
     thread.mark(marker(2))
@@ -160,7 +160,7 @@ def test_a_marker_may_be_sent_while_the_next_one_is_handed_over(clock: Clock) ->
 
 
 def test_a_sink_that_hangs_delays_neither_markers_nor_the_end(monkeypatch) -> None:
-    monkeypatch.setattr(module, "ROOM", 3)
+    monkeypatch.setattr(module, "MAX_WAITING", 3)
     sink = Sink(hangs_at=1)
     thread = SinkThread(sink)
     thread.mark(marker(1))

@@ -19,7 +19,7 @@ from typing import Any, Final
 import numpy as np
 
 from study_app.haptics.runtime.clocks import SystemClock
-from study_app.outlets.streams import MARKERS, SAMPLES, ClockMapping, library
+from study_app.outlets.streams import MARKERS, SAMPLES, ClockMapping, import_pylsl
 
 _RESOLVE_TIMEOUT_S: Final = 30.0
 _POLL_S: Final = 0.002
@@ -45,7 +45,7 @@ def _await_end(ending: threading.Event) -> None:
 
 def _listen() -> dict[str, Any]:
     """Receive both streams until the input closes; return the received data."""
-    lsl, clock = library(), SystemClock()
+    lsl, clock = import_pylsl(), SystemClock()
     markers, samples = _open_inlet(lsl, MARKERS), _open_inlet(lsl, SAMPLES)
     correction_s = markers.time_correction(_RESOLVE_TIMEOUT_S)
     mapping = ClockMapping(clock.now_ns, lsl.local_clock)
