@@ -13,13 +13,13 @@ from study_app.errors import VideoError
 EXTRA: Final = "needs the optional video extra: pip install 'liquid-study[video]'"
 _SIZE: Final = (1280, 720)
 """Size of scaled frames until the tank sets its own [px]."""
-_NICE: Final = 5
-"""Nice level of a decoding thread above the others, if the system permits one per thread. [choice]"""
+_NICE_LEVEL: Final = 5
+"""Nice level of decoding threads, on systems with a level for each thread. [choice]"""
 SECOND_NS: Final = 1_000_000_000
 _USUAL_RATE_HZ: Final = 30.0
 _RATES_HZ: Final = (1.0, 240.0)
-OF_FILE: Final = {"format_whitelist": "mov,mp4,m4a,3gp,3g2,mj2,matroska,webm,avi,mpeg,mpegts,ogg"}
-"""FFmpeg's names of containers that contain the video: others, such as ffconcat, refer to another file."""
+FILE_OPTIONS: Final = {"format_whitelist": "mov,mp4,m4a,3gp,3g2,mj2,matroska,webm,avi,mpeg,mpegts,ogg"}
+"""Options of a file: FFmpeg's names of the accepted formats. Others, such as ffconcat, may refer to other files."""
 
 
 class Pixels(NamedTuple):
@@ -37,7 +37,7 @@ def is_installed() -> bool:
 
 
 def open_video(source: str, *, kind: str | None = None, timeout: Any = None, **options: str) -> Any:
-    """Open a source with PyAV and return its container; ``kind`` is FFmpeg's name of a device or format."""
+    """Open a source and return its PyAV container; ``kind`` is FFmpeg's name of a type of device, or of a format."""
     try:
         import av  # noqa: PLC0415 - an optional extra
         from av.error import FFmpegError  # noqa: PLC0415
@@ -62,7 +62,7 @@ def failure_reason(error: Exception) -> str:
     """Return the reason why a video cannot be read, as reported by the system or FFmpeg."""
     if type(error).__name__ == "ExitError":  # FFmpeg: "Immediate exit requested", after its time limit
         return "no data arrived in time"
-    if isinstance(error, UnicodeError):  # PyAV reads a name in it
+    if isinstance(error, UnicodeError):  # PyAV cannot decode a name in it
         return "the file is damaged"
     reason = str(getattr(error, "strerror", None) or error or type(error).__name__)
     if reason.startswith("Error number") and (number := getattr(error, "errno", None)):  # unknown to FFmpeg
@@ -71,7 +71,7 @@ def failure_reason(error: Exception) -> str:
 
 
 def period_ns(stream: Any) -> int:
-    """Return the frame period that a stream states [ns]."""
+    """Return the frame period according to a stream's header [ns]."""
     for rate in (stream.average_rate, stream.guessed_rate):
         if rate is not None and _RATES_HZ[0] <= float(rate) <= _RATES_HZ[1]:
             return round(SECOND_NS / float(rate))
@@ -88,10 +88,10 @@ class Scaler:
         self.size = _SIZE
 
     def pixels(self, frame: Any) -> Pixels:
-        """Return a frame's pixels, scaled to the width or height of the size with the frame's aspect ratio."""
-        wide, high = self.size
-        share = min(wide / frame.width, high / frame.height)
-        width, height = max(2, round(share * frame.width)), max(2, round(share * frame.height))
+        """Return a frame's pixels, scaled to fill the width or the height of the size, with the same aspect ratio."""
+        max_width, max_height = self.size
+        scale = min(max_width / frame.width, max_height / frame.height)
+        width, height = max(2, round(scale * frame.width)), max(2, round(scale * frame.height))
         scaled = self._reformatter.reformat(frame, width, height, "bgra", interpolation="BILINEAR")
         plane = scaled.planes[0]  # keeps its frame
         return Pixels(width=width, height=height, stride=plane.line_size, content=plane)
@@ -101,4 +101,4 @@ def make_less_urgent() -> None:
     """Lower the priority of this thread."""
     if sys.platform == "linux":
         with suppress(OSError):
-            os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), _NICE)
+            os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), _NICE_LEVEL)

@@ -43,12 +43,12 @@ class VideoWriter:
 
     def add(self, pixels: NDArray[np.uint8]) -> None:
         """Add a picture (height, width, 4): blue, green, red, unused."""
-        high, wide = self._stream.height, self._stream.width
-        made = self._picture.from_ndarray(np.ascontiguousarray(pixels[:high, :wide]), format="bgra")
-        self._container.mux(self._stream.encode(made))
+        height, width = self._stream.height, self._stream.width
+        frame = self._picture.from_ndarray(np.ascontiguousarray(pixels[:height, :width]), format="bgra")
+        self._container.mux(self._stream.encode(frame))
 
     def finish(self) -> bytes:
-        """Return the content of the whole file."""
+        """Finish the file and return its content."""
         self._container.mux(self._stream.encode())
         self._container.close()
         return self._file.getvalue()

@@ -1,4 +1,4 @@
-"""Frames of a video as values, and their statistics in a trial: shown, late and lost, and the age of the camera's."""
+"""Frames of a video, and their statistics in a trial: how many were shown, late or lost, and their age."""
 
 from dataclasses import dataclass, field
 from typing import Any, Protocol
@@ -6,9 +6,9 @@ from typing import Any, Protocol
 from study_app.errors import VideoError
 
 
-def stopped_error(why: str) -> VideoError:
-    """Return the error about a source that failed in a trial, without its name, which would reveal the condition."""
-    return VideoError(f"one of the study's videos stopped ({why}): check the camera and the files")
+def stopped_error(reason: str) -> VideoError:
+    """Return the error for a source that failed in a trial, without its name, since that would reveal the condition."""
+    return VideoError(f"one of the study's videos stopped ({reason}): check the camera and the files")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -18,15 +18,15 @@ class VideoFrame:
     Attributes
     ----------
     number : int
-        Its number in the source, from 0; lost frames have numbers, too.
+        Its number in the source, from 0; lost frames are counted, too.
     width, height, stride : int
-        Its size [px], and the bytes of a row.
+        Its size [px], and the number of bytes in a row.
     pixels : buffer
         Rows of 32-bit pixels: blue, green, red, unused.
     due_ns : int
-        Display time without a delay [ns, servo's clock]: when it was ready, or its time in the footage.
+        Display time without a delay [ns, servo's clock]: the time when it was ready, or its time in the footage.
     age_ns : int or None
-        Age of the picture at that time, by the source's time stamps; None if unknown, 0 for footage.
+        Age of the picture at that time, from the source's time stamps; None if unknown, 0 for footage.
     period_ns : int
         Time from one frame of the source to the next.
     """
@@ -62,20 +62,20 @@ class VideoSource(Protocol):
 
 
 class VideoStatistics:
-    """Statistics of the painted frames of a video."""
+    """Statistics of the frames of a video that were painted."""
 
     def __init__(self) -> None:
         self._number: int | None = None
         self._frames = self._late = self._lost = 0
-        self._most_ns: int | None = None
+        self._max_error_ns: int | None = None
         self._ages_ns: list[int] = []
 
     def frame(self, painted_ns: int, video: VideoFrame, delay_s: float) -> None:
-        """Add the video frame that was painted at a time [ns], with the delay requested at that time [s]."""
+        """Add a video frame that was painted at ``painted_ns``, with the delay requested at that time."""
         if video.number == self._number:
             return
         error_ns = painted_ns - video.due_ns - round(delay_s * 1e9)
-        self._most_ns = error_ns if self._most_ns is None else max(self._most_ns, error_ns)
+        self._max_error_ns = error_ns if self._max_error_ns is None else max(self._max_error_ns, error_ns)
         self._late += error_ns > video.period_ns
         self._lost += 0 if self._number is None else max(0, video.number - self._number - 1)
         self._number = video.number
@@ -90,6 +90,6 @@ class VideoStatistics:
             "video_frames": self._frames if seen else None,
             "video_frames_late": self._late if seen else None,
             "video_frames_lost": self._lost if seen else None,
-            "video_delay_error_max_ms": None if self._most_ns is None else self._most_ns * 1e-6,
+            "video_delay_error_max_ms": None if self._max_error_ns is None else self._max_error_ns * 1e-6,
             "video_age_mean_ms": sum(ages_ns) / len(ages_ns) * 1e-6 if ages_ns else None,
         }

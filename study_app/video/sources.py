@@ -1,7 +1,7 @@
-"""Sources of a video: a live camera, or any live stream that FFmpeg opens, and footage that is played from a file.
+"""Sources of a video: a live camera, or another live stream that FFmpeg can open, and footage from a file.
 
-A camera is open throughout a session, so that neither its light nor its sound reveals when a condition shows it.
-Footage is played in a loop from the beginning of each trial. Both are decoded in threads of their own.
+A camera is open throughout a session, so that neither its light nor its sound reveals which conditions show it.
+Footage is played in a loop from the beginning of each trial. Each source is decoded in a separate thread.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from study_app.protocol.source import file_hash
 from study_app.protocol.trials import DELAY, MOST_DELAY_MS
 from study_app.video.decoding import (
     EXTRA,
-    OF_FILE,
+    FILE_OPTIONS,
     SECOND_NS,
     Scaler,
     failure_reason,
@@ -38,20 +38,20 @@ from study_app.video.decoding import (
 )
 from study_app.video.frames import VideoFrame, stopped_error
 
-_LIVE: Final = {"fflags": "nobuffer", "flags": "low_delay", "probesize": "65536", "analyzeduration": "0"}
-_OF_DEVICE: Final = {"video_size": "1280x720", "framerate": "30"}
+_LIVE_OPTIONS: Final = {"fflags": "nobuffer", "flags": "low_delay", "probesize": "65536", "analyzeduration": "0"}
+_DEVICE_OPTIONS: Final = {"video_size": "1280x720", "framerate": "30"}
 USUAL: Final = {"linux": "v4l2:/dev/video0", "darwin": "avfoundation:0"}.get(sys.platform, "")
 KINDS: Final = ("v4l2", "avfoundation", "dshow")
 OPENS_S, STALLS_S, ENDS_S = 8.0, 1.0, 5.0
-_MOST_AGE_S: Final = 10.0
-"""Greatest difference of a time stamp from a system clock [s]: a larger one means another clock. [choice]"""
+_MAX_AGE_S: Final = 10.0
+"""Maximum difference between a time stamp and a system clock; if larger, the time is from another clock. [choice]"""
 _SPARE_NS: Final = SECOND_NS // 2
 HOST: Final = re.compile(r"([\w.-]+|\[[\da-fA-F:.]+\])(:\d{1,5})?")
 NOT_SHOWN: Final = "(address not shown)"
-_COUNTED: Final = 30
-"""Number of intervals between frames whose median is the period."""
-_AHEAD: Final = 15
-"""Capacity for decoded frames: half a second at 30 Hz, 45 MB at 1152 x 648 pixels. [choice]"""
+_COUNTED_GAPS: Final = 30
+"""Number of intervals between frames from which the frame period is estimated, by their median."""
+_MAX_QUEUED: Final = 15
+"""Maximum number of decoded frames in the queue: 0.5 s at 30 Hz, 45 MB at 1152 x 648 pixels. [choice]"""
 PATIENCE_S: Final = 5.0
 _CAMERA = "camera"
 
@@ -62,14 +62,14 @@ class Camera:
     Parameters
     ----------
     source : str
-        ``v4l2:/dev/video0``, ``avfoundation:0``, ``dshow:video=NAME``, or an URL.
+        ``v4l2:/dev/video0``, ``avfoundation:0``, ``dshow:video=NAME``, or a URL.
     holds_s : float
-        Greatest age of frames that are requested [s].
+        Maximum age of requested frames [s].
 
     Raises
     ------
     VideoError
-        There is no camera, or it sends no frame.
+        There is no camera, or it does not send a frame.
     """
 
     def __init__(self, source: str, now_ns: Callable[[], int], holds_s: float) -> None:
@@ -95,10 +95,10 @@ class Camera:
 
     @property
     def works(self) -> bool:
-        return self.thread.is_alive() and not self._stalls
+        return self.thread.is_alive() and not self._is_stalled
 
     @property
-    def _stalls(self) -> bool:
+    def _is_stalled(self) -> bool:
         return self._now_ns() - self.newest.due_ns > STALLS_S * SECOND_NS
 
     @property
@@ -123,12 +123,12 @@ class Camera:
             The camera ended, or sent nothing for a second.
         """
         with self._changed:
-            failure, held = self._failure, tuple(self._frames)
-        if not failure and self._stalls:
+            failure, frames = self._failure, tuple(self._frames)
+        if not failure and self._is_stalled:
             failure = f"no frame arrived for {STALLS_S:g} s"
         if failure:
             raise stopped_error(failure)
-        return next((frame for frame in reversed(held) if frame.due_ns <= moment_ns), None)
+        return next((frame for frame in reversed(frames) if frame.due_ns <= moment_ns), None)
 
     def close(self) -> None:
         self._closed = True
@@ -137,7 +137,7 @@ class Camera:
     def _work(self) -> None:
         make_less_urgent()
         try:
-            self._read()
+            self._read_frames()
             failure = "it ended"
         except Exception as error:  # noqa: BLE001 - FFmpeg's errors have no other common base class
             failure = failure_reason(error)
@@ -145,26 +145,25 @@ class Camera:
             self._failure = failure
             self._changed.notify_all()
 
-    def _read(self) -> None:
-        kind, _, place = self.source.partition(":")
-        of_device = kind in KINDS
-        options = {**_LIVE, **_OF_DEVICE} if of_device else _LIVE
-        given = {"kind": kind, **options} if of_device else options
-        with open_video(place if of_device else self.source, timeout=(OPENS_S, 2 * STALLS_S), **given) as container:
+    def _read_frames(self) -> None:
+        kind, _, device = self.source.partition(":")
+        is_device = kind in KINDS
+        options = {"kind": kind, **_LIVE_OPTIONS, **_DEVICE_OPTIONS} if is_device else _LIVE_OPTIONS
+        with open_video(device if is_device else self.source, timeout=(OPENS_S, 2 * STALLS_S), **options) as container:
             stream = container.streams.video[0]
             self.size, scaler = (stream.width, stream.height), Scaler()
-            numbers = _Numbers(period_ns(stream))
+            numbers = _FrameNumbers(period_ns(stream))
             for frame in container.decode(stream):
                 if self._closed:
                     return
                 scaler.size = self._fitted or scaler.size
                 self._store_frame(frame, scaler, numbers)
 
-    def _store_frame(self, frame: Any, scaler: Scaler, numbers: _Numbers) -> None:
-        number = numbers.of(frame.time)
+    def _store_frame(self, frame: Any, scaler: Scaler, numbers: _FrameNumbers) -> None:
+        number = numbers.next_number(frame.time)
         width, height, stride, pixels = scaler.pixels(frame)
         ready_ns, age_ns = self._now_ns(), _age_ns(frame.time)
-        made = VideoFrame(
+        video_frame = VideoFrame(
             number=number,
             width=width,
             height=height,
@@ -175,51 +174,51 @@ class Camera:
             period_ns=numbers.period_ns,
         )
         with self._changed:
-            self._frames.append(made)
+            self._frames.append(video_frame)
             while self._frames[0].due_ns < ready_ns - self._holds_ns:
                 self._frames.popleft()
             self._changed.notify_all()
 
 
 def without_login(source: str) -> str:
-    """Return the name of a device, or scheme and host of an URL, whose other parts may contain name and password."""
+    """Return the name of a device, or only scheme and host of a URL, since its other parts may contain a password."""
     if source.partition(":")[0] in KINDS:
         return source
     with suppress(ValueError):  # the URL is invalid
         parts = urlsplit(source)
         host = parts.netloc.rpartition("@")[2]
-        no_later = source.count("@") == parts.netloc.count("@")  # otherwise a / in a password may have cut off the host
-        if parts.scheme and no_later and HOST.fullmatch(host):
+        has_host = source.count("@") == parts.netloc.count("@")  # otherwise a / in a password may have cut it off
+        if parts.scheme and has_host and HOST.fullmatch(host):
             return f"{parts.scheme}://{host}"
     return NOT_SHOWN
 
 
-class _Numbers:
-    """Numbers the frames of a camera, including lost ones."""
+class _FrameNumbers:
+    """Numbers the frames of a camera; lost frames are counted, too."""
 
     def __init__(self, period_ns: int) -> None:
         self.period_ns = period_ns
         self._number = -1
         self._before_s: float | None = None
-        self._gaps_s: deque[float] = deque(maxlen=_COUNTED)
+        self._gaps_s: deque[float] = deque(maxlen=_COUNTED_GAPS)
 
-    def of(self, stamp_s: float | None) -> int:
-        """Return the number of a frame with this time stamp [s]; without one, the next number."""
-        missed = 0
+    def next_number(self, stamp_s: float | None) -> int:
+        """Return the number of the next frame by its time stamp; without one, no frame counts as lost."""
+        lost = 0
         if stamp_s is not None and self._before_s is not None and (gap_s := stamp_s - self._before_s) > 0:
             self._gaps_s.append(gap_s)
-            if len(self._gaps_s) >= _COUNTED // 3:
+            if len(self._gaps_s) >= _COUNTED_GAPS // 3:
                 self.period_ns = round(float(np.median(self._gaps_s)) * SECOND_NS)
-            missed = max(0, round(gap_s * SECOND_NS / self.period_ns) - 1)
+            lost = max(0, round(gap_s * SECOND_NS / self.period_ns) - 1)
         self._before_s = stamp_s
-        self._number += 1 + missed
+        self._number += 1 + lost
         return self._number
 
 
 def _age_ns(stamp_s: float | None) -> int | None:
-    """Return the age of a frame with this time stamp [ns], by the system clock of the stamps."""
+    """Return the age of a frame with this time stamp [ns], by the system clock that the stamps are from."""
     for clock in (time.perf_counter, time.time):
-        if stamp_s is not None and -0.001 <= (age_s := clock() - stamp_s) < _MOST_AGE_S:
+        if stamp_s is not None and -0.001 <= (age_s := clock() - stamp_s) < _MAX_AGE_S:
             return max(0, round(age_s * SECOND_NS))
     return None
 
@@ -230,7 +229,7 @@ class Footage:
     def __init__(self, path: Path) -> None:
         self.path = path
         try:
-            with open_video(str(path), **OF_FILE) as container:
+            with open_video(str(path), **FILE_OPTIONS) as container:
                 stream = container.streams.video[0]
                 self._period_ns = period_ns(stream)
                 if (first := next(container.decode(stream), None)) is None:
@@ -289,7 +288,9 @@ class Footage:
             self._media_ns = max(0, moment_ns - began_ns)
             while self._frames and self._frames[0].due_ns <= self._media_ns:
                 self._shown = self._frames.popleft()
-            if len(self._frames) <= _AHEAD // 2:  # rarely: the decoder competes with painting for the interpreter lock
+            if (
+                len(self._frames) <= _MAX_QUEUED // 2
+            ):  # rarely: the decoder competes with painting for the interpreter lock
                 self._changed.notify_all()
             if self._failure and not self._frames:
                 raise stopped_error(self._failure)
@@ -305,18 +306,18 @@ class Footage:
     def _work(self) -> None:
         make_less_urgent()
         try:
-            with open_video(str(self.path), **OF_FILE) as container:
+            with open_video(str(self.path), **FILE_OPTIONS) as container:
                 while not self._closed:
                     play = self._play
-                    for frame in self._decoded(container, play):
+                    for frame in self._decode_in_loop(container, play):
                         if not self._queue_frame(frame, play):
                             break
         except Exception as error:  # noqa: BLE001 - FFmpeg's errors have no other common base class
             with self._changed:
                 self._failure = failure_reason(error)
 
-    def _decoded(self, container: Any, play: int) -> Iterator[VideoFrame]:
-        """Yield the frames in a loop from the beginning; overdue ones except the first are not scaled."""
+    def _decode_in_loop(self, container: Any, play: int) -> Iterator[VideoFrame]:
+        """Yield the frames in a loop from the beginning; skip overdue frames, except the very first one."""
         number = offset_ns = 0
         while True:
             container.seek(0)
@@ -344,9 +345,9 @@ class Footage:
             offset_ns += end_ns
 
     def _queue_frame(self, frame: VideoFrame, play: int) -> bool:
-        """Queue a frame when there is room; return whether it is still needed."""
+        """Queue a frame when there is room; return False if the playback has been restarted or ended."""
         with self._changed:
-            while len(self._frames) >= _AHEAD and play == self._play and not self._closed:
+            while len(self._frames) >= _MAX_QUEUED and play == self._play and not self._closed:
                 self._changed.wait()
             if play != self._play or self._closed:
                 return False
@@ -358,7 +359,7 @@ class Footage:
 
 @dataclass(frozen=True, slots=True)
 class VideosFound:
-    """The result of opening a study's videos: a description, and why they cannot be used ("" if they can)."""
+    """The result of opening a study's videos: a description, and the reason why one cannot be used, or ""."""
 
     about: str
     fault: str = ""
@@ -370,9 +371,9 @@ class Videos:
     Parameters
     ----------
     folder : Path
-        The folder of its file; paths of footage are relative to it.
+        The folder of the study's file; paths of footage are relative to it.
     camera : str
-        The camera of this machine, as in `camera.Camera`; "" for the system's default.
+        The camera of this machine, as for `Camera`; "" for the system's default.
     """
 
     def __init__(self, protocol: Protocol, folder: Path, camera: str, now_ns: Callable[[], int]) -> None:
@@ -380,9 +381,11 @@ class Videos:
         self.views = tuple(sorted({condition.view for condition in shown}))
         self._hashes = {condition.view: condition.footage_sha256 for condition in shown if condition.footage_sha256}
         self._folder, self._camera, self._now_ns = folder, camera or USUAL, now_ns
-        varied = any(stimulus.vary == DELAY for stimulus in protocol.stimuli.values())
+        varies_delay = any(stimulus.vary == DELAY for stimulus in protocol.stimuli.values())
         self._holds_s = (
-            MOST_DELAY_MS / 1000 if varied else max((condition.delay_ms for condition in shown), default=0.0) / 1000
+            MOST_DELAY_MS / 1000
+            if varies_delay
+            else max((condition.delay_ms for condition in shown), default=0.0) / 1000
         )
         self._open: dict[str, Camera | Footage] = {}
         self._opening = threading.Lock()
@@ -390,22 +393,22 @@ class Videos:
         self._closed = False
 
     def open(self) -> VideosFound:
-        """Open videos that are not open or failed; return the result."""
+        """Open the videos that are not yet open or have failed; return the result."""
         with self._opening:
             for view in self.views:
-                before = self._open.get(view)
-                if before is not None and before.works:
+                previous = self._open.get(view)
+                if previous is not None and previous.works:
                     continue
                 try:
-                    if before is not None:
-                        before.close()
-                    self._keep(view, self._opened(view))
+                    if previous is not None:
+                        previous.close()
+                    self._store_source(view, self._open_source(view))
                 except VideoError as error:
                     return VideosFound("every video in the study must be playable", str(error))
-        return VideosFound("; ".join(self._words()))
+        return VideosFound("; ".join(self._descriptions()))
 
     def reopen(self) -> None:
-        """Open videos that failed in a session.
+        """Open the videos that have failed during a session.
 
         Raises
         ------
@@ -423,7 +426,7 @@ class Videos:
             source.fit(width, height)
 
     def describe(self) -> dict[str, Any]:
-        """Return the record for the receipt, which does not reveal the video of a condition."""
+        """Return the description for the receipt; it does not reveal which condition shows which video."""
         description: dict[str, Any] = {"footage_sha256": sorted(set(self._hashes.values()))} if self._hashes else {}
         if isinstance(camera := self._open.get(_CAMERA), Camera):
             age_ns = camera.newest.age_ns
@@ -438,11 +441,11 @@ class Videos:
     def close(self) -> None:
         with self._changing:
             self._closed = True
-            every = tuple(self._open.values())
-        for source in every:
+            sources = tuple(self._open.values())
+        for source in sources:
             source.close()
 
-    def _keep(self, view: str, source: Camera | Footage) -> None:
+    def _store_source(self, view: str, source: Camera | Footage) -> None:
         """Store an open source; close it if all were closed meanwhile."""
         with self._changing:
             closed = self._closed
@@ -452,7 +455,7 @@ class Videos:
             source.close()
             raise VideoError("the videos have been closed")
 
-    def _opened(self, view: str) -> Camera | Footage:
+    def _open_source(self, view: str) -> Camera | Footage:
         if view == _CAMERA:
             return Camera(self._camera, self._now_ns, self._holds_s)
         path = self._folder / view
@@ -460,7 +463,7 @@ class Videos:
             raise VideoError(f"{path} has changed since the study began: restore the original file")
         return Footage(path)
 
-    def _words(self) -> Iterable[str]:
+    def _descriptions(self) -> Iterable[str]:
         for view, source in self._open.items():
             if isinstance(source, Camera) and view == _CAMERA:
                 age_ns = source.newest.age_ns

@@ -18,7 +18,7 @@ from study_app.errors import VideoError
 pytest.importorskip("av", reason="the optional extra video is not installed")
 
 from study_app.video import sources
-from study_app.video.sources import Camera, _Numbers
+from study_app.video.sources import Camera, _FrameNumbers
 from tests.strangers import ends_with_each
 from tests.video.clips import number_in
 from tests.video.test_footage import pixels_of
@@ -132,5 +132,5 @@ def test_another_program_in_place_of_a_camera_is_one_line_in_time(
 
 
 def test_numbers_follow_time_stamps() -> None:
-    numbers = _Numbers(33_333_333)
-    assert [numbers.of(stamp) for stamp in (0.0, 0.033, 0.1, 0.133, None, 0.3)] == [0, 1, 3, 4, 5, 6]
+    numbers = _FrameNumbers(33_333_333)
+    assert [numbers.next_number(stamp) for stamp in (0.0, 0.033, 0.1, 0.133, None, 0.3)] == [0, 1, 3, 4, 5, 6]
