@@ -1,9 +1,9 @@
-"""Parameters of a liquid by least squares: from measured motion and force, or from a rheometer's flow curve.
+"""Fits of a liquid's parameters by least squares, to a measured motion and force or to a rheometer's flow curve.
 
-Of a force the sum over rows and axes of (measured − simulated force)² is minimised, through the servo's own tick; of a
-flow curve the sum of (fitted/measured stress − 1)², since curves span decades and a rheometer's error is relative to
-the stress. Values stay in the ranges that the scene's models permit (``search``); ``estimates`` computes confidence
-intervals and warnings.
+For a force, the sum of (measured − simulated force)² over rows and axes is minimised; the simulation uses the tick of
+the servo. For a flow curve, it is the sum of (fitted/measured stress − 1)², since curves span decades and a rheometer's
+error is relative to the stress. Values stay in the ranges that the scene's models permit (``search``); ``estimates``
+computes confidence intervals and warnings.
 """
 
 import math
@@ -19,25 +19,25 @@ from study_app.haptics.model.laws import stress_pa
 from study_app.haptics.model.motion import Floats, Motion
 from study_app.haptics.model.scene import Scene
 from study_app.lab.identify.estimates import Estimates, estimate
-from study_app.lab.identify.measured_force import FlowCurve, Measured, vectors_x
+from study_app.lab.identify.measured_force import FlowCurve, MeasuredForce, vectors_x
 from study_app.lab.identify.parameters import Parameter, find_parameters
 from study_app.lab.identify.search import ForceProblem, Problem, solve
 
-_FOLLOWING: Final = 0.1
-_POOR: Final = 0.5  # residual relative to the force above which the opposite sign is tried
-_CLEARLY: Final = 0.9
-_DRIVING: Final = 0.1  # noise of 10,000 rows correlates with velocity by 0.01
-_UNRELATED: Final = 0.25
-_CHANCE: Final = 5.0
-"""Number of standard deviations of noise above which residuals count as correlated."""
+_MAX_AUTOCORRELATION: Final = 0.1
+_POOR_SHARE: Final = 0.5  # residual relative to the force above which the opposite sign is tried
+_CLEARLY_BETTER: Final = 0.9
+_DRIVING_CORRELATION: Final = 0.1  # noise of 10,000 rows correlates with velocity by 0.01
+_MIN_EXPLAINED: Final = 0.25
+_CHANCE_DEVIATIONS: Final = 5.0
+"""Residuals count as correlated if their correlation exceeds this many standard deviations of that of noise."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Fit(Estimates):
     """The result of a fit to a force.
 
-    ``measured_n``, ``fitted_n`` and ``residual_n`` (measured − fitted) are (n, 3) at the measured times; ``axes`` are
-    those in use.
+    ``measured_n``, ``fitted_n`` and ``residual_n`` (measured − fitted) have the shape (n, 3), at the measured times;
+    ``axes`` are those in which a force is not zero.
     """
 
     motion: Motion
@@ -57,34 +57,34 @@ class Fit(Estimates):
 
     @property
     def share(self) -> float:
-        """``rms_n`` relative to that of the measured force."""
+        """``rms_n`` relative to the RMS of the measured force."""
         return self.rms_n / _rms(self.measured_n)
 
     @property
     def explained(self) -> float:
-        """The share of the measured force's mean square that the law explains, at least 0."""
+        """The share of the measured force's mean square that the fitted law explains, at least 0."""
         return max(1 - self.share**2, 0.0)
 
     def summary(self) -> str:
         lasted_s = self.motion.t_s[-1] - self.motion.t_s[0]
-        left = f"residual {self.rms_n:.3g} N RMS, {100 * self.share:.1f} % of the force"
+        residual = f"residual {self.rms_n:.3g} N RMS, {100 * self.share:.1f} % of the force"
         law = f"the law explains {100 * self.explained:.1f} % of the mean squared force"
-        return f"{len(self.motion.t_s)} rows over {lasted_s:.3g} s; {left}; {law}"
+        return f"{len(self.motion.t_s)} rows over {lasted_s:.3g} s; {residual}; {law}"
 
 
 def fit(scene: Scene, liquid_id: str, names: Sequence[str], motion: Motion, force_n: Floats) -> Fit:
     """Return the values of the parameters ``names`` for which `simulate` is closest to a measured force.
 
     ``force_n`` is the liquid's force on the body, (n, 3) or along x (n,), at the times of the motion, whose rate may
-    differ from the scene's. Velocities of the motion are used if given, else those of the scene's estimator. The search
-    begins at the scene's values; with ``effects = "auto"``, with the effects selected for them.
+    differ from the scene's. Velocities of the motion are used if it has them, else those of the scene's estimator. The
+    search begins at the scene's values; ``effects = "auto"`` selects the effects for these values.
 
     Raises
     ------
     StudyError
         There is no such liquid or parameter, or there are too few measurements.
     """
-    measured = Measured(motion, vectors_x(force_n) if force_n.ndim == 1 else force_n)
+    measured = MeasuredForce(motion, vectors_x(force_n) if force_n.ndim == 1 else force_n)
     scene = resolve(scene)
     problem = ForceProblem(scene, liquid_id, find_parameters(scene, liquid_id, names), measured)
     z, fields = estimate(problem, liquid_id, names, float(np.linalg.norm(measured.force_n)))
@@ -93,15 +93,15 @@ def fit(scene: Scene, liquid_id: str, names: Sequence[str], motion: Motion, forc
     fields["warnings"] += (
         *_quantity_warnings(measured, problem.axes),
         *_sign_warnings(problem, _rms(residual_n)),
-        *_residual_warnings(residual_n, fields["following"], measured.force_n),
+        *_residual_warnings(residual_n, fields["autocorrelation"], measured.force_n),
     )
     return Fit(**fields, motion=motion, measured_n=measured.force_n, fitted_n=fitted_n, axes=problem.axes)
 
 
-def _quantity_warnings(measured: Measured, axes: Sequence[int]) -> Iterator[str]:
+def _quantity_warnings(measured: MeasuredForce, axes: Sequence[int]) -> Iterator[str]:
     """Yield warnings if the measured values cannot be the force of a liquid at rest on this body.
 
-    Without its constant part, such a force takes energy from the body, and it follows velocity and acceleration.
+    Apart from a constant part, such a force takes energy from the body and depends on its velocity and acceleration.
     """
     t_s, force_n = measured.motion.t_s, measured.force_n
     velocity_mps = measured.motion.velocity_mps
@@ -110,34 +110,34 @@ def _quantity_warnings(measured: Measured, axes: Sequence[int]) -> Iterator[str]
     varying_n = force_n - force_n.mean(axis=0)
     size = np.linalg.norm(varying_n) * np.linalg.norm(velocity_mps)
     along = float(np.sum(varying_n * velocity_mps)) / size if size else 0.0
-    if along > _DRIVING:
+    if along > _DRIVING_CORRELATION:
         yield (
             f"the measured forces accelerate the body (their correlation with its velocity is {along:.2f}), but a "
             "liquid at rest slows it down: specify the liquid's force on the body, not the body's force on the liquid"
         )
-    left_n2 = 0.0
+    residual_n2 = 0.0
     for axis in axes:
         v_mps = velocity_mps[:, axis]
         law = np.column_stack([v_mps, np.abs(v_mps) * v_mps, np.gradient(v_mps, t_s), np.ones_like(v_mps)])
-        left_n2 += float(np.sum((force_n[:, axis] - law @ np.linalg.lstsq(law, force_n[:, axis])[0]) ** 2))
-    follows = 1 - left_n2 / float(np.sum(force_n**2))
-    if follows < _UNRELATED:
+        residual_n2 += float(np.sum((force_n[:, axis] - law @ np.linalg.lstsq(law, force_n[:, axis])[0]) ** 2))
+    explained = 1 - residual_n2 / float(np.sum(force_n**2))
+    if explained < _MIN_EXPLAINED:
         yield (
-            f"velocity and acceleration explain only {100 * follows:.0f} % of the measured values: they may not be "
+            f"velocity and acceleration explain only {100 * explained:.0f} % of the measured values: they may not be "
             "the force on this body, or their times may not match the motion"
         )
 
 
 def _sign_warnings(problem: ForceProblem, rms_n: float) -> Iterator[str]:
-    """Yield a warning if the law fits a poorly fitted force better with its sign reversed."""
+    """Yield a warning if the fit to the force is poor, and clearly better with the opposite sign of the force."""
     measured = problem.measured
     size_n = _rms(measured.force_n)
-    if rms_n < _POOR * size_n:
+    if rms_n < _POOR_SHARE * size_n:
         return
     mirrored = problem.with_force(-measured.force_n)
     z, _ = solve(mirrored)
     reversed_n = _rms(measured.force_n + mirrored.force_n(z))
-    if reversed_n < _CLEARLY * rms_n:
+    if reversed_n < _CLEARLY_BETTER * rms_n:
         yield (
             f"with the opposite sign of the force, the residual would be {100 * reversed_n / size_n:.0f} % of the "
             f"force instead of {100 * rms_n / size_n:.0f} %: check the sign of the force columns"
@@ -145,8 +145,8 @@ def _sign_warnings(problem: ForceProblem, rms_n: float) -> Iterator[str]:
 
 
 def _residual_warnings(residual_n: Floats, rho: float, force_n: Floats) -> Iterator[str]:
-    """Yield warnings about correlated residuals, which indicate a model error, since noise is uncorrelated."""
-    if rho > max(_FOLLOWING, _CHANCE / math.sqrt(residual_n.size)):
+    """Yield a warning if residuals are correlated, which indicates a model error, since noise is uncorrelated."""
+    if rho > max(_MAX_AUTOCORRELATION, _CHANCE_DEVIATIONS / math.sqrt(residual_n.size)):
         share = _rms(residual_n) / _rms(force_n)
         yield (
             f"the residuals ({100 * share:.1f} % of the force) are autocorrelated (lag-1 correlation {rho:.3f}): "
@@ -160,10 +160,10 @@ def _rms(vectors_n: Floats) -> float:
 
 
 CURVE_TABLE: Final = "non_newtonian"
-_LEAST_OF_A_BRANCH: Final = 6
-_APART: Final = 5.0
-"""Smallest ratio of the gap between branches to its noise. [choice] See `test_noise_makes_no_branches`."""
-_LEAST_GAP: Final = 0.01
+_MIN_BRANCH_ROWS: Final = 6
+_MIN_GAP_RATIO: Final = 5.0
+"""Minimum ratio of the gap between branches to its noise. [choice] See `test_noise_makes_no_branches`."""
+_MIN_GAP: Final = 0.01
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -180,8 +180,8 @@ class CurveFit(Estimates):
 
     def summary(self) -> str:
         rates = self.curve.rate_per_s
-        said = f"{len(rates)} shear rates from {rates.min():.3g} to {rates.max():.3g} per s"
-        return f"{said}; residual {100 * self.share:.1f} % of the stress (RMS)"
+        measured = f"{len(rates)} shear rates from {rates.min():.3g} to {rates.max():.3g} per s"
+        return f"{measured}; residual {100 * self.share:.1f} % of the stress (RMS)"
 
 
 def fit_curve(scene: Scene, liquid_id: str, names: Sequence[str], curve: FlowCurve) -> CurveFit:
@@ -194,9 +194,11 @@ def fit_curve(scene: Scene, liquid_id: str, names: Sequence[str], curve: FlowCur
     """
     scene = resolve(scene)
     parameters = find_parameters(scene, liquid_id, names)
-    for it in parameters:
-        if it.table != CURVE_TABLE:
-            raise StudyError(f"{it.name} does not affect a flow curve: fit parameters from the table {CURVE_TABLE}")
+    for parameter in parameters:
+        if parameter.table != CURVE_TABLE:
+            raise StudyError(
+                f"{parameter.name} does not affect a flow curve: fit parameters from the table {CURVE_TABLE}"
+            )
     if len(curve.rate_per_s) <= len(parameters):
         raise StudyError(f"{len(curve.rate_per_s)} shear rates are too few for {len(parameters)} parameters")
     ordered = curve.ordered()
@@ -207,9 +209,9 @@ def fit_curve(scene: Scene, liquid_id: str, names: Sequence[str], curve: FlowCur
 
 
 def _branch_warnings(curve: FlowCurve) -> Iterator[str]:
-    """Yield a warning if two branches of a flow curve differ more than the noise along them.
+    """Yield a warning if two branches of a flow curve differ by more than noise.
 
-    The noise of their difference is estimated from its second differences along the shear rate.
+    The noise is estimated from the second differences, along the shear rate, of the gap between the branches.
     """
     if (branches := curve.branches()) is None:
         return
@@ -217,11 +219,11 @@ def _branch_warnings(curve: FlowCurve) -> Iterator[str]:
     common = (rate_per_s >= other_per_s[0]) & (rate_per_s <= other_per_s[-1])
     log_rate = np.log(rate_per_s[common])
     gap = np.log(stress_pa[common]) - np.interp(log_rate, np.log(other_per_s), np.log(other_pa))
-    if len(gap) < _LEAST_OF_A_BRANCH:
+    if len(gap) < _MIN_BRANCH_ROWS:
         return
     noise = math.sqrt(float(np.mean(np.diff(gap, 2) ** 2)) / 6)
     size = math.sqrt(float(np.mean(gap**2)))
-    if size > _APART * noise and size > _LEAST_GAP:
+    if size > _MIN_GAP_RATIO * noise and size > _MIN_GAP:
         yield (
             f"{branches.description} differ by {100 * math.expm1(size):.0f} % of the stress, which is more than noise "
             "can explain (thixotropy or hysteresis); the fit lies between them, and its intervals do not cover "
@@ -243,16 +245,18 @@ class _CurveProblem(Problem):
     def _products(self, residual: Floats) -> float:
         """Return the sum of the products of residuals at successive shear rates.
 
-        Rows with equal shear rates have no order: the sum is averaged over all their orders.
+        Rows with equal shear rates have no order; the sum is the average over all their orders.
         """
-        _, at, counts = np.unique(self._curve.rate_per_s, return_inverse=True, return_counts=True)
-        sums, squares = np.bincount(at, residual.ravel()), np.bincount(at, residual.ravel() ** 2)
+        _, rate_index, counts = np.unique(self._curve.rate_per_s, return_inverse=True, return_counts=True)
+        sums, squares = np.bincount(rate_index, residual.ravel()), np.bincount(rate_index, residual.ravel() ** 2)
         means = sums / counts
         return float(np.sum((sums**2 - squares) / counts) + np.sum(means[1:] * means[:-1]))
 
     def stress_pa(self, z: Floats) -> Floats:
         """Return the stress (n,) [Pa] at the measured shear rates."""
-        changes: dict[str, Any] = {it.field: value for it, value in zip(self.parameters, self.values(z), strict=True)}
+        changes: dict[str, Any] = {
+            parameter.field: value for parameter, value in zip(self.parameters, self.values(z), strict=True)
+        }
         table = self._table.model_copy(update=changes)
         return np.array([stress_pa(table, rate) for rate in self._curve.rate_per_s.tolist()])
 

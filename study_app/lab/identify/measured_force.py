@@ -1,4 +1,4 @@
-"""Reads measured motion and force, or a flow curve, from a file; prepares the motion for `simulate`."""
+"""Reads a measured motion and force, or a flow curve, from a file, and prepares the motion for `simulate`."""
 
 import math
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ _FORCES: Final = ("fx_n", "fy_n", "fz_n")
 _ALONG_A_LINE: Final = ("t_s", "velocity_mps", "force_n")
 FLOW_CURVE: Final = ("shear_rate_per_s", "shear_stress_pa")
 _COLUMNS: Final = (PLACES + _FORCES, _ALONG_A_LINE, FLOW_CURVE)
-_LONGEST_S: Final = 0.05
+_MAX_GAP_S: Final = 0.05
 _SMOOTHED_S: Final = 0.025
 _HEADER: Final = (
     f"{','.join(PLACES + _FORCES)}, with {','.join(VELOCITIES)} if they are known, or {','.join(_ALONG_A_LINE)} "
@@ -26,8 +26,8 @@ _HEADER: Final = (
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Measured:
-    """A motion of n rows in the scene frame, and the liquid's force on the body (n, 3) [N] measured along it."""
+class MeasuredForce:
+    """A motion of n rows in the scene frame, and the measured force (n, 3) [N] of the liquid on the body."""
 
     motion: Motion
     force_n: Floats
@@ -56,23 +56,23 @@ class FlowCurve:
         return FlowCurve(self.rate_per_s[order], self.stress_pa[order])
 
     def branches(self) -> "Branches | None":
-        """Return two branches, each sorted by shear rate: of repeated rates, or rising and falling rows.
+        """Return two branches, each sorted by shear rate; None if the curve does not have two.
 
-        For rates that were measured repeatedly these are the smallest and the largest stresses. None if most rates
-        occur once and the rows do not go up and down, or down and up.
+        If most rates were measured repeatedly, the branches are the smallest and the largest stresses at these rates.
+        Otherwise they are the rows with rising and with falling rates, if the rates change direction exactly once.
         """
         rates, counts = np.unique(self.rate_per_s, return_counts=True)
         repeated = rates[counts > 1]
         if len(repeated) > len(rates) / 2:
             stresses = [self.stress_pa[self.rate_per_s == rate] for rate in repeated]
-            least, greatest = (np.array([end(values) for values in stresses]) for end in (np.min, np.max))
+            smallest, largest = (np.array([end(values) for values in stresses]) for end in (np.min, np.max))
             description = "the largest and smallest stresses at repeated shear rates"
-            return Branches(description=description, first=(repeated, greatest), second=(repeated, least))
+            return Branches(description=description, first=(repeated, largest), second=(repeated, smallest))
         turns = np.flatnonzero(np.diff(np.sign(np.diff(self.rate_per_s))))
         if len(turns) != 1:
             return None
-        ways = [self._sort_by_rate(slice(turns[0] + 2)), self._sort_by_rate(slice(turns[0] + 1, None))]
-        return Branches(description="the stresses at rising and falling shear rates", first=ways[0], second=ways[1])
+        before, after = self._sort_by_rate(slice(turns[0] + 2)), self._sort_by_rate(slice(turns[0] + 1, None))
+        return Branches(description="the stresses at rising and falling shear rates", first=before, second=after)
 
     def _sort_by_rate(self, rows: slice) -> tuple[Floats, Floats]:
         order = np.argsort(self.rate_per_s[rows])
@@ -81,18 +81,18 @@ class FlowCurve:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Branches:
-    """Two branches of a flow curve, each as increasing shear rates and stresses; ``description`` names both."""
+    """Two branches of a flow curve: increasing shear rates, and their stresses; ``description`` names both branches."""
 
     description: str
     first: tuple[Floats, Floats]
     second: tuple[Floats, Floats]
 
 
-def read_measurement(path: Path) -> Measured | FlowCurve:
-    """Read a table (`text_tables`) with one of the headers in `_HEADER`, in any column order; ignore other columns.
+def read_measurement(path: Path) -> MeasuredForce | FlowCurve:
+    """Read a table (`text_tables`) with the columns of `_HEADER` in any order; other columns are ignored.
 
-    Lines that begin with # are ignored. A motion given by its velocity along a line is along x, with integrated
-    positions.
+    Lines that begin with # are ignored. A motion that is given by its velocity along a line is along x; its positions
+    are integrated.
 
     Raises
     ------
@@ -109,11 +109,11 @@ def read_measurement(path: Path) -> Measured | FlowCurve:
     names = max(_COLUMNS, key=lambda names: len({*names} & {*table.names}) / len(names))
     if names == PLACES + _FORCES and {*VELOCITIES} <= {*table.names}:
         names += VELOCITIES
-    if lacking := [name for name in names if name not in table.names]:
-        columns = f"the column{'s' * (len(lacking) > 1)} {', '.join(lacking)}"
+    if missing := [name for name in names if name not in table.names]:
+        columns = f"the column{'s' * (len(missing) > 1)} {', '.join(missing)}"
         raise StudyError(f"{path} does not have {columns}: the first line must contain {_HEADER}")
-    if twice := [name for name in names if table.names.count(name) > 1]:
-        raise StudyError(f"{path} has two columns named {twice[0]}: remove one of them")
+    if repeated := [name for name in names if table.names.count(name) > 1]:
+        raise StudyError(f"{path} has two columns named {repeated[0]}: remove one of them")
     if not table.lines:
         raise StudyError(f"{path} has a header but no rows: add one row for each sample")
     try:
@@ -126,13 +126,13 @@ def read_measurement(path: Path) -> Measured | FlowCurve:
         raise StudyError(f"{path}: {error}") from error
 
 
-def _parse_measurement(rows: Floats, names: tuple[str, ...]) -> Measured | FlowCurve:
+def _parse_measurement(rows: Floats, names: tuple[str, ...]) -> MeasuredForce | FlowCurve:
     if names == FLOW_CURVE:
         return FlowCurve(rows[:, 0], rows[:, 1])
     if names == _ALONG_A_LINE:
         return along_a_line(rows[:, 0], rows[:, 1], rows[:, 2])
     velocity_mps = rows[:, 7:] if len(names) > len(PLACES + _FORCES) else None
-    return Measured(Motion(rows[:, 0], rows[:, 1:4], velocity_mps=velocity_mps), rows[:, 4:7])
+    return MeasuredForce(Motion(rows[:, 0], rows[:, 1:4], velocity_mps=velocity_mps), rows[:, 4:7])
 
 
 def vectors_x(values: Floats) -> Floats:
@@ -141,17 +141,17 @@ def vectors_x(values: Floats) -> Floats:
     return np.column_stack([values, zero, zero])
 
 
-def along_a_line(t_s: Floats, velocity_mps: Floats, force_n: Floats) -> Measured:
+def along_a_line(t_s: Floats, velocity_mps: Floats, force_n: Floats) -> MeasuredForce:
     """Return a motion along x from its velocities (n,), and the force (n,) along x."""
-    way_m = np.concatenate([[0.0], np.cumsum((velocity_mps[1:] + velocity_mps[:-1]) / 2 * np.diff(t_s))])
-    return Measured(Motion(t_s, vectors_x(way_m), velocity_mps=vectors_x(velocity_mps)), vectors_x(force_n))
+    path_m = np.concatenate([[0.0], np.cumsum((velocity_mps[1:] + velocity_mps[:-1]) / 2 * np.diff(t_s))])
+    return MeasuredForce(Motion(t_s, vectors_x(path_m), velocity_mps=vectors_x(velocity_mps)), vectors_x(force_n))
 
 
 def with_centred_velocity(motion: Motion) -> Motion:
-    """Return the motion with velocities (n, 3): slopes of parabolas through positions within ±12.5 ms.
+    """Return the motion with velocities (n, 3), the slopes of parabolas fitted to the positions within ±12.5 ms.
 
-    A measured force depends on the motion itself, not on a device's filter; these velocities have no lag. A motion that
-    has velocities is returned unchanged. [choice] 25 ms is a tenth of the period of the fastest strokes, 4 Hz.
+    These velocities have no lag, since a measured force depends on the motion itself and not on a device's filter. A
+    motion with velocities is returned unchanged. [choice] 25 ms is a tenth of the period of the fastest strokes, 4 Hz.
 
     Raises
     ------
@@ -160,7 +160,7 @@ def with_centred_velocity(motion: Motion) -> Motion:
     """
     if motion.velocity_mps is not None:
         return motion
-    step_s = float(np.median(np.diff(motion.t_s))) if len(motion.t_s) > 1 else _LONGEST_S
+    step_s = float(np.median(np.diff(motion.t_s))) if len(motion.t_s) > 1 else _MAX_GAP_S
     even = at_rate(motion, 1 / step_s)
     rows = 2 * max(math.floor(_SMOOTHED_S / 2 / step_s), 1) + 1
     if len(even.t_s) < rows:
@@ -173,9 +173,9 @@ def with_centred_velocity(motion: Motion) -> Motion:
 
 
 def at_rate(motion: Motion, rate_hz: float) -> Motion:
-    """Return the motion with a row for every tick; unchanged if its rows are within half a tick.
+    """Return the motion with a row for every tick; unchanged if its steps differ from a tick by less than half.
 
-    Between the rows of a slower or uneven measurement positions are interpolated by cubic splines, velocities linearly.
+    Other measurements are interpolated: positions by cubic splines, velocities linearly.
 
     Raises
     ------
@@ -185,9 +185,9 @@ def at_rate(motion: Motion, rate_hz: float) -> Motion:
     step_s = np.diff(motion.t_s)
     if len(step_s) == 0:
         raise StudyError("one row is not enough: record at least 20 rows per second")
-    if step_s.max() > _LONGEST_S:
+    if step_s.max() > _MAX_GAP_S:
         row, gap_s = int(step_s.argmax()) + 2, float(step_s.max())
-        raise StudyError(f"row {row} is {gap_s:.3g} s after the previous row; at most {_LONGEST_S:g} s is permitted")
+        raise StudyError(f"row {row} is {gap_s:.3g} s after the previous row; at most {_MAX_GAP_S:g} s is permitted")
     tick_s = 1 / rate_hz
     if abs(step_s.mean() / tick_s - 1) < 0.01 and (np.abs(step_s / tick_s - 1) < 0.5).all():
         return motion
@@ -195,6 +195,6 @@ def at_rate(motion: Motion, rate_hz: float) -> Motion:
     t_s = motion.t_s[0] + np.arange(ticks + 1) * tick_s
     if motion.velocity_mps is None:
         return Motion(t_s, CubicSpline(motion.t_s, motion.position_m)(t_s))
-    place = CubicHermiteSpline(motion.t_s, motion.position_m, motion.velocity_mps)
+    position = CubicHermiteSpline(motion.t_s, motion.position_m, motion.velocity_mps)
     velocity_mps = np.column_stack([np.interp(t_s, motion.t_s, column) for column in motion.velocity_mps.T])
-    return Motion(t_s, place(t_s), velocity_mps=velocity_mps)
+    return Motion(t_s, position(t_s), velocity_mps=velocity_mps)

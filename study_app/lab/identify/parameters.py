@@ -1,4 +1,4 @@
-"""The numbers of a liquid that a fit may vary: found by name, within the ranges of the scene's own models."""
+"""The parameters of a liquid that can be fitted, by name, with the ranges that the scene's models permit."""
 
 import dataclasses
 import difflib
@@ -14,18 +14,18 @@ from study_app.haptics.model.effects import EFFECTS, Effect
 from study_app.haptics.model.scene import Liquid, Scene
 
 _THRESHOLDS: Final = tuple(name for effect in EFFECTS for name in effect.thresholds)
-"""Thresholds, which cannot be fitted: the force does not change with them, or jumps."""
+"""Thresholds, which cannot be fitted, since the force does not change smoothly with them."""
 NO_LESS_THAN: Final = {"scaling": "length", "thickened_viscosity_pa_s": "zero_shear_viscosity_pa_s"}
-"""Fields that must not be less than another of the same table."""
+"""Fields that must not be less than another field of the same table."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Parameter:
-    """One number of a scene.
+    """A numeric parameter of a scene.
 
-    ``name`` is its requested name, ``table`` and ``field`` its place: "liquid", "body" or an effect's table. ``least``
-    and ``most`` are the limits of its model (``least`` excluded if ``above``) and of the parameters in `NO_LESS_THAN`
-    that are not fitted. ``whole`` numbers are integers.
+    ``name`` is the requested name. ``table`` is "liquid", "body" or the name of an effect, and ``field`` the field
+    there. ``least`` and ``most`` are the limits of its model (``least`` excluded if ``above``) and of the parameters in
+    `NO_LESS_THAN` that are not fitted. ``whole`` means that it is an integer.
     """
 
     name: str
@@ -39,54 +39,58 @@ class Parameter:
 
 
 def find_parameters(scene: Scene, liquid_id: str, names: Sequence[str]) -> tuple[Parameter, ...]:
-    """Return the parameters called ``names`` of a scene whose liquids name their effects.
+    """Return the parameters with these names in a scene whose liquids name their effects.
 
-    A name is a field of the liquid, of the tables of its effects or of the body, such as ``drag_coefficient``; if two
-    share a name, the first in this order is used, unless the table is named: ``body.density_kg_m3``.
+    A name is a field of the liquid, of its effects or of the body, such as ``drag_coefficient``. If several fields have
+    this name, the first in this order is used; ``body.density_kg_m3`` selects the field of a table.
 
     Raises
     ------
     StudyError
         There is no such liquid or parameter, or a parameter is named twice or cannot be fitted.
     """
-    tables = dict(_tables(scene, _liquid(scene, liquid_id)))
+    tables = dict(_effective_tables(scene, _find_liquid(scene, liquid_id)))
     if not names:
         raise StudyError("specify at least one parameter to fit, such as drag_coefficient")
-    parameters = tuple(_parameter(tables, name) for name in names)
+    parameters = tuple(_find_parameter(tables, name) for name in names)
     for k, parameter in enumerate(parameters):
         for other in parameters[:k]:
             if (parameter.table, parameter.field) == (other.table, other.field):
                 raise StudyError(f"{other.name} and {parameter.name} are the same parameter: specify it once")
-    return tuple(_narrow_range(it, tables[it.table], parameters) for it in parameters)
+    return tuple(_narrow_range(parameter, tables[parameter.table], parameters) for parameter in parameters)
 
 
-def _narrow_range(it: Parameter, table: BaseModel, fitted: Sequence[Parameter]) -> Parameter:
+def _narrow_range(parameter: Parameter, table: BaseModel, fitted: Sequence[Parameter]) -> Parameter:
     """Return a parameter with its range limited by the fixed fields of `NO_LESS_THAN`."""
-    fields = {parameter.field for parameter in fitted if parameter.table == it.table}
+    fields = {other.field for other in fitted if other.table == parameter.table}
     for greater, less in NO_LESS_THAN.items():
-        if it.field == greater and less not in fields:
-            return dataclasses.replace(it, least=float(getattr(table, less)), above=False)
-        if it.field == less and greater not in fields and hasattr(table, greater):
-            return dataclasses.replace(it, most=float(getattr(table, greater)))
-    return it
+        if parameter.field == greater and less not in fields:
+            return dataclasses.replace(parameter, least=float(getattr(table, less)), above=False)
+        if parameter.field == less and greater not in fields and hasattr(table, greater):
+            return dataclasses.replace(parameter, most=float(getattr(table, greater)))
+    return parameter
 
 
 def replace_values(scene: Scene, liquid_id: str, parameters: Sequence[Parameter], values: Sequence[float]) -> Scene:
     """Return the scene with new values; integers are rounded."""
     tree = scene.model_dump()
     for parameter, value in zip(parameters, values, strict=True):
-        rows = [tree["body"]] if parameter.table == "body" else [it for it in tree["liquids"] if it["id"] == liquid_id]
+        rows = (
+            [tree["body"]] if parameter.table == "body" else [row for row in tree["liquids"] if row["id"] == liquid_id]
+        )
         for row in rows:
             table = row if parameter.table in {"body", "liquid"} else row[parameter.table]
             table[parameter.field] = round(value) if parameter.whole else float(value)
     try:
         return Scene.model_validate(tree)
     except ValidationError as error:
-        said = ", ".join(f"{it.name} = {value:g}" for it, value in zip(parameters, values, strict=True))
-        raise StudyError(f"{said} is not permitted: {error.errors()[0]['msg']}") from error
+        new_values = ", ".join(
+            f"{parameter.name} = {value:g}" for parameter, value in zip(parameters, values, strict=True)
+        )
+        raise StudyError(f"{new_values} is not permitted: {error.errors()[0]['msg']}") from error
 
 
-def _liquid(scene: Scene, liquid_id: str) -> Liquid:
+def _find_liquid(scene: Scene, liquid_id: str) -> Liquid:
     for liquid in scene.liquids:
         if liquid.id == liquid_id:
             return liquid
@@ -94,8 +98,8 @@ def _liquid(scene: Scene, liquid_id: str) -> Liquid:
     raise StudyError(f"the scene does not contain the liquid {liquid_id!r}; its liquids are {liquids}")
 
 
-def _tables(scene: Scene, liquid: Liquid) -> Iterator[tuple[str, BaseModel]]:
-    """Yield the tables that affect the force, in the search order for plain names."""
+def _effective_tables(scene: Scene, liquid: Liquid) -> Iterator[tuple[str, BaseModel]]:
+    """Yield the tables that affect the force, in the order in which a name is searched."""
     yield "liquid", liquid
     for effect in EFFECTS:
         if effect.model is not None and effect.name in liquid.effects:
@@ -105,20 +109,20 @@ def _tables(scene: Scene, liquid: Liquid) -> Iterator[tuple[str, BaseModel]]:
 
 def _fill_open_values(scene: Scene, effect: Effect, table: BaseModel) -> BaseModel:
     """Return a table with unset parameters computed from the scene."""
-    values = {name: of(scene) for name, of in effect.open_values.items() if getattr(table, name) is None}
+    values = {name: value_in(scene) for name, value_in in effect.open_values.items() if getattr(table, name) is None}
     return table.model_copy(update=values)
 
 
-def _parameter(tables: Mapping[str, BaseModel], name: str) -> Parameter:
-    place, _, field = name.rpartition(".")
+def _find_parameter(tables: Mapping[str, BaseModel], name: str) -> Parameter:
+    prefix, _, field = name.rpartition(".")
     if field in _THRESHOLDS:
         raise StudyError(
             f"{name} is a threshold and cannot be fitted, because the force does not change smoothly with it: set "
             "it with --set and compare the residuals"
         )
-    numbers = {name: dict(_numbers(table)) for name, table in tables.items()}
+    numbers = {name: dict(_numeric_fields(table)) for name, table in tables.items()}
     for table, fields in numbers.items():
-        if field in fields and place in {"", table}:
+        if field in fields and prefix in {"", table}:
             least, most, above, whole = fields[field]
             value = getattr(tables[table], field)
             if value is None:
@@ -136,15 +140,15 @@ def _parameter(tables: Mapping[str, BaseModel], name: str) -> Parameter:
                 whole=whole,
             )
     known = sorted({field for fields in numbers.values() for field in fields} - set(_THRESHOLDS))
-    near = difflib.get_close_matches(field, known, n=1)
-    meant = f"did you mean {near[0]!r}? " if near else ""
+    similar = difflib.get_close_matches(field, known, n=1)
+    suggestion = f"did you mean {similar[0]!r}? " if similar else ""
     raise StudyError(
-        f"unknown parameter {name!r}: {meant}the parameters of this liquid and its effects are {', '.join(known)}"
+        f"unknown parameter {name!r}: {suggestion}the parameters of this liquid and its effects are {', '.join(known)}"
     )
 
 
-def _numbers(table: BaseModel) -> Iterator[tuple[str, tuple[float, float, bool, bool]]]:
-    """Yield every numeric field with its limits, whether the least is excluded, and whether it is an integer."""
+def _numeric_fields(table: BaseModel) -> Iterator[tuple[str, tuple[float, float, bool, bool]]]:
+    """Yield each numeric field with its limits, whether the lower one is excluded, and whether it is an integer."""
     for field, schema in type(table).model_json_schema()["properties"].items():
         for kind in schema.get("anyOf", [schema]):
             if kind.get("type") in {"number", "integer"}:

@@ -1,4 +1,4 @@
-"""The files of a fit: a report, a preset for other commands, the residuals as a table, and a figure."""
+"""Writes the files of a fit: a report, a preset for other commands, a table of residuals, and a figure."""
 
 import hashlib
 from pathlib import Path
@@ -18,24 +18,28 @@ _CURVE_COLUMNS: Final[tuple[str, ...]] = (*FLOW_CURVE, "fitted_pa", "residual_pa
 
 
 def report_text(estimates: Estimates) -> str:
-    """Return the report: the parameters before and after with their intervals, the residual, and warnings."""
+    """Return the report: initial and fitted parameters, their intervals, the residual, and the warnings."""
     rows = [
         ["parameter", "from", "fitted", f"{100 * CONFIDENCE:g} % interval"],
-        *([it.name, f"{it.value:.5g}", *estimates.row(it)] for it in estimates.parameters),
+        *([parameter.name, f"{parameter.value:.5g}", *estimates.row(parameter)] for parameter in estimates.parameters),
     ]
     widths = [max(len(cell) for cell in column) for column in zip(*rows, strict=True)]
     table = [
         "  " + "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows
     ]
     return "\n".join(
-        (f"{estimates.liquid_id}: {estimates.summary()}", *table, *(f"warning: {it}" for it in estimates.warnings))
+        (
+            f"{estimates.liquid_id}: {estimates.summary()}",
+            *table,
+            *(f"warning: {warning}" for warning in estimates.warnings),
+        )
     )
 
 
 def write_fit(fit: Fit | CurveFit, to: Path, source: Path) -> tuple[Path, ...]:
     """Write preset (TOML), report (text), residuals (CSV) and figure into the folder ``to``; return the files.
 
-    ``source`` is the measured file, which the preset names with its hash.
+    ``source`` is the measured file; the preset contains its name and hash.
 
     Raises
     ------
@@ -53,28 +57,33 @@ def write_fit(fit: Fit | CurveFit, to: Path, source: Path) -> tuple[Path, ...]:
         columns, figure, what = COLUMNS, figures.draw_force(fit), "force"
     table = csv_text_of([columns, *zip(*(column.tolist() for column in values), strict=True)])
     title = f"{fit.liquid_id}: measured and fitted {what}"
-    drawn = {f"{name}.{kind}": style.file_bytes(figure, kind, title, style.PLOT_SETTINGS) for kind in style.FORMATS}
+    figures_by_file = {
+        f"{name}.{kind}": style.file_bytes(figure, kind, title, style.PLOT_SETTINGS) for kind in style.FORMATS
+    }
     texts = {f"{fit.liquid_id}.toml": preset_file_text(fit, source), f"{name}.txt": f"{report_text(fit)}\n"}
-    contents = {file: said.encode() for file, said in texts.items()}
-    return write_files(to, {**contents, f"{name}.csv": table.encode(), **drawn})
+    contents = {file: text.encode() for file, text in texts.items()}
+    return write_files(to, {**contents, f"{name}.csv": table.encode(), **figures_by_file})
 
 
 def preset_file_text(estimates: Estimates, source: Path) -> str:
-    """Return the fitted scene as a scene file, each fitted number with its interval in a comment.
+    """Return the fitted scene as the text of a scene file, with the intervals in comments.
 
-    The fit uses velocities from the measured motion, not from an estimator; the file names the default estimator.
+    The fit uses velocities of the measured motion, not those of an estimator; the file has the default estimator.
     """
     digest = hashlib.sha256(source.read_bytes()).hexdigest()
-    said = (
+    comment = (
         f"Fitted to {source.name} (SHA-256 {digest[:16]}…), {estimates.summary()}.",
         *(f"Warning: {warning}." for warning in estimates.warnings),
     )
-    notes = {_place(it, estimates): f"{100 * CONFIDENCE:g} %: {estimates.row(it)[1]}" for it in estimates.parameters}
-    return scene_text(with_default_estimator(estimates.scene), said=said, notes=notes)
+    notes = {
+        _path_in_file(parameter, estimates): f"{100 * CONFIDENCE:g} %: {estimates.row(parameter)[1]}"
+        for parameter in estimates.parameters
+    }
+    return scene_text(with_default_estimator(estimates.scene), said=comment, notes=notes)
 
 
-def _place(it: Parameter, estimates: Estimates) -> tuple[str, ...]:
-    """Return the place of a parameter in a scene file."""
-    if it.table == "body":
-        return "scene", "body", it.field
-    return "liquids", estimates.liquid_id, *(() if it.table == "liquid" else (it.table,)), it.field
+def _path_in_file(parameter: Parameter, estimates: Estimates) -> tuple[str, ...]:
+    """Return the keys that lead to a parameter in a scene file."""
+    if parameter.table == "body":
+        return "scene", "body", parameter.field
+    return "liquids", estimates.liquid_id, *(() if parameter.table == "liquid" else (parameter.table,)), parameter.field

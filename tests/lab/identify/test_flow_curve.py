@@ -197,7 +197,11 @@ def test_a_fit_does_not_depend_on_the_order_of_rows(gap):
     fields = list(STARTS["ketchup"])
     first, *others = (fit_curve(begun("ketchup"), "ketchup", fields, ordered) for ordered in curves)
     for other in others:
-        assert (other.values, other.intervals, other.following) == (first.values, first.intervals, first.following)
+        assert (other.values, other.intervals, other.autocorrelation) == (
+            first.values,
+            first.intervals,
+            first.autocorrelation,
+        )
         assert other.warnings == first.warnings
 
 

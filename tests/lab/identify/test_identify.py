@@ -38,8 +38,8 @@ def test_one_linear_parameter_is_the_quotient_of_linear_regression():
     true = np.sum(force_n * unit_n) / np.sum(unit_n**2)
     left = (force_n - true * unit_n)[:, [0, 2]]
     assert found.axes == (0, 2)
-    assert found.following < 0.05
-    widened = math.sqrt((1 + max(found.following, 0)) / (1 - max(found.following, 0)))
+    assert found.autocorrelation < 0.05
+    widened = math.sqrt((1 + max(found.autocorrelation, 0)) / (1 - max(found.autocorrelation, 0)))
     half = student.ppf(0.975, left.size - 1) * math.sqrt(np.sum(left**2) / (left.size - 1) / np.sum(unit_n**2))
     assert found.values["drag_coefficient"] == pytest.approx(true, rel=1e-9)
     lower, upper = found.intervals["drag_coefficient"]
@@ -143,7 +143,7 @@ def test_a_length_beyond_what_was_measured_ends_at_the_edge():
 def test_a_missing_effect_shows_in_residuals_that_follow_one_another():
     lacking = override_all(OIL, {"effects": ("drag",)})
     found = fit(lacking, "oil", ["viscosity_pa_s"], REACH, noisy(OIL, REACH, 0.01))
-    assert found.following > 0.9
+    assert found.autocorrelation > 0.9
     assert any("are autocorrelated" in warning for warning in found.warnings)
     white = fit(OIL, "oil", ["viscosity_pa_s"], REACH, noisy(OIL, REACH, 0.01))
     widths = [upper - lower for lower, upper in (found.intervals["viscosity_pa_s"], white.intervals["viscosity_pa_s"])]
@@ -179,7 +179,7 @@ def test_a_sharp_turn_that_velocities_from_places_blur_is_doubted():
     places = measured_force.with_centred_velocity(Motion(REVERSE.t_s, REVERSE.position_m))
     force_n = noisy(TANK, REVERSE, 0.06)
     blurred = fit(TANK, "tank", ["drag_coefficient"], places, force_n)
-    assert blurred.following < 0.5
+    assert blurred.autocorrelation < 0.5
     assert any("blur sharp turns" in warning for warning in blurred.warnings)
     assert fit(TANK, "tank", ["drag_coefficient"], REVERSE, force_n).warnings == ()
 
