@@ -1,7 +1,7 @@
-"""The liquid lab without its windows: adjustable parameters, two settings side by side, and their forces.
+"""The liquid lab without its windows: adjustable parameters, two settings for comparison, and their forces.
 
-``live`` is device and servo with a scene that is edited, ``ab_comparison`` the two settings, ``parameters`` what can be
-adjusted; read these first. ``identify`` fits liquids to files of measurements.
+``live`` has device and servo and presents edited scenes; ``ab_comparison`` has the two settings, ``parameters`` the
+parameters that can be adjusted; read these first. ``identify`` fits liquids to files of measurements.
 
 Reading order: parameters, programmed_paths; ab_comparison, identify; presets, shadow; live.
 

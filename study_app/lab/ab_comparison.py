@@ -1,6 +1,6 @@
-"""Two settings for comparison, the one presented, and the history of edits, as a frozen value.
+"""Two settings for comparison, with the history of their edits; one of them is presented.
 
-Nothing here uses a device or a window. Every change makes a new `Workbench`, so undo returns the previous one.
+Nothing here uses a device or a window. Every change returns a new `Workbench`, so undo returns the previous one.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ Floats: TypeAlias = NDArray[np.float64]
 
 Side: TypeAlias = Literal["A", "B"]
 
-_MOST_STEPS: Final = 500
-_SWITCHES_BY_CHANCE: Final = 0.5
+_MAX_UNDO_STEPS: Final = 500
+_PROBABILITY_OF_B: Final = 0.5
 
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """A liquid as it was chosen and as edited; ``name`` is its displayed name."""
+    """A liquid as it was chosen (``origin``) and as it has been edited (``scene``); ``name`` is its displayed name."""
 
     name: str
     origin: Scene
@@ -39,27 +39,28 @@ class Setting:
 
     @property
     def title(self) -> str:
-        """The displayed name, with a note if the liquid was edited."""
+        """The displayed name, with a note if the liquid has been edited."""
         return f"{self.name}, edited" if self.is_edited else self.name
 
     def value(self, name: str) -> Value:
         return value_of(self.scene, name)
 
     def chosen_value(self, name: str) -> Value:
-        """Return the value of a parameter when the liquid was chosen; None if it had none."""
+        """Return the value that a parameter had when the liquid was chosen; None if it had none."""
         return value_of(self.origin, name)
 
     def changed_names(self) -> tuple[str, ...]:
-        names = (it.name for section in sections(self.scene) for it in section.parameters)
+        names = (parameter.name for section in sections(self.scene) for parameter in section.parameters)
         return tuple(name for name in names if self.value(name) != self.chosen_value(name))
 
 
 @dataclass(frozen=True, slots=True)
 class Workbench:
-    """Settings A and B; ``presented`` is the one presented to the hand.
+    """Settings A and B; ``presented`` is the side that the hand feels.
 
-    While ``blind`` the assignment is hidden: ``first`` is the side called "setting 1", and nothing can be edited.
-    ``held`` is the parameter whose slider is being dragged.
+    In a ``blind`` comparison the assignment is hidden: ``first`` is the side called "Setting 1", and nothing can be
+    edited. ``past`` and ``future`` are the pairs of settings for undo and redo. ``held`` is the parameter whose slider
+    is being dragged.
     """
 
     a: Setting
@@ -88,33 +89,33 @@ class Workbench:
         return bool(self.future) and not self.blind
 
     def shown_name(self, side: Side) -> str:
-        """Return the label of a side, which hides the assignment while blind."""
+        """Return the label of a side; in a blind comparison it hides the assignment."""
         if self.blind:
             return "Setting 1" if side == self.first else "Setting 2"
         return self.setting(side).title
 
     def changed_names(self, side: Side) -> tuple[str, ...]:
-        """Return the changed parameters of a side; while blind, none."""
+        """Return the names of a side's changed parameters; none in a blind comparison."""
         return () if self.blind else self.setting(side).changed_names()
 
     def change(self, name: str, value: Value, *, held: bool = False) -> Workbench:
         """Return a copy with one parameter of the presented setting changed.
 
-        While a slider is ``held`` its values are one undo step, including the value at its release.
+        All values of a slider while it is ``held``, and the value at its release, are one undo step.
 
         Raises
         ------
         StudyError
-            The value is not permitted, with the reason; or nothing may be edited now.
+            The value is not permitted, or nothing may be edited now; the message gives the reason.
         """
         self._refuse_blind("edited")
         key = (self.presented, name)
-        goes_on = self.held == key
-        it = self.in_hand
-        edited = replace(it, scene=with_parameter(it.scene, name, value))
-        if edited == it:
-            return replace(self, held=key if held and goes_on else None)
-        return self._edit_workbench(self.presented, edited, held=key if held else None, goes_on=goes_on)
+        same_step = self.held == key
+        setting = self.in_hand
+        edited = replace(setting, scene=with_parameter(setting.scene, name, value))
+        if edited == setting:
+            return replace(self, held=key if held and same_step else None)
+        return self._with_setting(self.presented, edited, held=key if held else None, same_step=same_step)
 
     def choose(self, side: Side, name: str, scene: Scene) -> Workbench:
         """Return a copy with another liquid on a side.
@@ -126,11 +127,11 @@ class Workbench:
         """
         self._refuse_blind("exchanged")
         the_liquid(scene)
-        return self._edit_workbench(side, Setting(name, scene, scene))
+        return self._with_setting(side, Setting(name, scene, scene))
 
     def copy_to_other(self) -> Workbench:
         self._refuse_blind("copied")
-        return self._edit_workbench(other_side(self.presented), self.in_hand)
+        return self._with_setting(other_side(self.presented), self.in_hand)
 
     def undo(self) -> Workbench:
         """Return a copy with the last edit undone; the same if there is none."""
@@ -150,20 +151,21 @@ class Workbench:
         return replace(self, presented=other_side(self.presented), held=None)
 
     def blinded(self, chance: Random) -> Workbench:
-        """Return a blind copy: setting 1 and the presented setting are drawn at random."""
+        """Return a copy for a blind comparison; setting 1 and the presented setting are drawn at random."""
         if self.blind:
             return self
-        drawn = [chance.random() < _SWITCHES_BY_CHANCE for _ in range(2)]
-        first, presented = (other_side("A") if it else "A" for it in drawn)
+        sides: tuple[Side, Side] = ("A", "B")
+        first, presented = (sides[chance.random() < _PROBABILITY_OF_B] for _ in range(2))
         return replace(self, blind=True, first=first, presented=presented, held=None)
 
     def revealed(self) -> Workbench:
         return replace(self, blind=False, first="A")
 
-    def _edit_workbench(
-        self, side: Side, setting: Setting, *, held: tuple[Side, str] | None = None, goes_on: bool = False
+    def _with_setting(
+        self, side: Side, setting: Setting, *, held: tuple[Side, str] | None = None, same_step: bool = False
     ) -> Workbench:
-        past = self.past if goes_on else (*self.past, (self.a, self.b))[-_MOST_STEPS:]
+        """Return a copy with another setting on a side, as a new undo step or as the ``same_step`` as the last one."""
+        past = self.past if same_step else (*self.past, (self.a, self.b))[-_MAX_UNDO_STEPS:]
         a, b = (setting, self.b) if side == "A" else (self.a, setting)
         return replace(self, a=a, b=b, past=past, future=(), held=held)
 

@@ -1,7 +1,7 @@
-"""Device and servo of the lab: edited scenes, programmed paths that move the hand, and their results.
+"""Device and servo of the lab: presents edited scenes, moves the hand along programmed paths, and reads the results.
 
-It has no thread: its owner calls `poll` about thirty times per second. The servo only receives complete scenes and
-provides telemetry; at the end of the lab `close` writes zero force before it closes the device.
+`Live` has no thread: its owner calls `poll` about thirty times per second. The servo only receives complete scenes and
+provides telemetry. At the end of the lab, `close` sends zero force before it closes the device.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from study_app.haptics.model.motion import Motion
 
 
-_SPAN_NS: Final = 10_000_000_000
+_COUNTED_NS: Final = 10_000_000_000
 _NOW_NS: Final = 150_000_000
 
 
@@ -44,7 +44,7 @@ class LimiterCount:
 
 
 class LimiterCounts:
-    """Counts of the last 10 s, batch by batch."""
+    """Counts how often the limiters acted in the last 10 s, in batches of samples."""
 
     def __init__(self) -> None:
         self._batches: deque[tuple[int, Any]] = deque()
@@ -53,16 +53,17 @@ class LimiterCounts:
         if len(samples) == 0:
             return
         newest_ns = int(samples.time_ns[-1])
-        self._batches.append((newest_ns, np.array([np.count_nonzero(samples.limiters & it.bit) for it in LIMITERS])))
-        while self._batches[0][0] <= newest_ns - _SPAN_NS:
+        counts = np.array([np.count_nonzero(samples.limiters & limiter.bit) for limiter in LIMITERS])
+        self._batches.append((newest_ns, counts))
+        while self._batches[0][0] <= newest_ns - _COUNTED_NS:
             self._batches.popleft()
 
     def rows(self, force_limit_n: float, slew_n: float) -> tuple[LimiterCount, ...]:
-        """Return every limiter, for these limits of the force and of its change per tick."""
+        """Return the counts of every limiter; names contain the limits of the force and of its change per tick."""
         newest_ns = self._batches[-1][0] if self._batches else 0
-        nothing = np.zeros(len(LIMITERS), np.int64)
-        counts = sum((batch for _, batch in self._batches), nothing)
-        acting = sum((batch for when, batch in self._batches if when > newest_ns - _NOW_NS), nothing)
+        zeros = np.zeros(len(LIMITERS), np.int64)
+        counts = sum((batch for _, batch in self._batches), zeros)
+        acting = sum((batch for end_ns, batch in self._batches if end_ns > newest_ns - _NOW_NS), zeros)
         limits = {LIMITER_SLEW: f", {slew_n:g} N per tick", LIMITER_NORM: f", {force_limit_n:g} N"}
         return tuple(
             LimiterCount(limiter.label + limits.get(limiter.bit, ""), int(ticks), bool(now))
@@ -74,8 +75,8 @@ _Vector = tuple[float, float, float]
 
 WORKSPACE_M: Final[_Vector] = (0.1, 0.06, 0.06)
 _FORCE_LIMIT_N: Final = 8.0
-_ELEMENTS: Final = 100_000  # greatest length of a wake
-_SPACING_NS: Final = 50_000_000  # duration of a fade: with faster changes by a slider no scene would reach the hand
+_ELEMENTS: Final = 100_000  # maximum length of a wake
+_FADE_NS: Final = 50_000_000  # duration of a fade; a new scene waits for its end, so that each one can be felt
 _LONGEST_GAP_NS: Final = 200_000_000
 
 
@@ -83,7 +84,7 @@ _LONGEST_GAP_NS: Final = 200_000_000
 class Reading:
     """Hand position [m, hand frame], force on the hand [N], wake at the body [m/s, scene], and state of the servo.
 
-    ``fault`` is a sentence on why the servo stopped itself, "" while it runs.
+    ``fault`` is a sentence with the reason why the servo stopped itself, "" while it runs.
     """
 
     position_m: _Vector
@@ -94,7 +95,7 @@ class Reading:
 
 
 class Live:
-    """An opened device and its servo in the lab; the servo's ``rate_hz`` is the rate of all scenes here."""
+    """An open device and its servo in the lab; all scenes run at the servo's ``rate_hz``."""
 
     def __init__(self, rig: Rig) -> None:
         self._rig = rig
@@ -109,7 +110,7 @@ class Live:
         self.hand = hand_of(device)
         self._counts = LimiterCounts()
         self.workbench: Workbench | None = None
-        self._due: Workbench | None = None
+        self._waiting: Workbench | None = None
         self._loaded_ns: int | None = None
         self._closed = False
 
@@ -119,11 +120,11 @@ class Live:
         self.shadow.prepare()
 
     def feel(self, bench: Workbench, *, anew: bool = False) -> None:
-        """Present the selected setting of ``bench`` from the next tick, and compute the other one alongside.
+        """Present the selected setting of ``bench`` from the next tick, and compute the other setting in parallel.
 
-        Changes of parameters keep the wake (`Servo.adjust`). Other changes begin with a fade of 50 ms; the newest
-        change during a fade waits for its end. A setting that is already presented continues unchanged, unless ``anew``
-        restarts it in a blind comparison.
+        Changes of parameters keep the wake (`Servo.adjust`). Other changes begin with a fade of 50 ms; during a fade,
+        the latest change waits for its end. A setting that is already presented continues unchanged, unless ``anew``
+        restarts it for a blind comparison.
 
         Raises
         ------
@@ -131,26 +132,26 @@ class Live:
             The servo cannot present it, or has stopped itself.
         """
         before = self.workbench
-        goes_on = self._due is None and before is not None and before.presented == bench.presented and not anew
-        if goes_on and before is not None and before.in_hand.scene == bench.in_hand.scene:
+        continues = self._waiting is None and before is not None and before.presented == bench.presented and not anew
+        if continues and before is not None and before.in_hand.scene == bench.in_hand.scene:
             self.servo.check()
             side = other_side(bench.presented)
             self.workbench = bench
             for shadow in (self.shadow, *([self._ghost.shadow] if self._ghost is not None else ())):
                 shadow.set_other(side, self._presentable(bench.setting(side).scene))
             return
-        if goes_on and self.servo.may_adjust(self._presentable(bench.in_hand.scene)):
-            self._present(bench, goes_on=True)
+        if continues and self.servo.may_adjust(self._presentable(bench.in_hand.scene)):
+            self._present(bench, continues=True)
             return
-        self._due = bench
-        self._load_what_is_due()
+        self._waiting = bench
+        self._load_waiting_scene()
 
     @property
     def due_in_s(self) -> float | None:
-        """Time until `poll` may load a waiting scene; None if none waits."""
-        if self._due is None or self._loaded_ns is None:
+        """Time until `poll` may load the waiting scene [s]; None if no scene waits."""
+        if self._waiting is None or self._loaded_ns is None:
             return None
-        return max(self._loaded_ns + _SPACING_NS - self.servo.now_ns(), 0) * 1e-9
+        return max(self._loaded_ns + _FADE_NS - self.servo.now_ns(), 0) * 1e-9
 
     def poll(self) -> None:
         """Process new telemetry, load a waiting scene, and restart a path that has ended.
@@ -167,14 +168,14 @@ class Live:
             self.shadow.process_samples(samples, lost=lost)
         if self._ghost is not None:
             self._ghost.follow(self.servo.now_ns())
-        self._load_what_is_due()
+        self._load_waiting_scene()
         if self.path is not None and self.hand is not None and not self.hand.moving:
-            self._lead()
+            self._start_path()
 
     def play(self, name: str | None) -> None:
         """Move the hand along a programmed path repeatedly; with None stop.
 
-        A device held by a person is not moved: then the path is only computed and drawn.
+        A device that a person holds is not moved; then the path is only computed and drawn.
 
         Raises
         ------
@@ -186,24 +187,24 @@ class Live:
             if self.hand is not None:
                 self.hand.rest()
             return
-        motion = self._programme(name)
+        motion = self._programmed_motion(name)
         self.path = name
         if self.hand is not None:
-            self._lead()
+            self._start_path()
         else:
             self._ghost = _Ghost(motion, self.servo.rate_hz, self.device.force_limit_n, self.servo.now_ns())
             if self.workbench is not None:
-                a, b = (self._presentable(it.scene) for it in (self.workbench.a, self.workbench.b))
+                a, b = (self._presentable(setting.scene) for setting in (self.workbench.a, self.workbench.b))
                 self._ghost.begin(self.workbench.presented, a, b)
 
     def point_to(self, x_m: float, y_m: float, z_m: float) -> None:
-        """Set the pointer [m, hand frame] of a device that has one, unless a path moves it."""
+        """Move the pointer [m, hand frame] of a device that has one, unless a path moves it."""
         point_to: Callable[[float, float, float], None] | None = getattr(self.device, "point_to", None)
         if point_to is not None and self.path is None:
             point_to(x_m, y_m, z_m)
 
     def press(self, buttons: int) -> None:
-        """Press exactly these buttons of a device that has a pointer: button 1 is bit 0."""
+        """Press exactly these buttons of a device that has a pointer; button 1 is bit 0."""
         if self.hand is not None and hasattr(self.device, "point_to"):
             self.hand.press(buttons)
 
@@ -223,13 +224,13 @@ class Live:
 
     def trace(self) -> Trace | None:
         """Return the last 2.5 s for A and for B."""
-        return self._shown.trace()
+        return self._active_shadow.trace()
 
     def tail(self, side: Side) -> Tail | None:
-        return self._shown.tail(side)
+        return self._active_shadow.tail(side)
 
     def reading(self) -> Reading | None:
-        """Return the present state; None before the first tick."""
+        """Return the current state; None before the first tick."""
         latest = self.servo.telemetry.latest()
         if latest is None:
             return None
@@ -242,7 +243,7 @@ class Live:
         )
 
     def close(self) -> None:
-        """End in a safe order: zero force, stop the servo, close the device; a second call does nothing."""
+        """Send zero force, stop the servo and close the device, in this safe order; a second call does nothing."""
         if self._closed:
             return
         self._closed = True
@@ -258,58 +259,59 @@ class Live:
         self.close()
 
     @property
-    def _shown(self) -> Shadow:
+    def _active_shadow(self) -> Shadow:
         return self.shadow if self._ghost is None else self._ghost.shadow
 
-    def _load_what_is_due(self) -> None:
+    def _load_waiting_scene(self) -> None:
         now_ns = self.servo.now_ns()
-        if self._due is None or (self._loaded_ns is not None and now_ns < self._loaded_ns + _SPACING_NS):
+        if self._waiting is None or (self._loaded_ns is not None and now_ns < self._loaded_ns + _FADE_NS):
             return
-        bench, self._due = self._due, None
+        bench, self._waiting = self._waiting, None
         self._loaded_ns = now_ns
-        self._present(bench, goes_on=False)
+        self._present(bench, continues=False)
 
-    def _present(self, bench: Workbench, *, goes_on: bool) -> None:
+    def _present(self, bench: Workbench, *, continues: bool) -> None:
         """Present the selected setting with the servo, and update the shadows."""
-        a, b = (self._presentable(it.scene) for it in (bench.a, bench.b))
-        serial = (self.servo.adjust if goes_on else self.servo.load)(a if bench.presented == "A" else b)
+        a, b = (self._presentable(setting.scene) for setting in (bench.a, bench.b))
+        serial = (self.servo.adjust if continues else self.servo.load)(a if bench.presented == "A" else b)
         self.workbench = bench
-        self.shadow.expect(serial, bench.presented, a, b, goes_on=goes_on)
+        self.shadow.expect(serial, bench.presented, a, b, continues=continues)
         if self._ghost is not None:
-            self._ghost.begin(bench.presented, a, b, goes_on=goes_on)
+            self._ghost.begin(bench.presented, a, b, continues=continues)
 
     def _presentable(self, scene: Scene) -> Scene:
-        """Return a scene at the servo's rate."""
-        same = scene.rate_hz == self.servo.rate_hz
-        return scene if same else Scene(**(dict(scene) | {"rate_hz": self.servo.rate_hz}))
+        """Return a scene with the servo's rate."""
+        if scene.rate_hz == self.servo.rate_hz:
+            return scene
+        return Scene(**(dict(scene) | {"rate_hz": self.servo.rate_hz}))
 
-    def _programme(self, name: str) -> Motion:
+    def _programmed_motion(self, name: str) -> Motion:
         scene = Scene() if self.workbench is None else self.workbench.in_hand.scene
         return programmed_path(name, scene, self.device.workspace_m)
 
-    def _lead(self) -> None:
-        """Move the hand to the path from its current position."""
+    def _start_path(self) -> None:
+        """Move the hand from its current position to the path, and along it."""
         assert self.path is not None and self.hand is not None  # noqa: S101, PT018 - called for a path and a hand
-        motion = lead_to_path(self._programme(self.path), self.hand.aim_m)
+        motion = lead_to_path(self._programmed_motion(self.path), self.hand.aim_m)
         self.hand.follow(motion.t_s, motion.position_m)
 
 
 class _Ghost:
-    """A path without a hand: samples like those of a servo, for a separate shadow."""
+    """A path that no hand follows: it makes samples like those of a servo, for a separate shadow."""
 
     def __init__(self, motion: Motion, rate_hz: float, limit_n: float, now_ns: int) -> None:
-        self.shadow = Shadow(Scene(rate_hz=rate_hz), _ELEMENTS, limit_n, alone=True)
+        self.shadow = Shadow(Scene(rate_hz=rate_hz), _ELEMENTS, limit_n, without_servo=True)
         self._motion = lead_to_path(motion, motion.position_m[-1])
         self._period_ns = round(1e9 / rate_hz)
         self._started_ns = self._next_ns = now_ns
         self._serial = 0
 
-    def begin(self, presented: Side, a: Scene, b: Scene, *, goes_on: bool = False) -> None:
+    def begin(self, presented: Side, a: Scene, b: Scene, *, continues: bool = False) -> None:
         self._serial += 1
-        self.shadow.expect(self._serial, presented, a, b, goes_on=goes_on)
+        self.shadow.expect(self._serial, presented, a, b, continues=continues)
 
     def follow(self, now_ns: int) -> None:
-        """Compute the ticks that a servo would have run by now; skip those overdue for too long."""
+        """Compute the ticks that a servo would have run by now; skip those that are overdue for too long."""
         first_ns = max(self._next_ns, now_ns - _LONGEST_GAP_NS)
         times_ns = np.arange(first_ns, now_ns, self._period_ns)
         if len(times_ns) == 0:
@@ -330,26 +332,26 @@ def open_live(
     progress: Callable[[str], object] | None = None,
     cancelled: Callable[[], bool] | None = None,
 ) -> Live:
-    """Open a device and start its servo at rest; compiling takes a minute the first time.
+    """Open a device and start its servo at rest; the first compilation takes a minute.
 
     Parameters
     ----------
-    options : values of options by name; those of other devices are ignored
-    progress : receives the device's requests while it is opened
-    cancelled : returns whether to stop opening it
+    options : values of options by name; options of other devices are ignored
+    progress : function that gets the device's requests while it is opened
+    cancelled : function that returns whether to stop opening it
 
     Raises
     ------
     StudyError
         The device cannot be opened; nothing is left open.
     """
-    taken = {option.name for option in descriptor_of(name).options}
+    known_options = {option.name for option in descriptor_of(name).options}
     settings = RigSettings(
         workspace_m=WORKSPACE_M,
         force_limit_n=_FORCE_LIMIT_N,
         elements=_ELEMENTS,
         random=stream(1, "lab/tremor"),
-        options={option: value for option, value in (options or {}).items() if option in taken},
+        options={option: value for option, value in (options or {}).items() if option in known_options},
     )
     rig = open_rig(name, settings, progress=progress, cancelled=cancelled)
     try:

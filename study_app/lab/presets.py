@@ -1,4 +1,4 @@
-"""The available liquids, and settings saved as presets: scene files that every command accepts."""
+"""The available liquids, and settings saved as presets, which are scene files that every command accepts."""
 
 from __future__ import annotations
 
@@ -35,24 +35,26 @@ class Choice:
         return load_scene(self.source, self.liquid)
 
     def setting(self) -> Setting:
-        """Return the initial setting of the liquid on a side of the workbench.
+        """Return the initial setting of the liquid for a side of the workbench.
 
-        If its file has the default "ewma", the lab uses "kalman", also in presets saved there.
+        If its file has the default "ewma", the lab uses "kalman" instead, also in the presets that it saves.
         """
         scene = with_default_estimator(self.scene)
         return Setting(displayed_name(self.liquid), scene, scene)
 
 
 def available_liquids(folders: tuple[Path, ...] | None = None, saved: tuple[str, ...] = ()) -> tuple[Choice, ...]:
-    """Return every liquid of the shipped protocols, of the files in ``folders``, and of the ``saved`` ones.
+    """Return the liquids of the shipped protocols, of the files in ``folders``, and of the ``saved`` files.
 
     ``folders`` is by default the workspace's ``protocols``. Broken files are skipped; a file in ``folders`` with the
     name of a shipped one replaces it.
     """
     folders = (workspace().protocols,) if folders is None else folders
-    own = [str(path) for folder in folders for path in sorted(folder.glob("[!.]*.toml")) if path.stem not in shipped()]
+    in_folders = [
+        str(path) for folder in folders for path in sorted(folder.glob("[!.]*.toml")) if path.stem not in shipped()
+    ]
     choices: list[Choice] = []
-    for source in dict.fromkeys([*shipped(), *own, *saved]):
+    for source in dict.fromkeys([*shipped(), *in_folders, *saved]):
         with suppress(ProtocolError):
             choices += liquids_of(source)
     return tuple(choices)
@@ -73,12 +75,12 @@ def liquids_of(source: str) -> tuple[Choice, ...]:
 
 
 def preset_text(setting: Setting) -> str:
-    """Return a setting as a scene file, with a comment that lists the changes."""
+    """Return a setting as the text of a scene file, with a comment that lists the changes."""
     changed = ", ".join(setting.changed_names())
-    said = [f"{setting.name}, as set in the liquid lab."]
+    comment = [f"{setting.name}, as set in the liquid lab."]
     if changed:
-        said.append(f"Changed from the preset: {changed}.")
-    return scene_text(setting.scene, said=said)
+        comment.append(f"Changed from the preset: {changed}.")
+    return scene_text(setting.scene, said=comment)
 
 
 def save_preset(path: Path, text: str) -> None:

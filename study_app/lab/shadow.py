@@ -1,9 +1,9 @@
-"""Recomputes the presented setting outside the servo, and the other setting on the same motion.
+"""Recomputes the presented setting outside the servo, and the other setting for the same motion.
 
-Telemetry is processed in batches by the servo's tick (``haptics.runtime.offline``) for A and for B, each with a
-separate state. The presented side starts with the persistent state of the servo's safety layer, so that its forces
-equal the servo's to the last bit; the other side continues with a copy of it. Both velocity filters use the force that
-was sent, since it moved the hand. Nothing here can delay the servo.
+Batches of telemetry are processed with the servo's tick (``haptics.runtime.offline``), for A and for B, each with a
+separate state. The presented side has the persistent state of the servo's safety layer, so that its forces are equal to
+the servo's to the last bit; the other side continues with a copy of this state. Both velocity filters use the force
+that was sent, since this force moved the hand. Nothing here can delay the servo.
 """
 
 from dataclasses import dataclass
@@ -24,16 +24,16 @@ from study_app.lab.ab_comparison import Side, other_side
 
 Floats: TypeAlias = NDArray[np.float64]
 
-_MOST_POINTS: Final = 400
+_MAX_POINTS: Final = 400
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Tail:
-    """The moving elements of a wake as positions, from the oldest to the newest, thinned to at most 400.
+    """Positions of the moving elements of a wake, from the oldest to the newest; at most 400 of them.
 
-    ``positions_m`` (n, 3) [m, hand frame]; ``breaks`` (n,) bool, true where a segment begins; ``ages`` (n,) from 0, the
-    newest possible element, to 1, the oldest. ``alive`` of at most ``elements`` are stored now, including those at
-    rest, in ``segments`` segments (cells of a local wake).
+    ``positions_m`` is (n, 3) [m, hand frame]; ``breaks`` (n,) is true where a segment begins; ``ages`` (n,) are from 0,
+    the newest possible element, to 1, the oldest. The wake stores ``alive`` elements now, including those at rest, and
+    at most ``elements``, in ``segments`` segments (cells of a local wake).
     """
 
     positions_m: Floats
@@ -46,8 +46,8 @@ class Tail:
 
 def _tail_of(trail: Any, places: Any, elements: int) -> Tail:
     """Return the tail of a trail (``haptics.runtime.offline``) of at most ``elements`` elements."""
-    left, held = int(trail.left), int(trail.held)
-    numbers = np.arange(left - held, left)
+    left, stored = int(trail.left), int(trail.held)
+    numbers = np.arange(left - stored, left)
     samples = places[numbers % len(places)]
     moving = samples.moving != 0
     numbers, samples = numbers[moving], samples[moving]
@@ -60,24 +60,24 @@ def _tail_of(trail: Any, places: Any, elements: int) -> Tail:
         breaks=breaks[kept],
         ages=np.clip(ages, 0.0, 1.0),
         elements=elements,
-        alive=held,
+        alive=stored,
         segments=int(trail.segments),
     )
 
 
 def _rows_to_draw(breaks: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Return the rows to draw: evenly spaced ones, the newest, and starts of segments if they fit."""
+    """Return the rows to draw: starts of segments (the newest ones if there are too many), and evenly spaced rows."""
     count = len(breaks)
-    if count <= _MOST_POINTS:
+    if count <= _MAX_POINTS:
         return np.arange(count)
     begins = np.flatnonzero(breaks)
-    if len(begins) > _MOST_POINTS // 2:
-        begins = begins[-(_MOST_POINTS // 2) :]
-    even = np.linspace(0, count - 1, _MOST_POINTS - len(begins)).round().astype(np.int64)
+    if len(begins) > _MAX_POINTS // 2:
+        begins = begins[-(_MAX_POINTS // 2) :]
+    even = np.linspace(0, count - 1, _MAX_POINTS - len(begins)).round().astype(np.int64)
     return np.unique(np.concatenate([begins, even]))
 
 
-_SPAN_S: Final = 2.5
+_TRACE_S: Final = 2.5
 _SIDES: Final[tuple[Side, Side]] = ("A", "B")
 
 _ROW: Final = np.dtype(
@@ -95,11 +95,11 @@ _ROW: Final = np.dtype(
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Trace:
-    """The last 2.5 s of one motion for A and for B; ``t_s`` (n,) ends at 0, the newest sample.
+    """The last 2.5 s of a motion, for A and for B; ``t_s`` (n,) ends at 0, the newest sample.
 
     ``force_a_n``, ``force_b_n`` (n, 3) are the forces on the hand, sent by the servo or, for the other side, as they
     would have been sent; ``body_mps``, ``wake_a_mps`` and ``wake_b_mps`` (n,) are speeds in the scene; ``presented_a``
-    (n,) tells where A was presented.
+    (n,) is true where A was presented.
     """
 
     t_s: Floats
@@ -113,61 +113,61 @@ class Trace:
 
 @dataclass(slots=True)
 class _Presented:
-    """The side and scene that the servo presents from the scene's first sample on."""
+    """What the servo presents from the first sample of a scene on; ``continues`` if it only adjusted parameters."""
 
     side: Side
     scenes: dict[Side, Scene]
-    goes_on: bool
+    continues: bool
 
 
 class Shadow:
     """Recomputes both settings outside the servo, with the device's own force limit [N] and dynamics.
 
-    ``rest`` is the servo's initial scene without liquids, ``elements`` the capacity of a wake. ``alone``: the samples
-    are not from a servo, so that both sides show recomputed results.
+    ``rest`` is the servo's initial scene without liquids, ``elements`` the capacity of a wake. ``without_servo`` means
+    that the samples do not have a servo's forces, so the results of both sides are recomputed.
     """
 
     def __init__(
-        self, rest: Scene, elements: int, limit_n: float, dynamics: Dynamics = UNKNOWN, *, alone: bool = False
+        self, rest: Scene, elements: int, limit_n: float, dynamics: Dynamics = UNKNOWN, *, without_servo: bool = False
     ) -> None:
-        self._alone = alone
-        self._sides = {side: _Half(rest, elements, limit_n, dynamics) for side in _SIDES}
-        self._side: Side = "A"
+        self._without_servo = without_servo
+        self._sides = {side: _Simulation(rest, elements, limit_n, dynamics) for side in _SIDES}
+        self._presented_side: Side = "A"
         self._serial = 0
         self._expected: dict[int, _Presented] = {}
-        self._recent = _Recent()
-        self.differing = 0  # ticks in which the presented side's force differed from the servo's in any bit
-        self.followed = 0  # ticks compared
+        self._recent = _RecentSamples()
+        self.differing = 0  # number of ticks in which the recomputed force differed from the servo's in any bit
+        self.compared = 0  # number of compared ticks
 
     def prepare(self) -> None:
         """Compile all functions that run later, or load them from the cache."""
-        for half in self._sides.values():
-            half.begin(half.scene)
-            half.answer(records(SAMPLE, 0), sent=True)
-            half.restart()
+        for simulation in self._sides.values():
+            simulation.begin(simulation.scene)
+            simulation.recompute(records(SAMPLE, 0), sent=True)
+            simulation.restart()
 
-    def expect(self, serial: int, side: Side, a: Scene, b: Scene, *, goes_on: bool = False) -> None:
-        """Register the setting that the servo will present as scene ``serial``; ``goes_on`` if it only adjusts."""
-        self._expected[serial] = _Presented(side, {"A": a, "B": b}, goes_on)
+    def expect(self, serial: int, side: Side, a: Scene, b: Scene, *, continues: bool = False) -> None:
+        """Register what the servo will present as scene ``serial``; ``continues`` if it only adjusts parameters."""
+        self._expected[serial] = _Presented(side, {"A": a, "B": b}, continues)
 
     def set_other(self, side: Side, scene: Scene) -> None:
-        """Set the scene of the side not presented, if it differs."""
-        for it in self._expected.values():
-            it.scenes[side] = scene
+        """Set the scene of the side that is not presented; restart that side if the scene differs."""
+        for presented in self._expected.values():
+            presented.scenes[side] = scene
         if self._sides[side].scene != scene:
             self._sides[side].begin(scene)
 
     def process_samples(self, samples: Any, *, lost: bool = False) -> None:
-        """Process the servo's next samples (recarray of ``SAMPLE``); ``lost`` if some before them were dropped."""
+        """Process the servo's next samples (recarray of ``SAMPLE``); ``lost`` if samples before them were dropped."""
         if lost:
-            for half in self._sides.values():
-                half.begin(half.scene)
+            for simulation in self._sides.values():
+                simulation.begin(simulation.scene)
         borders = np.flatnonzero(np.diff(samples.scene, prepend=self._serial))
-        for first, behind in zip((0, *borders), (*borders, len(samples)), strict=True):
-            part = samples[first:behind]
+        for first, end in zip((0, *borders), (*borders, len(samples)), strict=True):
+            part = samples[first:end]
             if len(part):
-                self._change_to(int(part.scene[0]))
-                self._follow(part)
+                self._change_scene(int(part.scene[0]))
+                self._recompute_sides(part)
 
     def trace(self) -> Trace | None:
         return self._recent.trace()
@@ -175,37 +175,43 @@ class Shadow:
     def tail(self, side: Side) -> Tail | None:
         return self._sides[side].tail()
 
-    def _change_to(self, serial: int) -> None:
-        """Follow the servo to this scene: restart the presented side, and the other side if it changed."""
+    def _change_scene(self, serial: int) -> None:
+        """Change to the servo's scene: restart or adjust the presented side; restart the other side if it changed."""
         if serial == self._serial:
             return
         self._serial = serial
-        missed = [it for number, it in self._expected.items() if number <= serial]  # some scenes may have no sample
+        begun = [
+            scenes for number, scenes in self._expected.items() if number <= serial
+        ]  # some scenes may have no sample
         presented = self._expected.get(serial)
         if presented is None:  # rest: the servo ends, or presents nothing
             return
-        self._expected = {number: it for number, it in self._expected.items() if number > serial}
-        shown, hidden = self._sides[presented.side], self._sides[other_side(presented.side)]
-        if self._side != presented.side:
-            shown.safety, hidden.safety = (hidden.safety, hidden.safety.copy())  # the servo's own setting follows
-        goes_on = all(it.goes_on for it in missed)
-        (shown.go_on if goes_on else shown.begin)(presented.scenes[presented.side])
-        if hidden.scene != presented.scenes[other_side(presented.side)]:
-            hidden.begin(presented.scenes[other_side(presented.side)])
-        self._side = presented.side
+        self._expected = {number: scenes for number, scenes in self._expected.items() if number > serial}
+        side, other = self._sides[presented.side], self._sides[other_side(presented.side)]
+        if self._presented_side != presented.side:  # the presented side has the state of the servo's safety layer
+            side.safety, other.safety = (other.safety, other.safety.copy())
+        continues = all(scenes.continues for scenes in begun)
+        (side.adjust if continues else side.begin)(presented.scenes[presented.side])
+        if other.scene != presented.scenes[other_side(presented.side)]:
+            other.begin(presented.scenes[other_side(presented.side)])
+        self._presented_side = presented.side
 
-    def _follow(self, samples: Any) -> None:
-        """Recompute both sides for samples of one scene; show the servo's own forces for the presented side."""
-        out = {side: half.answer(samples, sent=side == self._side) for side, half in self._sides.items()}
-        if not self._alone:
-            again, out[self._side] = out[self._side], samples
-            self.followed += len(samples)
-            self.differing += int(np.count_nonzero((again.device_force_n != samples.device_force_n).any(axis=1)))
-        self._recent.add(samples.time_ns, out["A"], out["B"], presented_a=self._side == "A")
+    def _recompute_sides(self, samples: Any) -> None:
+        """Recompute both sides for samples of one scene; the forces of the presented side are the servo's."""
+        out = {
+            side: simulation.recompute(samples, sent=side == self._presented_side)
+            for side, simulation in self._sides.items()
+        }
+        if not self._without_servo:
+            recomputed, out[self._presented_side] = out[self._presented_side], samples
+            differs = (recomputed.device_force_n != samples.device_force_n).any(axis=1)
+            self.compared += len(samples)
+            self.differing += int(np.count_nonzero(differs))
+        self._recent.add(samples.time_ns, out["A"], out["B"], presented_a=self._presented_side == "A")
 
 
-class _Half:
-    """One side: its scene, packed model and safety layer."""
+class _Simulation:
+    """The simulation of a side: its scene, packed model and safety layer."""
 
     def __init__(self, rest: Scene, elements: int, limit_n: float, dynamics: Dynamics) -> None:
         self.scene = rest
@@ -218,19 +224,19 @@ class _Half:
         self.safety = new_safety(self.safety[0].device_limit_n)
 
     def begin(self, scene: Scene) -> None:
-        """Start a scene like the servo: reset the state and fade the force in."""
+        """Start a scene as the servo does: reset the state and fade the force in."""
         self.scene = scene
         pack_into(self._model, scene, dynamics=self._dynamics)
         begin_scene(self.safety[0])
         self._trail.view(np.uint8)[:] = 0
 
-    def go_on(self, scene: Scene) -> None:
-        """Adopt a scene's parameters like the servo's `adjust`: keep state and force."""
+    def adjust(self, scene: Scene) -> None:
+        """Use a scene's parameters from now on, as `Servo.adjust` does: keep state and force."""
         self.scene = scene
         adjust_into(self._model, scene, dynamics=self._dynamics)
 
-    def answer(self, samples: Any, *, sent: bool) -> Any:
-        """Return the samples with recomputed results; ``sent`` if the device received this side's force."""
+    def recompute(self, samples: Any, *, sent: bool) -> Any:
+        """Return the samples with recomputed results; ``sent`` if the device got this side's force."""
         out = samples.copy()
         recompute_sample(self._model, self.safety[0], out, self._trail[0], self._places, sent)
         return out
@@ -240,14 +246,13 @@ class _Half:
         if not scene.liquids:
             return None
         liquid = scene.liquids[0]
-        wake = (
-            liquid.wake if "wake" in liquid.effects else liquid.local_wake if "local_wake" in liquid.effects else None
-        )
+        local_wake = liquid.local_wake if "local_wake" in liquid.effects else None
+        wake = liquid.wake if "wake" in liquid.effects else local_wake
         return None if wake is None else _tail_of(self._trail[0], self._places, scaled_length(wake, scene.rate_hz))
 
 
-class _Recent:
-    """The newest samples of both sides, over the length of a trace."""
+class _RecentSamples:
+    """The latest samples of both sides, for a trace."""
 
     def __init__(self) -> None:
         self._rows: Any = records(_ROW, 0)
@@ -260,7 +265,7 @@ class _Recent:
         rows.wake_b_mps = np.linalg.norm(b.wake_mps, axis=1)
         rows.presented_a = presented_a
         joined = np.concatenate([self._rows, rows])
-        self._rows = joined[joined["time_ns"] > time_ns[-1] - round(_SPAN_S * 1e9)].view(np.recarray)
+        self._rows = joined[joined["time_ns"] > time_ns[-1] - round(_TRACE_S * 1e9)].view(np.recarray)
 
     def trace(self) -> Trace | None:
         rows = self._rows

@@ -270,9 +270,9 @@ def test_the_lab_beside_a_servo_in_its_own_thread_sees_every_tick_of_it() -> Non
         sides = bench()
         live.feel(sides)
         live.play("reverse")
-        while live.shadow.followed < 1500:
+        while live.shadow.compared < 1500:
             live.poll()
-            if live.shadow.followed > 700 and sides.presented == "A":
+            if live.shadow.compared > 700 and sides.presented == "A":
                 live.feel(sides := sides.switch())
         assert live.shadow.differing == 0
         assert live.servo.fault is None

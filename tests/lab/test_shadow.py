@@ -35,7 +35,7 @@ def test_the_felt_sides_forces_are_the_servos_to_the_last_bit_through_switches_e
     run(live, 200)
     live.feel(sides.switch())
     run(live, 900)
-    assert live.shadow.followed == 3310
+    assert live.shadow.compared == 3310
     assert live.shadow.differing == 0
     trace = live.trace()
     assert trace is not None
@@ -79,7 +79,7 @@ def test_the_other_side_is_what_it_would_be_were_it_felt() -> None:
     beside.play("reverse")
     run(beside, 2000)
     recorded = beside.servo.telemetry.ring[:2000].copy()
-    alone = Shadow(Scene(), 10_000, 8.0, alone=True)
+    alone = Shadow(Scene(), 10_000, 8.0, without_servo=True)
     alone.expect(1, "B", quiet, SCENES["light_oil"])
     alone.process_samples(recorded)
     one, other = beside.trace(), alone.trace()
@@ -96,7 +96,7 @@ def test_a_tail_is_the_path_that_was_left_and_breaks_where_it_turns() -> None:
     scene = SCENES["water"]
     wake = scene.liquids[0].wake
     assert wake is not None
-    shadow = Shadow(Scene(), 2000, 8.0, alone=True)
+    shadow = Shadow(Scene(), 2000, 8.0, without_servo=True)
     shadow.expect(1, "A", scene, scene)
     samples = records(SAMPLE, 600)
     samples.time_ns, samples.scene, samples.fresh = np.arange(600) * 1_000_000, 1, 1
@@ -121,7 +121,7 @@ def test_a_tail_is_the_path_that_was_left_and_breaks_where_it_turns() -> None:
 
 def test_a_tail_forgets_what_falls_off_it() -> None:
     scene = with_parameter(SCENES["water"], "wake.length", 100.0)
-    shadow = Shadow(Scene(), 2000, 8.0, alone=True)
+    shadow = Shadow(Scene(), 2000, 8.0, without_servo=True)
     shadow.expect(1, "A", scene, SCENES["honey"])
     samples = records(SAMPLE, 400)
     samples.time_ns, samples.scene, samples.fresh = np.arange(400) * 1_000_000, 1, 1
