@@ -140,7 +140,7 @@ class BlockResult:
 
     ``settings`` are in order, ``delays_ms`` are their delays if the block compares delays and they are known.
     ``measures`` has one row per setting and statement. ``findings`` are the tested values by the keys of the
-    descriptors in ``analysis.findings``. ``presentations`` are the least and greatest number of answers by one
+    descriptors in ``analysis.findings``. ``presentations`` are the minimum and maximum number of answers by one
     participant to a statement in one setting; ``replicated_ms`` are delays that several conditions present;
     ``sessions`` are session numbers; ``incomplete`` maps statements to participants with missing answers.
     """

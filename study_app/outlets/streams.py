@@ -117,7 +117,7 @@ class ClockMapping:
 
     @property
     def uncertainty_s(self) -> float:
-        """The greatest error of the offset [s]."""
+        """The maximum error of the offset [s]."""
         return 0.5 * (self._high_s - self._low_s)
 
 

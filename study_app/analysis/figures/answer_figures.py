@@ -251,7 +251,7 @@ def draw_threshold(
 
 
 _FILES: Final = 3
-"""Of files that are not as recorded so many are named."""
+"""Maximum number of named files that have changed since they were recorded."""
 
 
 def title(block: Block) -> str:

@@ -171,7 +171,7 @@ def empty_result(block: Block, *absent: NotTested) -> BlockResult:
 
 
 def _presentation_range(single: Iterable[Array]) -> tuple[int, int]:
-    """Return the least and greatest number of answers by a participant to one statement in one condition."""
+    """Return the minimum and maximum number of answers by a participant to one statement in one condition."""
     counts = np.concatenate([(~np.isnan(values)).sum(axis=2).ravel() for values in single] or [np.zeros(0)])
     positive = counts[counts > 0]
     return (int(positive.min()), int(positive.max())) if len(positive) else (0, 0)
