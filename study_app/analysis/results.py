@@ -283,7 +283,7 @@ class ContrastResult(Outcome):
 
     ``n`` participants are compared; ``left_out`` are the others with the reasons. ``higher`` is the number of
     participants with a higher value on the first side; None between groups. ``p_bootstrap`` and ``p_skewed`` (t
-    corrected for skewness) must also show the difference. ``equivalent`` tells whether the effect is shown to lie
+    corrected for skewness) must also show the difference. ``equivalent`` is whether the effect is shown to lie
     within the study's bound, by ``p_equivalent``, which is corrected over the hypotheses with a bound; None without a
     bound. ``not_excluded`` is then the upper limit of the 95 % interval of the share of participants that differ by
     more. ``sides`` are the numbers of those compared, ``sd`` is the standard deviation of the differences within

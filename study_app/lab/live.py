@@ -104,7 +104,7 @@ class Live:
         self.path: str | None = None
         rest = Scene(rate_hz=servo.rate_hz)
         self.shadow = Shadow(rest, servo.elements, device.force_limit_n, device.dynamics)
-        self._ghost: _Ghost | None = None
+        self._simulated_hand: _SimulatedHand | None = None
         self._reader = servo.telemetry.reader()
         self._dropped = 0
         self.hand = hand_of(device)
@@ -137,7 +137,7 @@ class Live:
             self.servo.check()
             side = other_side(bench.presented)
             self.workbench = bench
-            for shadow in (self.shadow, *([self._ghost.shadow] if self._ghost is not None else ())):
+            for shadow in (self.shadow, *([self._simulated_hand.shadow] if self._simulated_hand is not None else ())):
                 shadow.set_other(side, self._presentable(bench.setting(side).scene))
             return
         if continues and self.servo.may_adjust(self._presentable(bench.in_hand.scene)):
@@ -166,8 +166,8 @@ class Live:
         if len(samples):
             self._counts.add(samples)
             self.shadow.process_samples(samples, lost=lost)
-        if self._ghost is not None:
-            self._ghost.follow(self.servo.now_ns())
+        if self._simulated_hand is not None:
+            self._simulated_hand.follow(self.servo.now_ns())
         self._load_waiting_scene()
         if self.path is not None and self.hand is not None and not self.hand.moving:
             self._start_path()
@@ -182,7 +182,7 @@ class Live:
         StudyError
             There is no such path, or no setting is presented yet.
         """
-        self.path, self._ghost = None, None
+        self.path, self._simulated_hand = None, None
         if name is None:
             if self.hand is not None:
                 self.hand.rest()
@@ -192,10 +192,12 @@ class Live:
         if self.hand is not None:
             self._start_path()
         else:
-            self._ghost = _Ghost(motion, self.servo.rate_hz, self.device.force_limit_n, self.servo.now_ns())
+            self._simulated_hand = _SimulatedHand(
+                motion, self.servo.rate_hz, self.device.force_limit_n, self.servo.now_ns()
+            )
             if self.workbench is not None:
                 a, b = (self._presentable(setting.scene) for setting in (self.workbench.a, self.workbench.b))
-                self._ghost.begin(self.workbench.presented, a, b)
+                self._simulated_hand.begin(self.workbench.presented, a, b)
 
     def point_to(self, x_m: float, y_m: float, z_m: float) -> None:
         """Move the pointer [m, hand frame] of a device that has one, unless a path moves it."""
@@ -260,7 +262,7 @@ class Live:
 
     @property
     def _active_shadow(self) -> Shadow:
-        return self.shadow if self._ghost is None else self._ghost.shadow
+        return self.shadow if self._simulated_hand is None else self._simulated_hand.shadow
 
     def _load_waiting_scene(self) -> None:
         now_ns = self.servo.now_ns()
@@ -276,8 +278,8 @@ class Live:
         serial = (self.servo.adjust if continues else self.servo.load)(a if bench.presented == "A" else b)
         self.workbench = bench
         self.shadow.expect(serial, bench.presented, a, b, continues=continues)
-        if self._ghost is not None:
-            self._ghost.begin(bench.presented, a, b, continues=continues)
+        if self._simulated_hand is not None:
+            self._simulated_hand.begin(bench.presented, a, b, continues=continues)
 
     def _presentable(self, scene: Scene) -> Scene:
         """Return a scene with the servo's rate."""
@@ -296,8 +298,8 @@ class Live:
         self.hand.follow(motion.t_s, motion.position_m)
 
 
-class _Ghost:
-    """A path that no hand follows: it makes samples like those of a servo, for a separate shadow."""
+class _SimulatedHand:
+    """A simulated hand on a path, for devices that a person holds: its samples go to a separate shadow."""
 
     def __init__(self, motion: Motion, rate_hz: float, limit_n: float, now_ns: int) -> None:
         self.shadow = Shadow(Scene(rate_hz=rate_hz), _ELEMENTS, limit_n, without_servo=True)

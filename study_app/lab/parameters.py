@@ -61,7 +61,7 @@ def sections(scene: Scene) -> tuple[Section, ...]:
     Raises
     ------
     StudyError
-        The scene has no liquid, several, or takes its velocities from a table.
+        The scene does not have exactly one liquid, or takes its velocities from a table.
     """
     liquid = the_liquid(scene)
     effects = resolve(scene).liquids[0].effects
@@ -141,7 +141,7 @@ def the_liquid(scene: Scene) -> Liquid:
     Raises
     ------
     StudyError
-        The scene has no liquid, several, or takes its velocities from a table.
+        The scene does not have exactly one liquid, or takes its velocities from a table.
     """
     if len(scene.liquids) != 1:
         raise StudyError(f"the lab opens one liquid at a time, not {len(scene.liquids)}: choose one")

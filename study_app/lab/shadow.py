@@ -184,7 +184,7 @@ class Shadow:
             scenes for number, scenes in self._expected.items() if number <= serial
         ]  # some scenes may have no sample
         presented = self._expected.get(serial)
-        if presented is None:  # rest: the servo ends, or presents nothing
+        if presented is None:  # the servo is ending or presents no setting
             return
         self._expected = {number: scenes for number, scenes in self._expected.items() if number > serial}
         side, other = self._sides[presented.side], self._sides[other_side(presented.side)]

@@ -84,7 +84,7 @@ class Camera:
         self._failure = ""
         self._closed = False
         self.size = (0, 0)
-        self.thread = threading.Thread(target=self._work, name="camera", daemon=True)
+        self.thread = threading.Thread(target=self._run_camera, name="camera", daemon=True)
         self.thread.start()
         with self._changed:
             self._changed.wait_for(lambda: self._frames or self._failure, OPENS_S)
@@ -120,7 +120,7 @@ class Camera:
         Raises
         ------
         VideoError
-            The camera ended, or sent nothing for a second.
+            The camera stopped, or did not send a frame for a second.
         """
         with self._changed:
             failure, frames = self._failure, tuple(self._frames)
@@ -134,7 +134,7 @@ class Camera:
         self._closed = True
         self.thread.join(ENDS_S)
 
-    def _work(self) -> None:
+    def _run_camera(self) -> None:
         make_less_urgent()
         try:
             self._read_frames()
@@ -251,7 +251,7 @@ class Footage:
         self._media_ns = 0
         self._closed = False
         self._failure = ""
-        self.thread = threading.Thread(target=self._work, name="footage", daemon=True)
+        self.thread = threading.Thread(target=self._run_decoder, name="footage", daemon=True)
         self.thread.start()
 
     @property
@@ -303,7 +303,7 @@ class Footage:
             self._changed.notify_all()
         self.thread.join(PATIENCE_S)
 
-    def _work(self) -> None:
+    def _run_decoder(self) -> None:
         make_less_urgent()
         try:
             with open_video(str(self.path), **FILE_OPTIONS) as container:

@@ -140,7 +140,7 @@ class Session:
     """The contents of one session's receipt; ``visit`` is its row of ``Study.participants``.
 
     ``own_dynamics`` are the device's own damping, friction and mass; None if they were not measured.
-    ``device_velocity`` tells whether the device measured its velocity.
+    ``device_velocity`` is whether the device measured its velocity.
     """
 
     folder: SessionFolder

@@ -337,7 +337,7 @@ FOUND: Final = ("shown", "suggested")
 class Answer:
     """A row of the first page: the verdict on one question (a finding's key) about one block (its id), as text.
 
-    ``claims`` tells whether it claims that conditions differ or that a delay is noticed, which would be false in a
+    ``claims`` is whether it claims that conditions differ or that a delay is noticed, which would be false in a
     study without any difference.
     """
 

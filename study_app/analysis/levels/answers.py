@@ -56,7 +56,7 @@ def _delay_words(setting: Setting) -> str:
 class SettingEstimate:
     """A participant's settings at one standard, as in `columns.RESULTS`, or the means of ``n`` participants.
 
-    ``levels`` are a participant's settings in order; ``started_high`` tells which of them started at the high end.
+    ``levels`` are a participant's settings in order; ``started_high`` shows which of them started at the high end.
     """
 
     participant: str | None

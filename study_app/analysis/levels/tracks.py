@@ -58,9 +58,9 @@ def timed_answers(study: Study) -> pd.DataFrame:
 def tracks(study: Study) -> pd.DataFrame:
     """Return the last attempt at each trial of levels with its presented level; the key must be open.
 
-    ``right`` tells whether the answer was correct, ``success`` whether it counts as a success of the psychometric
+    ``right`` is whether the answer was correct, ``success`` whether it counts as a success of the psychometric
     function; ``analysed`` is false if the trial is excluded or presents the modulus of a magnitude estimation;
-    ``reversal`` tells whether an up–down track reversed.
+    ``reversal`` is whether an up–down track reversed.
     """
     by_id = {block.id: block for block in study.levels}
     rows = study.trials[study.trials["block"].isin(list(by_id))]

@@ -500,7 +500,7 @@ def _findings_by_effect(
 def _condition_findings(
     block: PlannedBlock, decided: Decided, answers: Array, ps: Array, shown: NDArray[np.bool_], rng: np.random.Generator
 ) -> dict[str, NDArray[np.bool_]]:
-    """Return findings about conditions; ``shown`` (studies,) tells whether the global test is significant."""
+    """Return findings about conditions; ``shown`` (studies,) is whether the global test is significant."""
     effects = len(answers)
     if block.k == 2:
         ps = signed(answers.reshape(-1, *answers.shape[2:]), rng)
@@ -544,7 +544,7 @@ def _step_down(
 ) -> NDArray[np.bool_]:
     """Return whether a trend is shown up to each delay or a shorter one (studies, items, delays).
 
-    ``shown`` (studies, items) tells whether the trend over all delays is significant. Rank correlations over fewer than
+    ``shown`` (studies, items) is whether the trend over all delays is significant. Rank correlations over fewer than
     ``first`` delays are then tested without a correction.
     """
     _, _, k, items = rising.shape

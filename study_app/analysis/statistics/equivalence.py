@@ -54,7 +54,7 @@ class Equivalence(Outcome):
     ``verdict`` is "equivalent" if every p is at most alpha; "not equivalent" if the whole interval lies beyond the
     bound (or, if all differences are equal, if they lie beyond it for so many participants that a sign test is
     significant); "out of reach" if so few participants cannot show equivalence, whatever they answer; and otherwise
-    "inconclusive", which is not evidence of a difference. ``checks_agree`` tells whether the bootstrap supports the
+    "inconclusive", which is not evidence of a difference. ``checks_agree`` is whether the bootstrap supports the
     decision of the t tests. ``beyond`` is the number of participants who differ by more than the bound; it may be
     large even if the means are equivalent.
     """

@@ -211,7 +211,7 @@ def bootstrap(
 def monte_carlo_p(is_extreme: NDArray[np.bool_], seed: int, least: float) -> tuple[float, float, str]:
     """Return p, the smallest possible p, and a description of the method for random permutations.
 
-    ``is_extreme`` (draws,) tells whether each permutation is at least as extreme as the data. ``least`` is the smallest
+    ``is_extreme`` (draws,) is whether each permutation is at least as extreme as the data. ``least`` is the smallest
     p of a full enumeration.
     """
     draws = len(is_extreme)

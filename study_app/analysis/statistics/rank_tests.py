@@ -61,7 +61,7 @@ class SignedRanks(Outcome):
 def signed_rank_test(x: ArrayLike, y: ArrayLike, *, alpha: float = 0.05) -> SignedRanks:
     """Compare answers (participants,) of the same participants in two settings; equal answers are dropped, as in R.
 
-    Pairs with NaN, a missing answer, are also dropped. The note tells whether too few pairs remain to reach p ≤
+    Pairs with NaN, a missing answer, are also dropped. The note says whether too few pairs remain to reach p ≤
     ``alpha``.
     """
     first, second = checked_values(x, "participants"), checked_values(y, "participants")
