@@ -122,7 +122,7 @@ def judgements(items: Iterable[str], trial: TrialFeatures, person: Rater, draw: 
     """Return a person's unrounded answer to each item id, in the given order: from 1 to 7, or slightly beyond."""
     item_ids = tuple(items)
     opinions_by_item = zip(item_ids, _opinions(item_ids, trial, person), strict=True)
-    return {item: opinion + person.leaning + person.noise * normal(draw) for item, opinion in opinions_by_item}
+    return {item: opinion + person.leaning + person.noise * draw_normal(draw) for item, opinion in opinions_by_item}
 
 
 def _opinions(items: Iterable[str], trial: TrialFeatures, person: Rater) -> list[float]:
@@ -334,7 +334,7 @@ class Comparison:
         threshold = self.observer.delay_jnd_s if self.delays else self.observer.weber_fraction * abs(smallest_value)
         distances = [(value - smallest_value) / threshold for value in sensed]
         return [
-            smallest_value + threshold * math.copysign(person.sensed(abs(distance), course.done), distance)
+            smallest_value + threshold * math.copysign(person.perceived_intensity(abs(distance), course.done), distance)
             for distance in distances
         ]
 
@@ -372,7 +372,7 @@ class Comparison:
             return min(points, max(1, math.floor((points + 1) / 2 + (ratio - 1) * (points - 1) + 0.5)))
         if self.observer.estimates is not None and first > 0 and sensed[-1] > 0:
             exponent, spread = self.observer.estimates
-            return _MODULUS * math.exp(exponent * math.log(sensed[-1] / first) + spread * normal(draw))
+            return _MODULUS * math.exp(exponent * math.log(sensed[-1] / first) + spread * draw_normal(draw))
         perceived = self._perceive_last_interval(sensed, draw)
         return _MODULUS * math.sqrt(max(perceived / first if mean > 0 and first > 0 else 1.0, 0.0))
 

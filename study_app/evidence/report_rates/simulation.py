@@ -396,7 +396,10 @@ def _liquid_events(asked: BlockAnswers, result: BlockResult, cell: Cell, _truth:
         )
         yield ("equal liquids distinguished", "at most 5 %"), found_equal
     if cell.extent == "full":
-        yield ("some liquids distinguished", "counted"), any(pair.tested.verdict in FOUND for pair in Pairs.value_in(result))
+        yield (
+            ("some liquids distinguished", "counted"),
+            any(pair.tested.verdict in FOUND for pair in Pairs.value_in(result)),
+        )
         yield ("liquids recognised", "counted"), _is_liquid_recognised(result)
 
 
@@ -464,7 +467,8 @@ def _equivalence(asked: BlockAnswers, result: BlockResult, truth: Array) -> Iter
         return
     nearest = min(truly_different, key=truly_different.__getitem__)
     is_called_equivalent = {
-        (tested.item, tested.delay_ms): tested.verdict == "equivalent" for tested in ContrastsWithControl.value_in(result)
+        (tested.item, tested.delay_ms): tested.verdict == "equivalent"
+        for tested in ContrastsWithControl.value_in(result)
     }
     yield ("smallest difference beyond the bound called equivalent", "at most 5 %"), is_called_equivalent[nearest]
     longest_ms = common_ms(result)

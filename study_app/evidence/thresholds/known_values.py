@@ -271,10 +271,10 @@ class KnownThreshold(_KnownValue):
         name = "delay_jnd_s" if self._of_delay else "weber_fraction"
         for deviation in deviations:
             participant = replace(
-                self.observer, person=of_kind(kind, draw) if kind else Person(lapse=LAPSES_MOST * draw())
+                self.observer, person=person_of_kind(kind, draw) if kind else Person(lapse=LAPSES_MOST * draw())
             )
             participant = replace(participant, **{name: getattr(participant, name) * math.exp(deviation)})
-            session_threshold = getattr(participant, name) * _BETWEEN_SESSIONS ** normal(draw)
+            session_threshold = getattr(participant, name) * _BETWEEN_SESSIONS ** draw_normal(draw)
             yield replace(participant, **{name: session_threshold}), self._threshold(participant)
 
     def simulate(self, number: int, seed: int, kind: str = "", observers: Sequence[Observer] = ()) -> StudyFound:

@@ -89,7 +89,7 @@ def draw_people(count: int, seed: int) -> tuple[Person, ...]:
     people = []
     for number in range(1, count + 1):
         draw = stream(seed, f"noticed/person/{number}").random
-        jnd_s = JND_S * _BETWEEN_PEOPLE ** normal(draw)
+        jnd_s = JND_S * _BETWEEN_PEOPLE ** draw_normal(draw)
         people.append(Person(Observer(delay_jnd_s=jnd_s), rater(draw)))
     return tuple(people)
 

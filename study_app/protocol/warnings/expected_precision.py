@@ -297,7 +297,7 @@ class ThresholdPlan:
         answers = len(design.answers)
         columns = np.array(
             [
-                (person.wrong(answers), person.width, person.change, person.criterion, person.repeats)
+                (person.lapse_rate(answers), person.width, person.change, person.criterion, person.repeats)
                 for person in people
             ]
         ).T
@@ -350,7 +350,9 @@ class ThresholdPlan:
         if len(presented) > _THRESHOLD_OBSERVERS:
             presented = np.append(presented[presented < low], np.linspace(low, high, _THRESHOLD_OBSERVERS))
         grid = self.stimulus.analysis_grid(self.design, self.method.assumed(self.stimulus, self.design))
-        return [observer.fit(grid, two_intervals=self.two_intervals).flat for observer in answers.given(presented)]
+        return [
+            observer.fit(grid, two_intervals=self.two_intervals).flat for observer in answers.person_answers(presented)
+        ]
 
     def estimates(self, answered: ObserverAnswers, most: int | None = None, together: int = PEOPLE) -> Estimates:
         """Return the analysis' estimates from answers; see `fits` and `grouped`."""
@@ -460,7 +462,7 @@ def precision_rows(protocol: Protocol, block: Block) -> Iterator[tuple[str, str]
     across = "" if precisions.standards == 1 else " across all standards"
     group = ""
     if people is not None:
-        group = f"; ±{100 * precisions.of_group(people):.0f} %{across} for {people} participants"
+        group = f"; ±{100 * precisions.group_half_width(people):.0f} %{across} for {people} participants"
     elif precision is not None and (needed := precisions.participants_for(precision)) is not None:
         group = f"; ±{100 * precision:g} %{across} requires {needed} participants"
     yield PRECISION, f"{plan.words}{for_one} for one participant{group} (95 % intervals)"
@@ -482,7 +484,7 @@ def imprecise(protocol: Protocol, block: Block) -> Iterator[str]:
             f"of {precisions.threshold:.2g}, because {subject} clipped"
         )
         return
-    if (group_precision := precisions.of_group(people)) <= precision:
+    if (group_precision := precisions.group_half_width(people)) <= precision:
         return
     adaptive = block.stimulus is not None and protocol.method_of(block).adaptive
     key = "trials" if adaptive else "repetitions"
