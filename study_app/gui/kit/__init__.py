@@ -1,4 +1,4 @@
-"""What every window is made of: descriptions of fields and commands, and the widgets made from them."""
+"""The building blocks of every window: descriptions of fields and commands, and the widgets made from them."""
 
 from study_app.gui.kit.commands import COMMANDS, add_commands, command_tip, connect_button, key_cap, keys_of, with_key
 from study_app.gui.kit.devices import (

@@ -1,4 +1,4 @@
-"""Commands: one table for shortcuts, tips, buttons, menus, the list of keys and what each does; their `QAction`s."""
+"""The table of keyboard commands, from which shortcuts, tips, buttons, menus and the list of keys are made."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import KW_ONLY, dataclass
@@ -16,15 +16,15 @@ class Command:
     Attributes
     ----------
     id, words : str
-        Its name in the program, and its description.
+        The command's name in the program, and its description.
     keys : tuple of str
         Alternative keys.
     within : str
-        The part of the window in which its keys work; "" for the whole window.
+        The part of the window in which the keys work; "" for the whole window.
     held : bool
-        Whether the key is held, not pressed.
+        Whether the key must be held down.
     run : callable
-        Its action in the study designer, called with the page; None if a part of the page handles it.
+        The action in the study designer, called with the page; None if a part of the page handles it.
     """
 
     id: str
@@ -37,64 +37,62 @@ class Command:
 
     @property
     def key_labels(self) -> tuple[str, ...]:
-        """Its keys as printed on a keyboard: "Ctrl+Enter", "hold Esc"."""
+        """The keys as printed on a keyboard: "Ctrl+Enter", "hold Esc"."""
         return tuple(f"{'hold ' * self.held}{_key_label(keys)}" for keys in self.keys)
 
-    def action(self, place: QWidget, run: Callable[[], object]) -> QAction:
-        """Add its action to a widget and return it: the keys work anywhere in the window while the widget is shown."""
-        made = QAction(self.words, place, toolTip=_with_keys(self), shortcutContext=Qt.ShortcutContext.WindowShortcut)
-        made.setShortcuts([QKeySequence(keys) for keys in self.keys])
-        made.triggered.connect(lambda _checked=False: run())
-        place.addAction(made)
-        return made
+    def action(self, widget: QWidget, run: Callable[[], object]) -> QAction:
+        """Add the command's action to a widget; its keys work anywhere in the window while the widget is shown."""
+        action = QAction(self.words, widget, toolTip=_tip_text(self), shortcutContext=Qt.ShortcutContext.WindowShortcut)
+        action.setShortcuts([QKeySequence(keys) for keys in self.keys])
+        action.triggered.connect(lambda _checked=False: run())
+        widget.addAction(action)
+        return action
 
 
-_LISTS: Final = "outline, lists"
+_IN_LISTS: Final = "outline, lists"
 COMMANDS: Final = (
-    Command("outline", "Outline", ("Ctrl+1",), run=lambda place: place.parts.focus_outline()),
-    Command("form", "Form", ("Ctrl+2",), run=lambda place: place.parts.focus_form()),
-    Command("views", "Views, then their tabs", ("Ctrl+3",), run=lambda place: place.parts.focus_pane()),
-    Command("problems", "Problems", ("Ctrl+4",), run=lambda place: place.parts.focus_problems()),
-    Command("header", "Header", ("Ctrl+5",), run=lambda place: place.parts.focus_header()),
-    Command("next part", "Next part", ("F6",), run=lambda place: place.parts.cycle(1)),
-    Command("part before", "Previous part", ("Shift+F6",), run=lambda place: place.parts.cycle(-1)),
-    Command("find", "Find in the study", ("Ctrl+F",), run=lambda place: place.parts.focus_find()),
-    Command("next problem", "Next problem", ("F8",), run=lambda place: place.open_next_problem()),
-    Command("file", "Switch between form and file", ("Ctrl+E",), run=lambda place: place.parts.switch_to_file()),
-    Command("home", "Home", ("Alt+Home",), run=lambda place: place.leave_for_home()),
-    Command("back", "Previous element", ("Alt+Left",), run=lambda place: place.ask("back")),
-    Command("next question", "Text of the next question", ("Alt+PgDown",), run=lambda place: place.write_question(1)),
-    Command("question before", "Text of the previous one", ("Alt+PgUp",), run=lambda place: place.write_question(-1)),
+    Command("outline", "Outline", ("Ctrl+1",), run=lambda page: page.parts.focus_outline()),
+    Command("form", "Form", ("Ctrl+2",), run=lambda page: page.parts.focus_form()),
+    Command("views", "Views, then their tabs", ("Ctrl+3",), run=lambda page: page.parts.focus_pane()),
+    Command("problems", "Problems", ("Ctrl+4",), run=lambda page: page.parts.focus_problems()),
+    Command("header", "Header", ("Ctrl+5",), run=lambda page: page.parts.focus_header()),
+    Command("next part", "Next part", ("F6",), run=lambda page: page.parts.cycle(1)),
+    Command("part before", "Previous part", ("Shift+F6",), run=lambda page: page.parts.cycle(-1)),
+    Command("find", "Find in the study", ("Ctrl+F",), run=lambda page: page.parts.focus_find()),
+    Command("next problem", "Next problem", ("F8",), run=lambda page: page.open_next_problem()),
+    Command("file", "Switch between form and file", ("Ctrl+E",), run=lambda page: page.parts.switch_to_file()),
+    Command("home", "Home", ("Alt+Home",), run=lambda page: page.leave_for_home()),
+    Command("back", "Previous element", ("Alt+Left",), run=lambda page: page.ask("back")),
+    Command("next question", "Text of the next question", ("Alt+PgDown",), run=lambda page: page.write_question(1)),
+    Command("question before", "Text of the previous one", ("Alt+PgUp",), run=lambda page: page.write_question(-1)),
     Command("page", "Participant's page", ("Ctrl+Return",)),
     Command("leave page", "Leave the page", ("Escape",), within="page"),
     Command("language", "Show the page in the next language", ("Ctrl+L",)),
-    Command("add", "Add", ("Insert",), run=lambda place: place.ask_to_add()),
+    Command("add", "Add", ("Insert",), run=lambda page: page.ask_to_add()),
     Command("open entry", "Open the element that an entry refers to", ("Return",), within="lists"),
     Command("open liquid", "Open the liquid of a condition", ("Shift+Return",), within="lists"),
-    Command("duplicate", "Duplicate", ("Ctrl+D",), run=lambda place: place.duplicate()),
-    Command(
-        "series", "Make copies that differ in one number", ("Ctrl+Shift+D",), run=lambda place: place.make_series()
-    ),
-    Command("rename", "Rename", ("F2",), run=lambda place: place.rename()),
-    Command("delete", "Delete", ("Delete",), within=_LISTS, run=lambda place: place.delete()),
-    Command("up", "Move up", ("Alt+Up",), run=lambda place: place.move_by(-1)),
-    Command("down", "Move down", ("Alt+Down",), run=lambda place: place.move_by(1)),
-    Command("new", "New study …", ("Ctrl+N",), run=lambda place: place.begin_new()),
-    Command("open", "Open file …", ("Ctrl+O",), run=lambda place: place.header.open_file()),
-    Command("save", "Save", ("Ctrl+S",), run=lambda place: place.finish("save")),
-    Command("undo", "Undo", ("Ctrl+Z",), run=lambda place: place.finish("undo")),
-    Command("redo", "Redo", ("Ctrl+Shift+Z", "Ctrl+Y"), run=lambda place: place.finish("redo")),
+    Command("duplicate", "Duplicate", ("Ctrl+D",), run=lambda page: page.duplicate()),
+    Command("series", "Make copies that differ in one number", ("Ctrl+Shift+D",), run=lambda page: page.make_series()),
+    Command("rename", "Rename", ("F2",), run=lambda page: page.rename()),
+    Command("delete", "Delete", ("Delete",), within=_IN_LISTS, run=lambda page: page.delete()),
+    Command("up", "Move up", ("Alt+Up",), run=lambda page: page.move_by(-1)),
+    Command("down", "Move down", ("Alt+Down",), run=lambda page: page.move_by(1)),
+    Command("new", "New study …", ("Ctrl+N",), run=lambda page: page.begin_new()),
+    Command("open", "Open file …", ("Ctrl+O",), run=lambda page: page.header.open_file()),
+    Command("save", "Save", ("Ctrl+S",), run=lambda page: page.finish("save")),
+    Command("undo", "Undo", ("Ctrl+Z",), run=lambda page: page.finish("undo")),
+    Command("redo", "Redo", ("Ctrl+Shift+Z", "Ctrl+Y"), run=lambda page: page.finish("redo")),
     Command("play", "Play from here", ("F5",)),
     Command("stop", "Stop playing", ("Escape",), within="during playback", held=True),
-    Command("keys", "Keys", ("Shift+F1",), run=lambda place: place.keys_asked.emit()),
+    Command("keys", "Keys", ("Shift+F1",), run=lambda page: page.keys_asked.emit()),
     Command("next field", "Next field", ("Tab",), within="field"),
     Command("accept", "Accept", ("Return",), within="field"),
     Command("restore", "Restore", ("Escape",), within="field"),
     Command("remove", "Remove the key, scale point or hypothesis (×)", ("Ctrl+Delete",), within="field"),
     Command("count", "Increase, decrease", ("Up", "Down"), within="field"),
 )
-_OF: Final = {command.id: command for command in COMMANDS}
-_NAMES: Final = {"Return": "Enter", "Escape": "Esc", "Insert": "Ins", "Delete": "Del"}
+_BY_ID: Final = {command.id: command for command in COMMANDS}
+_KEY_NAMES: Final = {"Return": "Enter", "Escape": "Esc", "Insert": "Ins", "Delete": "Del"}
 
 
 def keys_markdown() -> str:
@@ -106,9 +104,9 @@ def keys_markdown() -> str:
     return "\n".join(("| key | does |", "| --- | --- |", *rows, ""))
 
 
-def add_commands(place: QWidget, runs: Mapping[str, Callable[[], object]]) -> dict[str, QAction]:
-    """Add the actions of commands, by their names, to a widget."""
-    return {name: _OF[name].action(place, run) for name, run in runs.items()}
+def add_commands(widget: QWidget, runs: Mapping[str, Callable[[], object]]) -> dict[str, QAction]:
+    """Add the actions of commands to a widget; return them by the commands' IDs."""
+    return {command_id: _BY_ID[command_id].action(widget, run) for command_id, run in runs.items()}
 
 
 def connect_button(button: QAbstractButton, action: QAction) -> None:
@@ -120,28 +118,28 @@ def connect_button(button: QAbstractButton, action: QAction) -> None:
 
 def keys_of(action: str) -> tuple[str, ...]:
     """Return the keys of an action in Qt's notation."""
-    return _OF[action].keys
+    return _BY_ID[action].keys
 
 
 def _key_label(keys: str) -> str:
     """Return keys as printed on a keyboard: "Ctrl+Enter"."""
-    return "+".join(_NAMES.get(key, key) for key in keys.split("+"))
+    return "+".join(_KEY_NAMES.get(key, key) for key in keys.split("+"))
 
 
 def key_cap(action: str) -> str:
     """Return the key cap's text on an action's button: "Ctrl D"."""
-    return _OF[action].key_labels[0].replace("+", " ")
+    return _BY_ID[action].key_labels[0].replace("+", " ")
 
 
 def with_key(text: str, action: str) -> str:
     """Return a tip with the key of an action: "Duplicate (Ctrl+D)"."""
-    return _with_keys(_OF[action], text)
+    return _tip_text(_BY_ID[action], text)
 
 
-def _with_keys(command: Command, text: str = "") -> str:
+def _tip_text(command: Command, text: str = "") -> str:
     return f"{text or command.words} ({command.key_labels[0]})"
 
 
 def command_tip(action: str) -> str:
     """Return the tip of an action, with its key."""
-    return with_key(_OF[action].words, action)
+    return with_key(_BY_ID[action].words, action)

@@ -1,4 +1,4 @@
-"""What windows say of devices, and the settings and screens of this computer."""
+"""Descriptions of devices for windows; the settings and screens of this computer."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def devices_shown(backends: Sequence[Backend]) -> tuple[DeviceShown, ...]:
 
 
 def device_named(name: str, shown: Iterable[DeviceShown]) -> DeviceShown:
-    """Return the description of the preferred device; only its name if no search has found it."""
+    """Return the description of a device; if no search has found it, one with only its name."""
     try:
         kind = descriptor_of(name).name
     except DeviceError as error:
@@ -76,15 +76,15 @@ def device_named(name: str, shown: Iterable[DeviceShown]) -> DeviceShown:
             sign="warning",
             word="Not known",
             can="",
-            why=_sentence(str(error)),
+            why=_as_sentence(str(error)),
         )
     for device in shown:
         if device.name.partition(":")[0] == kind:
             return device
-    return device_before_look(name)
+    return device_before_search(name)
 
 
-def device_before_look(name: str) -> DeviceShown:
+def device_before_search(name: str) -> DeviceShown:
     """Return the description of a device before the first search."""
     device = _descriptor(name)
     icon = "device" if device is None else device.icon
@@ -122,11 +122,11 @@ def remembered_options() -> tuple[DeviceOption, ...]:
     return tuple(option for option in window_options() if option.name in REMEMBERED_OPTIONS)
 
 
-def _device_shown(name: str, ways: Sequence[Backend]) -> DeviceShown:
+def _device_shown(name: str, backends: Sequence[Backend]) -> DeviceShown:
     device = _descriptor(name)
-    best = min(ways, key=_rank)
+    best_backend = min(backends, key=_usability_rank)
     by_command = device is not None and device.argument_required
-    tone, sign, word = _device_state(best, by_command=by_command)
+    tone, sign, word = _device_state(best_backend, by_command=by_command)
     choosable = device is not None and not by_command
     return DeviceShown(
         name=name,
@@ -135,17 +135,17 @@ def _device_shown(name: str, ways: Sequence[Backend]) -> DeviceShown:
         tone=tone,
         sign=sign,
         word=word,
-        can=_sentence(ways[0].can),
-        why="" if tone == "ok" and not best.why else _sentence(best.why),
-        ways=tuple(f"{way.by}: {way.state}" for way in ways),
+        can=_as_sentence(backends[0].can),
+        why="" if tone == "ok" and not best_backend.why else _as_sentence(best_backend.why),
+        ways=tuple(f"{backend.by}: {backend.state}" for backend in backends),
         simulated=device is not None and device.simulated,
         choosable=choosable,
         diagnosable=choosable and device is not None and device.doctor is not None,
     )
 
 
-def _rank(backend: Backend) -> int:
-    """Return how close a backend is to being usable; a ready driver without a device ranks lower."""
+def _usability_rank(backend: Backend) -> int:
+    """Return the rank of a backend; the lowest is closest to being usable."""
     if _is_connected(backend):
         return 0
     return {READY: 1, DRIVER_READY: 1, NONE: 2}.get(backend.state, 3)
@@ -172,22 +172,22 @@ def _descriptor(name: str) -> DeviceDescriptor | None:
     return DEVICES.get(name.partition(":")[0])
 
 
-def _sentence(text: str) -> str:
+def _as_sentence(text: str) -> str:
     return text[:1].upper() + text[1:] + ("" if not text or text[-1] in ".!?" else ".")
 
 
 def settings_here() -> tuple[MachineSettings, str]:
     """Return the settings, and the reason if they are defaults because the file cannot be read (else "")."""
-    settings, trouble = workstation.load_or_default()
+    settings, problem = workstation.load_or_default()
     try:
         descriptor_of(settings.device)
     except DeviceError as error:
         return settings.model_copy(update={"device": DEFAULTS.device}), f"{settings_file()}: {error}"
-    return settings, trouble
+    return settings, problem
 
 
 def theme_named(name: str) -> Theme:
-    """Return the theme with a name, for the operator's windows."""
+    """Return the theme of the operator's windows with a name; the light one if the name is unknown."""
     return DARK if name == DARK.name else LIGHT
 
 

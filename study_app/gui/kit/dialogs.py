@@ -1,4 +1,4 @@
-"""Questions with a way back, and the choice of a protocol's file."""
+"""Dialogs that can be cancelled, and the choice of a protocol file."""
 
 from collections.abc import Iterable, Mapping
 from types import MappingProxyType
@@ -16,8 +16,8 @@ from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import label, set_ink
 from study_app.workspace import workspace
 
-_NOTHING: Final[Mapping[str, str]] = MappingProxyType({})
-STEPS: Final = 1000  # of a bar
+_NO_NEEDS: Final[Mapping[str, str]] = MappingProxyType({})
+STEPS: Final = 1000  # of a progress bar
 REASON: Final = "Please enter a reason. It will be recorded."
 
 
@@ -54,7 +54,7 @@ class Question(QDialog):
         back: str = "Cancel",
         other: ActionButton | None = None,
         fields: Iterable[Field] = (),
-        needs: Mapping[str, str] = _NOTHING,
+        needs: Mapping[str, str] = _NO_NEEDS,
         warning: str = "",
         inside: QWidget | None = None,
         width: int = 0,
@@ -79,22 +79,19 @@ class Question(QDialog):
             other.clicked.connect(self.reject)
         self.said = label(explanation, "body", "text2", wraps=True)
         self.said.setMinimumWidth(420)
-        warns = QWidget()
+        warning_row = QWidget()
         sign = Icon("warning", "warn", 20), 0, Qt.AlignmentFlag.AlignTop
-        hbox(sign, (label(warning, "label", "warn", wraps=True), 1), spacing=10, margins=0, parent=warns)
-        warns.setVisible(bool(warning))
-        asked, foot = (
-            (*self.editors.values(), self.missing),
-            hbox(self.back, STRETCH, *([other] if other else []), self.go_on, spacing=10),
-        )
+        hbox(sign, (label(warning, "label", "warn", wraps=True), 1), spacing=10, margins=0, parent=warning_row)
+        warning_row.setVisible(bool(warning))
         parts: tuple[Part, ...] = (
             label(title, "title_dense"),
             self.said,
-            warns,
+            warning_row,
             *([(inside, 1)] if inside else []),
-            *asked,
+            *self.editors.values(),
+            self.missing,
             8,
-            foot,
+            hbox(self.back, STRETCH, *([other] if other else []), self.go_on, spacing=10),
         )
         vbox(*parts, spacing=12, margins=(28, 24, 28, 24), parent=self)
         apply_theme(self, theme)
@@ -110,7 +107,7 @@ class Question(QDialog):
             super().accept()
 
     def check_answers(self) -> bool:
-        """Return True if all answers are present and valid; otherwise focus the first that is not, and show why."""
+        """Return whether all answers are present and valid; if not, focus the first that is not and show the reason."""
         for editor in self.editors.values():
             try:
                 _ = editor.value
@@ -129,10 +126,10 @@ class Question(QDialog):
 
 
 class Work(Question):
-    """A question followed by work: it shows the progress, then a link to the result.
+    """A question that starts a job, then shows its progress and a link to its result.
 
-    ``begun`` is emitted when the work should begin, ``stop_asked`` when it should be cancelled, and `close_stopped`
-    closes the dialog. ``opened`` is emitted when the result should be shown.
+    ``begun`` is emitted when the job should start and ``stop_asked`` when it should be cancelled; call `close_stopped`
+    once it has stopped. ``opened`` is emitted when the result should be shown.
     """
 
     begun = Signal()
@@ -162,19 +159,19 @@ class Work(Question):
         self.go_on.setFocus()
 
     def show_refused(self, sentence: str) -> None:
-        """Show why the work was rejected; the answers can be changed."""
+        """Show why the job was rejected; the answers can be changed."""
         for editor in self.editors.values():
             editor.show()
         set_ink(self.said, "bad")
         self._show_end(sentence)
 
     def close_stopped(self) -> None:
-        """Close after the work was cancelled."""
+        """Close after the job was cancelled."""
         self.working = False
         super().reject()
 
     def accept(self) -> None:
-        """Begin the work, or open its result."""
+        """Start the job, or open its result."""
         if self.over:
             self.opened.emit()
         elif not self.working and self.check_answers():
@@ -188,7 +185,7 @@ class Work(Question):
             self.begun.emit()
 
     def reject(self) -> None:
-        """Close; cancel running work first."""
+        """Close the dialog, or cancel the running job."""
         if not self.working:
             super().reject()
         elif self.back.isEnabled():
@@ -201,7 +198,7 @@ class Work(Question):
         self.bar.hide()
         self.said.setText(sentence)
         self.go_on.show()
-        self.back.setEnabled(True)  # it may have ended in spite of the request to stop
+        self.back.setEnabled(True)  # disabled if the job ended after a request to stop
         self._shrink()
 
     def _shrink(self) -> None:

@@ -1,4 +1,4 @@
-"""Forms made from descriptions: a `Field` describes one value, an `Editor` is its label, control and line below."""
+"""Forms made from descriptions: a `Field` describes one value, an `Editor` consists of its label, control and hint."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import KW_ONLY, dataclass
@@ -17,7 +17,7 @@ from study_app.gui.widgets.numbers import read_number, write_number
 from study_app.number_text import readings_of, unclear_number
 from study_app.session.start import MAX_SEED
 
-LEAST_WORDS = 280  # narrower, wrapped text would request too much room
+MIN_TEXT_WIDTH = 280  # narrower wrapped text would become too high
 _UNIT_WIDTH = 28
 
 
@@ -85,7 +85,7 @@ def seed_field(aside: str = "") -> Field:
 
 
 def typed_file(name: str, text: str) -> Path | None:
-    """Return the file whose path was typed, None for an empty text."""
+    """Return the file whose path was typed; None for an empty text. Raise ValueError if there is no such file."""
     if text and not Path(text).is_file():
         raise ValueError(f"{name} was not found at {text}: choose the file, or leave the field empty")
     return Path(text) if text else None
@@ -98,9 +98,9 @@ class _Radios(QWidget):
         super().__init__()
         self._values, labels = zip(*options, strict=True)
         self.group, buttons = QButtonGroup(self), [Radio(text) for text in labels]
-        for at, button in enumerate(buttons):
+        for index, button in enumerate(buttons):
             button.setFont(font("body"))
-            self.group.addButton(button, at)
+            self.group.addButton(button, index)
         buttons[0].setChecked(True)
         vbox(*buttons, spacing=4, margins=0, parent=self)
         self.setFocusProxy(buttons[0])
@@ -111,7 +111,7 @@ class _Radios(QWidget):
 
 
 class _Line(QLineEdit):
-    """A line edit; ``restored`` is emitted at Esc to restore the displayed text."""
+    """A line edit; ``restored`` is emitted at Esc if the text was changed and must be restored."""
 
     restored = Signal()
 
@@ -126,7 +126,7 @@ class Editor(QWidget):
     """A label, a control with its unit or a button, and a line below.
 
     ``changed(name, value)`` is emitted for a valid value that was chosen or completely typed, ``edited(name)`` also at
-    every key. Invalid values are reported below, unless the form ``judges`` them elsewhere.
+    every key. Invalid values are reported below, unless the form that contains the editor ``judges`` them.
     """
 
     changed = Signal(str, object)
@@ -138,7 +138,7 @@ class Editor(QWidget):
         self._values = [value for value, _ in field.options]
         self.aside = label(field.aside, "small", "text3")
         self.below = label("", "small", "text2", wraps=True)
-        self.below.setMinimumWidth(LEAST_WORDS)
+        self.below.setMinimumWidth(MIN_TEXT_WIDTH)
         self.control = self._make_control()
         self.control.setFont(font("label" if field.unit else "body", tabular=bool(field.unit)))
         if isinstance(self.control, QAbstractButton):
@@ -146,8 +146,8 @@ class Editor(QWidget):
             self.show_refusal("")
             return
         self.control.setAccessibleName(f"{field.label} in {field.unit}" if field.unit else field.label)
-        named = label(field.label, "label", "text" if field.unit else "text2")
-        named.setBuddy(self.control)
+        name_label = label(field.label, "label", "text" if field.unit else "text2")
+        name_label.setBuddy(self.control)
         if field.kind in {"file", "folder"}:
             button = ActionButton("", "Choose …" if field.kind == "file" else "Change …", height=40)
             button.setAutoDefault(False)
@@ -155,10 +155,10 @@ class Editor(QWidget):
         if field.unit:
             unit = label(field.unit, "label", "text2")
             unit.setFixedWidth(_UNIT_WIDTH)
-            rows = [hbox((named, 1), self.control, unit, spacing=8)]
+            rows = [hbox((name_label, 1), self.control, unit, spacing=8)]
         else:
-            beside = () if button is None else (button,)
-            rows = [hbox(named, STRETCH, self.aside), hbox((self.control, 1), *beside, spacing=8)]
+            buttons = () if button is None else (button,)
+            rows = [hbox(name_label, STRETCH, self.aside), hbox((self.control, 1), *buttons, spacing=8)]
         vbox(*rows, self.below, spacing=6, margins=0, parent=self)
         self.show_refusal("")
 
@@ -179,10 +179,10 @@ class Editor(QWidget):
                 choice.activated.connect(lambda _at: self.changed.emit(self.field.name, self.value))
                 return choice
             case "switch" | "check":
-                mark = (Toggle if self.field.kind == "switch" else Check)(self.field.label)
-                mark.toggled.connect(lambda _on: self.edited.emit(self.field.name))
-                mark.clicked.connect(lambda on: self.changed.emit(self.field.name, on))
-                return mark
+                box = (Toggle if self.field.kind == "switch" else Check)(self.field.label)
+                box.toggled.connect(lambda _on: self.edited.emit(self.field.name))
+                box.clicked.connect(lambda on: self.changed.emit(self.field.name, on))
+                return box
         line = _Line()
         line.setMaxLength(self.field.longest)
         line.setPlaceholderText(self.field.placeholder)
@@ -190,7 +190,7 @@ class Editor(QWidget):
             line.setProperty("dense", "true")
             line.setFixedWidth(96)
             line.setAlignment(Qt.AlignmentFlag.AlignRight)
-        line.editingFinished.connect(self._take_text)
+        line.editingFinished.connect(self._submit_text)
         line.textChanged.connect(lambda _text: self.edited.emit(self.field.name))
         line.restored.connect(lambda: self._show_text(self._text))
         return line
@@ -215,14 +215,14 @@ class Editor(QWidget):
 
     def show_options(self, options: Mapping[Any, str]) -> None:
         """Offer other values, with the first one chosen."""
-        assert isinstance(self.control, QComboBox)  # noqa: S101 - only of a choice
+        assert isinstance(self.control, QComboBox)  # noqa: S101 - only choices have options
         self._values = [*options]
         self.control.clear()
         for value, text in options.items():
             self.control.addItem(text, value)
 
     def show_value(self, value: Any, hint: str | None = None) -> None:
-        """Show a value with a hint below; text that is being typed is kept."""
+        """Show a value with a hint below, but keep text that is being typed."""
         self._hint = self.field.hint if hint is None else hint
         match self.control:
             case QAbstractButton():
@@ -244,11 +244,11 @@ class Editor(QWidget):
 
     def _show_text(self, text: str) -> None:
         assert isinstance(self.control, QLineEdit)  # noqa: S101 - only lines are typed
-        self.control.setText(text)  # also no longer modified
+        self.control.setText(text)  # also clears isModified()
         self.control.setCursorPosition(0)
         self.show_refusal("")
 
-    def _take_text(self) -> None:
+    def _submit_text(self) -> None:
         assert isinstance(self.control, QLineEdit)  # noqa: S101 - only lines are typed
         if not self.control.isModified():
             return
@@ -263,7 +263,7 @@ class Editor(QWidget):
         self.changed.emit(self.field.name, value)
 
     def _choose_path(self) -> None:
-        assert isinstance(self.control, QLineEdit)  # noqa: S101 - files are typed, too
+        assert isinstance(self.control, QLineEdit)  # noqa: S101 - paths can be typed as well
         if self.field.kind == "file":
             chosen, _ = QFileDialog.getOpenFileName(self, self.field.label, self.control.text(), self.field.file_filter)
         else:

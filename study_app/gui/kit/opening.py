@@ -1,4 +1,4 @@
-"""Opening files and folders with the system's programs for them."""
+"""Open files and folders with the system's default programs."""
 
 import shutil
 import subprocess
@@ -15,7 +15,7 @@ from study_app.gui.theme.theme import LIGHT
 
 _POLL_MS = 200
 _POLLS = 50
-"""A program that still runs after so many polls shows the file."""
+"""The number of polls after which a program that still runs is assumed to show the file."""
 
 
 def open_here(path: Path) -> None:

@@ -1,4 +1,4 @@
-"""What screen readers receive beyond Qt's own roles: headings, plots, the participant's window."""
+"""Names, roles and announcements for screen readers that Qt's widgets lack."""
 
 import html
 
@@ -7,25 +7,26 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QAccessible, QAccessibleAnnouncementEvent
 from PySide6.QtWidgets import QAccessibleWidget, QLabel, QWidget
 
-_given: list[QAccessibleWidget] = []
-_PRUNED_AT = 256  # and at its multiples
+_interfaces: list[QAccessibleWidget] = []
+"""Qt deletes each interface with its widget; a Python reference that ended earlier would delete it twice."""
+_PRUNE_INTERVAL = 256
 
 
 def give_role(widget: QWidget, role: QAccessible.Role) -> None:
     """Give ``widget`` a role that its class lacks in Qt; its accessible name and description are kept.
 
-    Qt owns the interface and deletes it with the widget; Python's reference must outlive it, or it is deleted twice.
-    Call it last: Qt forgets the role once a signal is connected to a method that the widget's class has in Python.
+    Call it after all signals are connected: Qt forgets the role when a signal is connected to a Python method of the
+    widget.
     """
-    if len(_given) % _PRUNED_AT == 0:
-        _given[:] = [part for part in _given if shiboken6.isValid(part)]
-    made = QAccessibleWidget(widget, role)
-    QAccessible.registerAccessibleInterface(made)
-    _given.append(made)
+    if len(_interfaces) % _PRUNE_INTERVAL == 0:
+        _interfaces[:] = filter(shiboken6.isValid, _interfaces)
+    interface = QAccessibleWidget(widget, role)
+    QAccessible.registerAccessibleInterface(interface)
+    _interfaces.append(interface)
 
 
 def describe_plot(plot: QWidget, name: str, sentence: str) -> None:
-    """Give a plot a name and a description of one sentence."""
+    """Give a plot its name and description, a sentence, for screen readers."""
     plot.setAccessibleName(name)
     plot.setAccessibleDescription(sentence)
     give_role(plot, QAccessible.Role.Chart)
@@ -51,12 +52,12 @@ class PlainLabel(QLabel):
 
 
 def button_text(text: str) -> str:
-    """Return a text that a button shows literally; Qt uses a single "&" as the mark of a shortcut."""
+    """Return ``text`` escaped for a button, where Qt takes a single "&" for the mark of a shortcut."""
     return text.replace("&", "&&")
 
 
 def plain_tip(text: str) -> str:
-    """Return a text that a tooltip shows literally, even if Qt would take it for markup."""
+    """Return ``text`` escaped for a tooltip if Qt could take it for markup."""
     return f"<qt>{html.escape(text).replace(chr(10), '<br>')}</qt>" if "<" in text else text
 
 

@@ -1,4 +1,4 @@
-"""Jobs outside the window's thread: neither a slow disk nor a long computation freezes a window."""
+"""Jobs outside the GUI thread, so that neither a slow disk nor a long computation freezes a window."""
 
 import atexit
 import logging
@@ -17,50 +17,50 @@ from study_app.errors import StudyError
 log = logging.getLogger(__name__)
 
 _threads: weakref.WeakSet[threading.Thread] = weakref.WeakSet()
-_telling, _program_ends = threading.Lock(), threading.Event()
+_emitting, _program_ends = threading.Lock(), threading.Event()
 
 
 @atexit.register
 def _abandon_jobs() -> None:
     """Abandon running jobs before Qt is shut down, because a late signal would crash."""
-    with _telling:
+    with _emitting:
         _program_ends.set()
 
 
 def wait_for_jobs(seconds: float) -> None:
-    """Wait a limited time for the jobs of every `Background`; Python aborts if it exits during an import."""
-    until_s = time.perf_counter() + seconds
+    """Wait at most ``seconds`` for all running jobs: Python aborts if it exits while a thread imports a module."""
+    deadline_s = time.perf_counter() + seconds
     for thread in tuple(_threads):
-        thread.join(max(until_s - time.perf_counter(), 0.0))
+        thread.join(max(deadline_s - time.perf_counter(), 0.0))
 
 
-class _Ends(QObject):
-    """Delivers the ends of jobs to the GUI thread; a job may outlive its `Background`, but not this object."""
+class _Outcomes(QObject):
+    """Delivers the outcomes of jobs to the GUI thread; a job may outlive its `Background`, but not this object."""
 
-    came = Signal(object)
+    arrived = Signal(object)
 
     def __init__(self) -> None:
         super().__init__()
-        self.came.connect(self._deliver, Qt.ConnectionType.QueuedConnection)
+        self.arrived.connect(self._deliver, Qt.ConnectionType.QueuedConnection)
 
-    def _deliver(self, end: tuple["Background", Callable[[], Any], bool, Any]) -> None:
-        background, *rest = end
+    def _deliver(self, outcome: tuple["Background", Callable[[], Any], bool, Any]) -> None:
+        background, *arguments = outcome
         if isValid(background):
-            background.take_outcome(*rest)
+            background.deliver_outcome(*arguments)
 
 
 @cache
-def _shared_ends() -> _Ends:
-    return _Ends()
+def _shared_outcomes() -> _Outcomes:
+    return _Outcomes()
 
 
 def delayed_call(owner: QObject, milliseconds: int, run: Callable[[], Any]) -> QTimer:
-    """Return a timer that calls a function once, this time after it was last started."""
-    made = QTimer(owner)
-    made.setSingleShot(True)
-    made.setInterval(milliseconds)
-    made.timeout.connect(run)
-    return made
+    """Return a timer that calls ``run`` once, the given time after the last start of the timer."""
+    timer = QTimer(owner)
+    timer.setSingleShot(True)
+    timer.setInterval(milliseconds)
+    timer.timeout.connect(run)
+    return timer
 
 
 class Background(QObject):
@@ -77,17 +77,17 @@ class Background(QObject):
     def __init__(self, parent: QObject, refusals: type[Exception] = StudyError) -> None:
         super().__init__(parent)
         self._refusals = refusals
-        self._ends = _shared_ends()  # made in the windows' thread
-        self._wanted: Callable[[], Any] | None = None
+        self._outcomes = _shared_outcomes()  # must be created in the GUI thread
+        self._requested: Callable[[], Any] | None = None
         self._thread: threading.Thread | None = None
 
     @property
     def busy(self) -> bool:
-        return self._wanted is not None
+        return self._requested is not None
 
     def run(self, job: Callable[[], Any]) -> None:
         """Run ``job`` in a thread; the result of an earlier job is discarded."""
-        self._wanted = job
+        self._requested = job
         if self._thread is None:
             self._start_job(job)
 
@@ -99,32 +99,32 @@ class Background(QObject):
         return not self._thread.is_alive()
 
     def _start_job(self, job: Callable[[], Any]) -> None:
-        def work() -> None:
-            outcome, whole = None, False
+        def run_job() -> None:
+            outcome, succeeded = None, False
             try:
-                outcome, whole = job(), True
+                outcome, succeeded = job(), True
             except self._refusals as error:
                 outcome = error
             except BaseException as error:
                 outcome = error
                 raise
             finally:
-                with _telling:
+                with _emitting:
                     if not _program_ends.is_set():
-                        self._ends.came.emit((self, job, whole, outcome))
+                        self._outcomes.arrived.emit((self, job, succeeded, outcome))
 
-        self._thread = threading.Thread(target=work, name="background", daemon=True)
+        self._thread = threading.Thread(target=run_job, name="background", daemon=True)
         _threads.add(self._thread)
         self._thread.start()
 
-    def take_outcome(self, job: Callable[[], Any], whole: bool, outcome: Any) -> None:
-        """Emit a job's result, or its exception if it is not ``whole``; begin the job that replaced it."""
+    def deliver_outcome(self, job: Callable[[], Any], succeeded: bool, outcome: Any) -> None:
+        """Emit a job's result, or its exception if it has not ``succeeded``; start the job that replaced it, if any."""
         self._thread = None
-        if self._wanted is not job and self._wanted is not None:
-            self._start_job(self._wanted)
+        if self._requested is not job and self._requested is not None:
+            self._start_job(self._requested)
             return
-        self._wanted = None
-        refused = not whole and isinstance(outcome, self._refusals)
+        self._requested = None
+        refused = not succeeded and isinstance(outcome, self._refusals)
         if refused and not self.isSignalConnected(QMetaMethod.fromSignal(self.failed)):
             log.warning("%s", outcome)
-        (self.done if whole else self.failed).emit(outcome)
+        (self.done if succeeded else self.failed).emit(outcome)

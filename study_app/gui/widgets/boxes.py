@@ -1,4 +1,4 @@
-"""Widgets and layouts next to each other, or one below the other."""
+"""Rows, columns and grids of widgets and layouts."""
 
 from typing import Any, Final, TypeAlias, TypeVar
 
@@ -6,11 +6,11 @@ import shiboken6
 from PySide6.QtWidgets import QBoxLayout, QGridLayout, QHBoxLayout, QLayout, QVBoxLayout, QWidget
 
 STRETCH: Final = "stretch"
-"""A gap that takes the room that is left; in a tuple with its stretch."""
+"""A gap that fills the remaining space; a tuple adds its stretch factor."""
 Part: TypeAlias = QWidget | QLayout | int | str | tuple[Any, ...]
-"""A widget or layout, or a tuple with its stretch, and with its alignment; a gap [px]; or `STRETCH`."""
+"""A widget or layout, a gap [px] or `STRETCH`; or a tuple of one of them with its stretch factor and alignment."""
 _Margins: TypeAlias = int | tuple[int, int, int, int] | None
-"""The same on all sides [px], or left, top, right and bottom; None: the style's."""
+"""One margin for all sides [px], or left, top, right and bottom; None for the default of the style."""
 
 _B = TypeVar("_B", bound=QBoxLayout)
 
@@ -33,14 +33,14 @@ def grid(
     across: int | None = None, down: int | None = None, *, margins: _Margins = None, parent: QWidget | None = None
 ) -> QGridLayout:
     """Return a grid with horizontal and vertical gaps [px], as the layout of ``parent`` if given."""
-    made = QGridLayout(parent) if parent is not None else QGridLayout()
+    layout = QGridLayout(parent) if parent is not None else QGridLayout()
     if margins is not None:
-        made.setContentsMargins(*((margins,) * 4 if isinstance(margins, int) else margins))
+        layout.setContentsMargins(*((margins,) * 4 if isinstance(margins, int) else margins))
     if across is not None:
-        made.setHorizontalSpacing(across)
+        layout.setHorizontalSpacing(across)
     if down is not None:
-        made.setVerticalSpacing(down)
-    return made
+        layout.setVerticalSpacing(down)
+    return layout
 
 
 def _box(box: _B, parts: tuple[Part, ...], spacing: int | None, margins: _Margins, parent: QWidget | None) -> _B:
@@ -57,19 +57,19 @@ def _box(box: _B, parts: tuple[Part, ...], spacing: int | None, margins: _Margin
 def add_parts(box: QBoxLayout, *parts: Part) -> None:
     """Add parts at the end of a row or column."""
     for part in parts:
-        added, *how = part if isinstance(part, tuple) else (part,)
-        if isinstance(added, QLayout):
-            add_layout(box, added, *how)
-        elif isinstance(added, QWidget):
-            box.addWidget(added, *how)
-        elif isinstance(added, int):
-            box.addSpacing(added)
+        item, *options = part if isinstance(part, tuple) else (part,)
+        if isinstance(item, QLayout):
+            add_layout(box, item, *options)
+        elif isinstance(item, QWidget):
+            box.addWidget(item, *options)
+        elif isinstance(item, int):
+            box.addSpacing(item)
         else:
-            box.addStretch(*how)
+            box.addStretch(*options)
 
 
 def add_layout(outer: QBoxLayout | QGridLayout, inner: QLayout, *place: Any) -> None:
-    """Add a layout to another one: at the end with its stretch, or at a position of a grid."""
+    """Add a layout to a box, optionally with a stretch factor, or to a grid at a position."""
     outer.addLayout(inner, *place)
     _release_items(inner)
 
@@ -83,7 +83,7 @@ def insert_layout(outer: QBoxLayout, at: int, inner: QLayout) -> None:
 def _release_items(layout: QLayout) -> None:
     """Release PySide's wrappers of a layout's items when the layout is added to another one.
 
-    PySide does not notice when Qt deletes an item; an event at its address would get the wrapper and its class.
+    PySide does not notice when Qt deletes an item; an event later allocated at its address would get the wrapper.
     """
     for at in range(layout.count()):
         item = layout.itemAt(at)

@@ -1,4 +1,4 @@
-"""Cards and what stands in them: hairlines, icons, chips and bars; frames that scroll."""
+"""Cards and their contents: hairlines, icons, chips and bars; scroll areas."""
 
 import math
 
@@ -13,18 +13,18 @@ from study_app.gui.widgets.boxes import STRETCH, add_layout, hbox, vbox
 from study_app.gui.widgets.labels import Ink, label
 
 QWIDGETSIZE_MAX = (1 << 24) - 1
-"""Of Qt; PySide does not offer it."""
+"""Qt's constant, which PySide does not export."""
 _SHADOW_ALPHAS = (5, 5, 4)
 
 
 class Card(Themed, QWidget):
-    """A rounded surface with a column for its content and, if given, a ``title`` and a text at its right."""
+    """A rounded surface with a column for its content and an optional title, with ``aside`` at its right."""
 
     def __init__(self, title: str = "", aside: QWidget | None = None, *, padding: int = 20, gap: int = 12) -> None:
         super().__init__()
-        inside = padding + SHADOW
-        above = padding - 2 + SHADOW
-        self.column = vbox(spacing=gap, margins=(inside, above, inside, above), parent=self)
+        side_margin = padding + SHADOW
+        top_margin = padding - 2 + SHADOW
+        self.column = vbox(spacing=gap, margins=(side_margin, top_margin, side_margin, top_margin), parent=self)
         if title:
             self.heading = label(title, "card")
             self.title_row = hbox(self.heading, STRETCH, *([] if aside is None else [aside]))
@@ -49,7 +49,7 @@ class Card(Themed, QWidget):
 
 
 def scrolled(content: QWidget | QLayout) -> QScrollArea:
-    """Return ``content`` in a frame that scrolls vertically if necessary, and never horizontally."""
+    """Return ``content`` in a scroll area that scrolls only vertically."""
     if isinstance(content, QLayout):
         inside = QWidget()
         inside.setLayout(content)
@@ -62,9 +62,9 @@ def scrolled(content: QWidget | QLayout) -> QScrollArea:
     return area
 
 
-def smooth_painter(part: QWidget) -> QPainter:
-    """Return an antialiasing painter of a part."""
-    painter = QPainter(part)
+def smooth_painter(widget: QWidget) -> QPainter:
+    """Return an antialiasing painter for a widget."""
+    painter = QPainter(widget)
     painter.setRenderHint(QPainter.RenderHint.Antialiasing)
     return painter
 
@@ -76,13 +76,13 @@ def fill_rounded(painter: QPainter, body: QRectF, radius: float, colour: str) ->
     painter.drawRoundedRect(body, radius, radius)
 
 
-def paint_ground(part: QWidget, colour: str) -> None:
-    """Paint the background of a part with rounded corners."""
-    fill_rounded(smooth_painter(part), QRectF(part.rect()), RADIUS_CONTROL, colour)
+def paint_ground(widget: QWidget, colour: str) -> None:
+    """Paint the background of a widget with rounded corners."""
+    fill_rounded(smooth_painter(widget), QRectF(widget.rect()), RADIUS_CONTROL, colour)
 
 
 class Rule(QWidget):
-    """A hairline between groups, purely decorative."""
+    """A hairline between groups."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -160,7 +160,7 @@ def paint_chip(painter: QPainter, body: QRectF, t: Theme, tone: Tone, icon: str,
 
 
 class Bar(Themed, QWidget):
-    """A fraction of a whole, with a tick at the required minimum, if any."""
+    """A bar that shows a fraction, with an optional tick at the required minimum."""
 
     def __init__(self, height: int = 8) -> None:
         super().__init__()
@@ -240,8 +240,8 @@ class MaskedPanel(Themed, QWidget):
         painter.setFont(title_font)
         wrap = Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignTop | Qt.TextFlag.TextWordWrap
         box = QRectF(12, lines_top, self.width() - 24, height - lines_top)
-        used = painter.boundingRect(box, int(wrap), self._title)
+        title_box = painter.boundingRect(box, int(wrap), self._title)
         painter.drawText(box, int(wrap), self._title)
         painter.setPen(QColor(t.text2))
         painter.setFont(why_font)
-        painter.drawText(box.adjusted(0, math.ceil(used.height()) + 8, 0, 0), int(wrap), self._why)
+        painter.drawText(box.adjusted(0, math.ceil(title_box.height()) + 8, 0, 0), int(wrap), self._why)

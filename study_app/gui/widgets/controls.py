@@ -65,7 +65,7 @@ class Cap(Themed, QWidget):
 
 
 def _cap_size(text: str) -> QSize:
-    """Return the size of a key cap; none without keys."""
+    """Return the size of a key cap; its width is 0 if ``text`` is empty."""
     return QSize(max(20, round(QFontMetricsF(font("key")).horizontalAdvance(text)) + 10) if text else 0, 20)
 
 
@@ -81,7 +81,7 @@ def _paint_cap(painter: QPainter, at: QPointF, text: str, ink: str, edge: str) -
 
 
 class ActionButton(Themed, PressedByEnter):
-    """A button with an icon before its text and, if a key does the same, the key cap after it.
+    """A button with an icon before its text and, if it has a key, the key cap after it.
 
     ``key`` presses the button anywhere in its window; ``cap`` is only drawn, for a key that is handled elsewhere.
     """
@@ -159,9 +159,9 @@ class ActionButton(Themed, PressedByEnter):
 
 
 class CompactStop(Themed, QPushButton):
-    """Stop force, in its reserved colour; it acts when pressed, not when released, and is never disabled.
+    """The button that stops the force, in its reserved colour; it acts when pressed, not when released.
 
-    If the stop ends more than the force, ``text`` says so; ``cap`` are the keys shown after it.
+    It is never disabled. ``text`` names what else it stops, and ``cap`` is the key cap after it.
     """
 
     def __init__(self, text: str = "Stop force", cap: str = "") -> None:
@@ -219,36 +219,36 @@ class IconButton(Themed, PressedByEnter):
         super().paintEvent(event)
         ink = {"danger": self.theme.bad, "plain": self.theme.text3}.get(self._role, self.theme.text)
         middle, half = QRectF(self.rect()).center(), 10 if self.width() >= 40 else 8
-        place = QRectF(middle.x() - half, middle.y() - half, 2 * half, 2 * half)
+        body = QRectF(middle.x() - half, middle.y() - half, 2 * half, 2 * half)
         painter = QPainter(self)
         if not self.isEnabled():
             ink = self.theme.ctl
             painter.setOpacity(0.5)
-        draw_icon(painter, self._icon, place, ink, 2.0)
+        draw_icon(painter, self._icon, body, ink, 2.0)
 
 
 class Choice(Themed, QComboBox):
     """A drop-down list with a chevron; the wheel scrolls the page, not the choice.
 
-    Text that is too long is elided and complete in the list and in the tip. On Linux, screen readers use the choice as
-    its name and learn its meaning only from a label: therefore it has an invisible one.
+    Text that is too long is elided; the list and the tip show it in full. On Linux, screen readers take the chosen
+    entry for the name of the list, and read the real name only from a label, which is invisible here.
     """
 
     def __init__(self) -> None:
         super().__init__()
-        self._named = PlainLabel()
-        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)  # Qt's own gives it the keyboard when the wheel scrolls past it
-        self.setItemDelegate(QStyledItemDelegate(self))  # the theme gives the list's lines their height
+        self._name_label = PlainLabel()
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)  # by default, scrolling past it with the wheel would focus it
+        self.setItemDelegate(QStyledItemDelegate(self))  # the style sheet sets its lines' height
 
     def setAccessibleName(self, name: str) -> None:
         super().setAccessibleName(name)
-        self._named.setText(name)
-        self._named.setBuddy(self)
+        self._name_label.setText(name)
+        self._name_label.setBuddy(self)
 
     def event(self, event: QEvent) -> bool:
         if event.type() == QEvent.Type.ParentChange:
-            self._named.setParent(self.parentWidget())
-            self._named.hide()
+            self._name_label.setParent(self.parentWidget())
+            self._name_label.hide()
         return super().event(event)
 
     def showPopup(self) -> None:
@@ -267,13 +267,13 @@ class Choice(Themed, QComboBox):
         option = QStyleOptionComboBox()
         self.initStyleOption(option)
         painter.drawComplexControl(QStyle.ComplexControl.CC_ComboBox, option)
-        whole = self.currentText() or self.placeholderText()
+        text = self.currentText() or self.placeholderText()
         field = QStyle.SubControl.SC_ComboBoxEditField
-        room = self.style().subControlRect(QStyle.ComplexControl.CC_ComboBox, option, field, self).width()
-        shown = self.fitted(whole, room + 1)  # Qt rounds the width of the longest entry, perhaps down
-        option.currentText = shown  # type: ignore[attr-defined]  # missing in the stubs
+        width = self.style().subControlRect(QStyle.ComplexControl.CC_ComboBox, option, field, self).width()
+        shown_text = self.fitted(text, width + 1)  # Qt rounds the width of the longest entry, perhaps down
+        option.currentText = shown_text  # type: ignore[attr-defined]  # missing in the stubs
         painter.drawControl(QStyle.ControlElement.CE_ComboBoxLabel, option)
-        self.setToolTip(plain_tip(whole if shown != whole else ""))
+        self.setToolTip(plain_tip(text if shown_text != text else ""))
         draw_icon(
             painter, "chevron_down", QRectF(self.width() - 30, self.height() / 2 - 8, 16, 16), self.theme.text2, 2.0
         )
@@ -282,13 +282,13 @@ class Choice(Themed, QComboBox):
 class Number(QSpinBox):
     """A whole number that is typed or changed by the arrow keys; the wheel scrolls the page, not the number.
 
-    Qt ignores keys that a whole number cannot contain, so that "2,5" would become 25. Here they are typed; Enter
-    rejects such a text, and leaving the field restores the number from before. Both show the reason.
+    Qt ignores keys that a whole number cannot contain, so that "2,5" would become 25. This field accepts them; Enter
+    rejects such a text, and leaving the field restores the previous number. Both show the reason.
     """
 
     def __init__(self, lowest: int, highest: int, value: int) -> None:
         super().__init__()
-        self._before = value
+        self._previous = value
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setRange(lowest, highest)
         self.setValue(value)
@@ -303,20 +303,20 @@ class Number(QSpinBox):
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter) and not self.hasAcceptableInput():
-            self._say_refusal()
+            self._show_refusal()
         else:
             super().keyPressEvent(event)
 
     def focusInEvent(self, event: QFocusEvent) -> None:
-        self._before = self.value()
+        self._previous = self.value()
         super().focusInEvent(event)
 
     def wheelEvent(self, event: QWheelEvent) -> None:
         event.ignore()
 
     def fixup(self, _text: str) -> str:
-        self._say_refusal()
-        return f"{self._before}{self.suffix()}"
+        self._show_refusal()
+        return f"{self._previous}{self.suffix()}"
 
     @property
     def refusal(self) -> str:
@@ -325,7 +325,7 @@ class Number(QSpinBox):
             return ""
         return f"“{self.cleanText()}” is not a whole number from {self.minimum()} to {self.maximum()}"
 
-    def _say_refusal(self) -> None:
+    def _show_refusal(self) -> None:
         QToolTip.showText(self.mapToGlobal(self.rect().bottomLeft()), self.refusal, self)
 
 

@@ -1,4 +1,4 @@
-"""Labels in the type scale and the palette's roles."""
+"""Labels with the fonts of the type scale and the colours of the palette."""
 
 from typing import Literal, TypeAlias
 
@@ -10,7 +10,7 @@ from study_app.gui.theme.theme import TypeRole, font
 from study_app.gui.widgets.accessible import HeadingLabel, PlainLabel, give_role, plain_tip
 
 _HEADINGS: frozenset[TypeRole] = frozenset({"display", "title", "title_dense", "card"})
-"""The type roles of headings, for people who see them and for screen readers."""
+"""The type roles of headings, which screen readers announce as such."""
 Ink: TypeAlias = Literal["text", "text2", "text3", "ok", "warn", "bad", "accent"]
 
 
@@ -28,15 +28,15 @@ def label(
 
     ``tabular`` figures have equal widths.
     """
-    made = HeadingLabel(text) if (role in _HEADINGS if heading is None else heading) else PlainLabel(text)
-    made.setFont(font(role, weight=weight, tabular=tabular))
-    made.setProperty("role", ink)
-    made.setWordWrap(wraps)
+    widget = HeadingLabel(text) if (role in _HEADINGS if heading is None else heading) else PlainLabel(text)
+    widget.setFont(font(role, weight=weight, tabular=tabular))
+    widget.setProperty("role", ink)
+    widget.setWordWrap(wraps)
     if wraps:
         policy = QSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Minimum)
         policy.setHeightForWidth(True)
-        made.setSizePolicy(policy)
-    return made
+        widget.setSizePolicy(policy)
+    return widget
 
 
 def figures(text: str = "", role: TypeRole = "label", ink: Ink = "text", *, weight: int | None = None) -> QLabel:
@@ -45,7 +45,7 @@ def figures(text: str = "", role: TypeRole = "label", ink: Ink = "text", *, weig
 
 
 class Elided(QLabel):
-    """A label that is elided if there is not enough room; the complete text is in its tip."""
+    """A label that is elided if it is too narrow; the complete text is in its tip."""
 
     def __init__(self, role: TypeRole = "body", ink: Ink = "text") -> None:
         super().__init__()
@@ -82,7 +82,7 @@ class Elided(QLabel):
 
 
 class Clamped(QLabel):
-    """A label with at most ``most`` lines, elided if they are too few; the complete text is in its tip.
+    """A label with at most ``lines`` lines; a longer text is elided and complete in the tip.
 
     A ``steady`` label is as high as all its lines, even if the text needs fewer.
     """
@@ -123,7 +123,7 @@ class Clamped(QLabel):
 
 
 def _clamp_lines(text: str, most: int, font: QFont, width: int) -> list[str]:
-    """Return a text in lines that fit into ``width``; the last line is elided if there would be too many."""
+    """Return a text broken into at most ``most`` lines of ``width`` px; the last one is elided if it is too long."""
     layout = QTextLayout(text, font)
     layout.beginLayout()
     lines = []

@@ -1,6 +1,6 @@
-"""Live plots in the program's own look: pyqtgraph draws the curves, everything else about it is switched off.
+"""Live plots in the style of the program; pyqtgraph only draws curves and axes.
 
-Horizontal grid only, few ticks, curves named at their ends and distinguished by stroke as well as colour.
+Plots have horizontal grid lines and few ticks. Curves have their names at their ends, and differ in stroke and colour.
 """
 
 from collections.abc import Sequence
@@ -22,15 +22,15 @@ MINUS = "\u2212"
 _THIN_SPACE = "\u2009"
 STROKE = 2.0
 NOTHING = QPen(QColor(0, 0, 0, 0))
-# Dash and gap in stroke widths: x solid, y long dashes, z dots.
+# Lengths of dash and gap in stroke widths: x solid, y dashed, z dotted.
 _DASHES: tuple[tuple[float, float] | None, ...] = (None, (6.0, 3.0), (1.0, 1.6))
-_LINE_PX = 16.0  # a line of the plots' texts
+_LINE_PX = 16.0  # the height of a line of text
 NAME_MARGIN = 1.0  # around names [px]
 _NAMES_AFTER_PX = 6.0  # from a curve's end to its name
-_HALF_TICK_PX = 24.0  # half of "10 000" under the end of an axis
-_DIGIT_PX = 8.5  # a digit of the longest number along an axis, with its share of the gap to the next
-_MOST_FOR_NAMES = 0.5  # of that plot's height
-_P99_ABOVE = 0.1  # the highest the 99th percentile's line ends above the top grid line [decades]
+_HALF_TICK_PX = 24.0  # half the width of "10 000", the last tick of an axis
+_DIGIT_PX = 8.5  # the width of a digit, including its share of the gap between two ticks
+_MAX_NAMES_FRACTION = 0.5  # of the plot's height
+_P99_ABOVE = 0.1  # how far the line of the 99th percentile may extend above the top grid line [decades]
 _BINS_PER_DECADE = 14
 LOWEST_US, LEAST_HIGHEST_US = 1.0, 1000.0
 NAMES = ("x right", "y up", "z near")
@@ -43,18 +43,18 @@ def tick_text(value: float) -> str:
 
 
 def pen(colour: str, width: float = STROKE, dash: tuple[float, float] | None = None) -> QPen:
-    """Return a cosmetic pen, whose width is in screen px at any scale of the plot."""
-    made = QPen(QColor(colour), width)
-    made.setCosmetic(True)
-    made.setCapStyle(Qt.PenCapStyle.FlatCap)
-    made.setJoinStyle(Qt.PenJoinStyle.BevelJoin)  # a curve has so many points that joins are invisible, but costly
+    """Return a pen whose width is in screen px at any scale of the plot."""
+    cosmetic_pen = QPen(QColor(colour), width)
+    cosmetic_pen.setCosmetic(True)
+    cosmetic_pen.setCapStyle(Qt.PenCapStyle.FlatCap)
+    cosmetic_pen.setJoinStyle(Qt.PenJoinStyle.BevelJoin)  # others are slower and look the same
     if dash is not None:
-        made.setDashPattern(list(dash))
-    return made
+        cosmetic_pen.setDashPattern(list(dash))
+    return cosmetic_pen
 
 
 class _Axis(pg.AxisItem):
-    """An axis without a label; laying out the empty label took a quarter of the time to create a plot."""
+    """An axis without a label: laying out an empty one takes a quarter of the time to create a plot."""
 
     def _updateLabel(self) -> None:
         self.picture = None
@@ -62,7 +62,7 @@ class _Axis(pg.AxisItem):
 
 
 class Plot(Coloured, pg.GraphicsView):
-    """An empty plot: no menu, no buttons, no mouse, no frame; horizontal grid lines at the ticks of y.
+    """An empty plot without menu, buttons, mouse or frame, with horizontal grid lines at the ticks of y.
 
     It uses only pyqtgraph's view box and axes: its plot item creates menus that outlive the window.
     """
@@ -76,13 +76,13 @@ class Plot(Coloured, pg.GraphicsView):
         self.box = pg.ViewBox(enableMenu=False, enableMouse=False, defaultPadding=0)
         self.axes = {side: _Axis(side) for side in ("left", "bottom")}
         self.ticks: dict[str, list[tuple[float, str]]] = {}
-        whole = pg.GraphicsLayout()
-        whole.setContentsMargins(0, 0, 0, 0)
-        whole.setSpacing(0)
-        whole.addItem(self.axes["left"], 0, 0)
-        whole.addItem(self.box, 0, 1)
-        whole.addItem(self.axes["bottom"], 1, 1)
-        self.setCentralItem(whole)
+        layout = pg.GraphicsLayout()
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(0)
+        layout.addItem(self.axes["left"], 0, 0)
+        layout.addItem(self.box, 0, 1)
+        layout.addItem(self.axes["bottom"], 1, 1)
+        self.setCentralItem(layout)
         self._grid: list[Any] = []
         for axis in self.axes.values():
             axis.linkToView(self.box)
@@ -112,17 +112,17 @@ class Plot(Coloured, pg.GraphicsView):
         QCoreApplication.sendPostedEvents(self.scene(), QEvent.Type.MetaCall.value)
 
     def sizeHint(self) -> QSize:
-        """Return a small size: a plot takes the remaining room, and never makes a window scroll."""
+        """Return a small size, because a plot fills the remaining space and must not make a window scroll."""
         return QSize(320, 150)
 
     def show_ticks(self, side: str, ticks: list[tuple[float, str]]) -> None:
-        """Draw ``ticks`` (place, text) at an axis; those of y also get a grid line."""
+        """Draw ``ticks`` (position, text) at an axis; those of y also get a grid line."""
         self.ticks[side] = ticks
         self.axes[side].setTicks([ticks])
         if side == "left":
             for line in self._grid:
                 self.box.removeItem(line)
-            self._grid = [pg.InfiniteLine(place, angle=0, pen=pen(self.theme.grid, 1)) for place, _ in ticks]
+            self._grid = [pg.InfiniteLine(value, angle=0, pen=pen(self.theme.grid, 1)) for value, _ in ticks]
             for line in self._grid:
                 line.setZValue(-10)
                 self.box.addItem(line, ignoreBounds=True)
@@ -140,14 +140,14 @@ class TracePlot(Plot):
 
     Parameters
     ----------
-    reach : initial range, from −reach to reach; the plot extends if a curve goes beyond it
+    reach : initial range, from −reach to reach; the plot extends if a curve goes limit it
     """
 
     def __init__(self, span_s: float, reach: float, names: Sequence[str] = NAMES) -> None:
         super().__init__()
         self._span_s = span_s
-        self._asked = self.reach = reach
-        self._rows_and_step = (0, 0.0)
+        self._requested_reach = self.reach = reach
+        self._shown_ticks = (0, 0.0)
         self._name_height = self._names_after_s = 0.0
         self._newest: list[float] = []
         self.curves = [pg.PlotCurveItem(antialias=True) for _ in names]
@@ -160,33 +160,33 @@ class TracePlot(Plot):
             end.textItem.setFont(font("small", weight=600))
             end.textItem.document().setDocumentMargin(NAME_MARGIN)
             end.setVisible(False)
-        self.box.sigResized.connect(self._make_room)
+        self.box.sigResized.connect(self._fit_axes)
         self.show_ticks("bottom", _time_ticks(span_s))
-        self._make_room()
+        self._fit_axes()
         self.apply_theme(LIGHT)
 
     def show_reach(self, reach: float) -> None:
-        """Set the scale from −reach to reach, extended to even ticks."""
-        if reach != self._asked:
-            self._asked = reach
-            self._make_room()
+        """Set the range to ±reach, extended to the next tick."""
+        if reach != self._requested_reach:
+            self._requested_reach = reach
+            self._fit_axes()
 
-    def _make_room(self) -> None:
-        """Keep room in px for the names at the right and half a line above and below the outer ticks."""
+    def _fit_axes(self) -> None:
+        """Leave space for the names at the right, and for half a line of text above and below the outer ticks."""
         height, width = max(60.0, self.box.height()), max(120.0, self.box.width())
-        most = 3 if height > 130 else 2 if height > 84 else 1  # grid lines on either side of zero
-        step = tick_step(self._asked, most)
-        rows = max(1, int(np.ceil(self._asked / step - 1e-9)))
+        max_rows = 3 if height > 130 else 2 if height > 84 else 1  # grid lines on either side of zero
+        step = tick_step(self._requested_reach, max_rows)
+        rows = max(1, int(np.ceil(self._requested_reach / step - 1e-9)))
         self.reach = rows * step
         self._name_height = 2 * self.reach * (_LINE_PX + 1) / (height - _LINE_PX)
-        beyond = self.reach * height / (height - _LINE_PX)
-        self.box.setYRange(-beyond, beyond, padding=0)
-        named = max(end.textItem.boundingRect().width() for end in self.ends) + _NAMES_AFTER_PX + 2
-        share = min(0.4, named / width)
+        limit = self.reach * height / (height - _LINE_PX)
+        self.box.setYRange(-limit, limit, padding=0)
+        name_width = max(end.textItem.boundingRect().width() for end in self.ends) + _NAMES_AFTER_PX + 2
+        share = min(0.4, name_width / width)
         self._names_after_s = 1.02 * self._span_s / (1 - share) * _NAMES_AFTER_PX / width
         self.box.setXRange(-1.02 * self._span_s, 1.02 * self._span_s * share / (1 - share), padding=0)
-        if (rows, step) != self._rows_and_step:
-            self._rows_and_step = (rows, step)
+        if (rows, step) != self._shown_ticks:
+            self._shown_ticks = (rows, step)
             self.show_ticks("left", [(k * step, tick_text(k * step)) for k in range(-rows, rows + 1)])
         self._place_names()
 
@@ -202,7 +202,7 @@ class TracePlot(Plot):
         self._place_names()
 
     def _place_names(self) -> None:
-        """Put every name at its curve's newest end, or as near as the other names and the edges permit."""
+        """Place every name as close to the newest end of its curve as the other names and the edges permit."""
         if not self._newest:
             return
         for end, height in zip(self.ends, _spread_apart(self._newest, self._name_height, self.reach), strict=True):
@@ -217,7 +217,7 @@ class TracePlot(Plot):
 
 
 class LatenessPlot(Plot):
-    """Histogram of the lateness of ticks, both axes logarithmic; 99th percentile and limit marked."""
+    """A histogram of the lateness of ticks on logarithmic axes, with the 99th percentile and the limit."""
 
     def __init__(self, limit_us: float) -> None:
         super().__init__()
@@ -233,30 +233,30 @@ class LatenessPlot(Plot):
         for name in (self.p99_name, self.limit_name):
             name.textItem.setFont(font("small", weight=600, tabular=True))
             name.textItem.document().setDocumentMargin(NAME_MARGIN)
-        self.box.sigResized.connect(self._make_room)
+        self.box.sigResized.connect(self._fit_axes)
         self._show_decades(max(3, int(np.ceil(self._limit + 0.1))), 4)
         self.apply_theme(LIGHT)
 
-    def _show_decades(self, across: int, up: int) -> None:
-        if (across, up) == self._decades:
+    def _show_decades(self, x_decades: int, y_decades: int) -> None:
+        if (x_decades, y_decades) == self._decades:
             return
-        self._decades = (across, up)
-        self._make_room()
-        self.show_ticks("left", [(k, tick_text(10.0**k)) for k in range(up + 1)])
+        self._decades = (x_decades, y_decades)
+        self._fit_axes()
+        self.show_ticks("left", [(k, tick_text(10.0**k)) for k in range(y_decades + 1)])
 
-    def _make_room(self) -> None:
-        """Keep two lines of text above the bars: the limit's name is above that of the 99th percentile."""
-        across, up = self._decades
+    def _fit_axes(self) -> None:
+        """Leave space above the bars for the name of the 99th percentile and, above it, that of the limit."""
+        x_decades, y_decades = self._decades
         share = min(0.2, _HALF_TICK_PX / max(1.0, self.box.width()))  # half of the last tick's text
-        last = across * (1 + share / (1 - share))
-        self.box.setXRange(-0.02 * across, last, padding=0)
-        apart = 1 if self.box.width() >= _DIGIT_PX * (across + 1) * (last + 0.02 * across) else 2
-        self.show_ticks("bottom", [(k, tick_text(10.0**k)) for k in range(0, across + 1, apart)])
-        line = self.limit_name.textItem.boundingRect().height() + NAME_MARGIN
-        share = min(2 * line / max(1.0, self.box.height()), _MOST_FOR_NAMES)
-        top = (up + _P99_ABOVE + 0.3 * share) / (1 - share)
+        last = x_decades * (1 + share / (1 - share))
+        self.box.setXRange(-0.02 * x_decades, last, padding=0)
+        step = 1 if self.box.width() >= _DIGIT_PX * (x_decades + 1) * (last + 0.02 * x_decades) else 2
+        self.show_ticks("bottom", [(k, tick_text(10.0**k)) for k in range(0, x_decades + 1, step)])
+        line_height = self.limit_name.textItem.boundingRect().height() + NAME_MARGIN
+        share = min(2 * line_height / max(1.0, self.box.height()), _MAX_NAMES_FRACTION)
+        top = (y_decades + _P99_ABOVE + 0.3 * share) / (1 - share)
         self.box.setYRange(-0.3, top, padding=0)
-        self.limit_name.setPos(self._limit - 0.01 * across, top)
+        self.limit_name.setPos(self._limit - 0.01 * x_decades, top)
 
     def show_histogram(self, edges_us: Floats, counts: NDArray[np.int64], p99_us: float | None) -> None:
         """Draw ``counts`` (bins,) between ``edges_us`` (bins + 1,) and the 99th percentile [µs]."""
@@ -287,7 +287,7 @@ class LatenessPlot(Plot):
 
 
 def lateness_histogram(lateness_us: Floats) -> tuple[Floats, NDArray[np.int64]]:
-    """Return bin edges [µs] (bins + 1,), evenly spaced logarithms, and counts (bins,); below 1 µs counts as 1 µs."""
+    """Return logarithmically spaced bin edges [µs] (bins + 1,) and counts (bins,); less than 1 µs counts as 1 µs."""
     micros = np.maximum(lateness_us, LOWEST_US)
     decades = int(np.ceil(np.log10(max(LEAST_HIGHEST_US, float(micros.max(initial=0.0)))) - 1e-9))
     edges = np.logspace(0, decades, decades * _BINS_PER_DECADE + 1)
@@ -301,32 +301,32 @@ def draw_quickly(curve: pg.PlotCurveItem, *, solid: bool) -> None:
 
 
 def tick_step(reach: float, most: int) -> float:
-    """Return the least even step between ticks (1, 2 or 5 times a power of ten) with at most ``most`` in ``reach``."""
+    """Return the smallest round step (1, 2 or 5 times a power of ten) with at most ``most`` ticks within ``reach``."""
     least = max(reach, 1e-9) / (most + 0.01)
     power = 10.0 ** np.floor(np.log10(least))
     return float(next(power * step for step in (1, 2, 5, 10) if power * step >= least))
 
 
 def _time_ticks(span_s: float) -> list[tuple[float, str]]:
-    """Return a tick every two seconds before now."""
+    """Return ticks every two seconds, from now (0 s) back to ``span_s``."""
     return [(-t, "0 s" if t == 0 else f"{MINUS}{t} s") for t in range(0, int(span_s) + 1, 2)]
 
 
-def _spread_apart(places: Sequence[float], least: float, reach: float) -> list[float]:
-    """Return ``places`` moved as little as possible, in order, so that names do not touch, within ±reach."""
-    order = np.argsort(places, kind="stable")
-    moved = np.asarray(places, float)[order]
+def _spread_apart(positions: Sequence[float], gap: float, reach: float) -> list[float]:
+    """Return ``positions``, moved so that they are at gap ``gap`` apart and within ±reach; their order is kept."""
+    order = np.argsort(positions, kind="stable")
+    moved = np.asarray(positions, float)[order]
     for _ in range(8):
         for i in range(len(moved) - 1):
-            lack = least - (moved[i + 1] - moved[i])
-            if lack > 0:
-                moved[i] -= lack / 2
-                moved[i + 1] += lack / 2
+            missing = gap - (moved[i + 1] - moved[i])
+            if missing > 0:
+                moved[i] -= missing / 2
+                moved[i + 1] += missing / 2
     for i in range(len(moved) - 1):
-        moved[i + 1] = max(moved[i + 1], moved[i] + least)
+        moved[i + 1] = max(moved[i + 1], moved[i] + gap)
     rank = np.arange(len(moved))
-    moved = np.maximum(moved, -reach + least * rank)
-    moved = np.minimum(moved, reach - least * rank[::-1])
-    back = np.empty_like(moved)
-    back[order] = moved
-    return [float(place) for place in back]
+    moved = np.maximum(moved, -reach + gap * rank)
+    moved = np.minimum(moved, reach - gap * rank[::-1])
+    spread = np.empty_like(moved)
+    spread[order] = moved
+    return [float(position) for position in spread]

@@ -1,4 +1,4 @@
-"""What places and windows have in common: Esc that stops the force, the interface of a place."""
+"""The Esc key, which stops the force when held, and the base class of the main window's pages."""
 
 from PySide6.QtCore import QEvent, QObject, Qt, QTimer, Signal
 from PySide6.QtGui import QGuiApplication, QKeyEvent
@@ -19,10 +19,10 @@ class EscapeKey(QObject):
     Parameters
     ----------
     anywhere
-        Whether it listens by itself to the window of the program that has the keyboard, later ones too. A question
-        closes when Esc goes down, and a page may take the keyboard while it is down: then only the release ends a hold,
-        in whatever window that is. A hold that began in an ignored window (`ignore_window`) is that window's, as
-        long as no other one of the program has got the keyboard since.
+        Whether it follows the focused window, including windows that open later. The focus may move while Esc is down,
+        because a question closes or a page takes the focus; only the release then ends the hold, in any window. A hold
+        that began in the ignored window (`ignore_window`) does not count, unless the focus has moved to another window
+        of the program.
     """
 
     held = Signal()
@@ -30,17 +30,17 @@ class EscapeKey(QObject):
 
     def __init__(self, parent: QObject, *, anywhere: bool = False) -> None:
         super().__init__(parent)
-        self._aside: QWidget | None = None
-        self._began_aside = False
+        self._ignored_window: QWidget | None = None
+        self._began_in_ignored = False
         self._pressed_at_ms = 0
         self._timer = QTimer(self, singleShot=True, interval=HOLD_MS, timerType=Qt.TimerType.PreciseTimer)
         self._timer.timeout.connect(self._emit_held)
-        presses = key_presses()  # also of a window's own filter: they decide what is a press
+        presses = key_presses()  # created even if not ``anywhere``, because it removes key repeats from every window
         if anywhere:
             presses.changed.connect(self._follow_escape)
 
     def ignore_window(self, window: QWidget) -> None:
-        self._aside = window
+        self._ignored_window = window
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         if event.type() == QEvent.Type.WindowDeactivate:
@@ -50,11 +50,11 @@ class EscapeKey(QObject):
         return False
 
     def _follow_escape(self, window: QObject | None, event: QKeyEvent) -> None:
-        """Track presses and releases of Esc, and their time stamps if the program was busy."""
+        """Track presses and releases of Esc; if the program was busy, their time stamps tell how long it was held."""
         if event.key() != Qt.Key.Key_Escape:
             return
         if event.type() == QEvent.Type.KeyPress and not self._timer.isActive():
-            self._began_aside = self._is_ignored(window)
+            self._began_in_ignored = self._is_ignored(window)
             self._pressed_at_ms = event.timestamp()
             self._timer.start()
         elif event.type() == QEvent.Type.KeyRelease and self._timer.isActive():
@@ -65,11 +65,11 @@ class EscapeKey(QObject):
                 self.tapped.emit()
 
     def _is_ignored(self, window: QObject | None) -> bool:
-        return window is not None and self._aside is not None and window is self._aside.windowHandle()
+        return window is not None and self._ignored_window is not None and window is self._ignored_window.windowHandle()
 
     def _emit_held(self) -> None:
-        now = QGuiApplication.focusWindow()
-        if not (self._began_aside and (now is None or self._is_ignored(now))):
+        focus_window = QGuiApplication.focusWindow()
+        if not (self._began_in_ignored and (focus_window is None or self._is_ignored(focus_window))):
             self.held.emit()
 
 
@@ -90,10 +90,10 @@ class Place(Themed, QWidget):
         """Prepare for being shown: reload what may have changed."""
 
     def leave(self) -> None:
-        """Prepare for being hidden: release at once every device that acts on the hand."""
+        """Prepare for being hidden: release at once every device that can exert force."""
 
 
 def last_focused(part: QWidget) -> QWidget | None:
-    """Return the part that last had keyboard focus, if it is visible and enabled."""
+    """Return the child widget that last had keyboard focus, if it is visible and enabled."""
     last = part.focusWidget()
     return last if last not in {None, part} and last.isVisible() and last.isEnabled() else None

@@ -1,4 +1,4 @@
-"""Numbers that are typed, and numbers in a range on a slider."""
+"""Number fields and sliders."""
 
 import math
 from dataclasses import dataclass
@@ -32,11 +32,11 @@ def write_number(value: float, decimals: int, decimal_sign: str = ".") -> str:
 
 
 class NumberField(QLineEdit):
-    """A low field for a number; Return or leaving it submits, Esc reverts, Up and Down step.
+    """A compact field for a number; Return or leaving it submits, Esc reverts, Up and Down step.
 
-    ``entered(value)`` is emitted once for a typed number; ``unread(text)`` if the text is not one number;
-    ``abandoned()`` at Esc; ``stepped(steps)`` at Up and Down. Return submits a rejected number again. While something
-    is typed, `show_text` does not change it.
+    ``entered(value)`` is emitted once for a typed number, ``unread(text)`` if the text is not a single number,
+    ``abandoned()`` at Esc, and ``stepped(steps)`` at Up and Down. Return submits a rejected number again. `show_text`
+    does not change text that is being typed.
     """
 
     entered = Signal(float)
@@ -51,7 +51,7 @@ class NumberField(QLineEdit):
         self.setProperty("dense", "true")
         self.setAlignment(Qt.AlignmentFlag.AlignRight)
         self.setFont(font("label", tabular=True))
-        self.returnPressed.connect(self._take_typed)
+        self.returnPressed.connect(self._submit_typed)
 
     @property
     def state(self) -> str:
@@ -77,12 +77,12 @@ class NumberField(QLineEdit):
         self.setModified(False)
 
     def event(self, event: QEvent) -> bool:
-        """Leave keys without a meaning in a number to the window, so that its shortcuts work."""
+        """Leave keys that a number cannot contain to the window, so that its shortcuts work."""
         if event.type() == QEvent.Type.ShortcutOverride and isinstance(event, QKeyEvent):
-            undoes = event.matches(QKeySequence.StandardKey.Undo) or event.matches(QKeySequence.StandardKey.Redo)
-            plain = event.modifiers() in {Qt.KeyboardModifier.NoModifier, Qt.KeyboardModifier.ShiftModifier}
-            if (undoes and not self.isModified()) or (
-                plain and event.text().isalpha() and not self._is_numeric(event.text())
+            is_undo = event.matches(QKeySequence.StandardKey.Undo) or event.matches(QKeySequence.StandardKey.Redo)
+            has_no_modifier = event.modifiers() in {Qt.KeyboardModifier.NoModifier, Qt.KeyboardModifier.ShiftModifier}
+            if (is_undo and not self.isModified()) or (
+                has_no_modifier and event.text().isalpha() and not self._is_numeric(event.text())
             ):
                 event.ignore()
                 return True
@@ -114,7 +114,7 @@ class NumberField(QLineEdit):
     def _is_numeric(text: str) -> bool:
         return bool(text) and set(text) <= _NUMERALS
 
-    def _take_typed(self) -> None:
+    def _submit_typed(self) -> None:
         """Submit the typed text; retry a rejected number, since the reason may have disappeared."""
         if self._state == "refused":
             self.setModified(True)
@@ -134,15 +134,15 @@ class NumberField(QLineEdit):
 
 _STEPS = 200
 _PAGE = 20
-_FIGURES = 3  # significant digits of a slider's number: more would be false precision
+_SIGNIFICANT_DIGITS = 3  # significant digits of a slider's number: more would be false precision
 _KNOB = 7.5
 _TRACK = 4.0
-MARGIN = _KNOB + 4  # room for knob and focus ring at both ends
+MARGIN = _KNOB + 4  # space for the knob and its focus ring at both ends
 
 
 @dataclass(frozen=True, slots=True)
 class Range:
-    """The range of a slider, from ``least`` to ``most``; by decades if ``logarithmic``."""
+    """The range of a slider, from ``least`` to ``most``; ``whole`` means that all values are integers."""
 
     least: float
     most: float
@@ -156,11 +156,11 @@ class Range:
         return _STEPS
 
     def fraction_of_range(self, value: float) -> float:
-        """Return the position of a number on the track, 0 to 1; numbers beyond the ends are at the end."""
+        """Return the position of a number on the track, 0 to 1; numbers outside the range are at its ends."""
         if self.most <= self.least:
             return 0.0
         value = min(max(value, self.least), self.most)
-        if self._by_decades:
+        if self._is_logarithmic:
             return math.log(value / self.least) / math.log(self.most / self.least)
         return (value - self.least) / (self.most - self.least)
 
@@ -170,17 +170,17 @@ class Range:
             return self.least
         if share >= 1.0:
             return self.most
-        if self._by_decades:
+        if self._is_logarithmic:
             number = self.least * (self.most / self.least) ** share
-            digits = _FIGURES - 1 - math.floor(math.log10(abs(number)))
+            digits = _SIGNIFICANT_DIGITS - 1 - math.floor(math.log10(abs(number)))
         else:
             number = self.least + share * (self.most - self.least)
-            digits = _FIGURES - math.floor(math.log10(self.most - self.least))
+            digits = _SIGNIFICANT_DIGITS - math.floor(math.log10(self.most - self.least))
         number = round(number) if self.whole else round(number, digits)
         return min(max(float(number), self.least), self.most)
 
     @property
-    def _by_decades(self) -> bool:
+    def _is_logarithmic(self) -> bool:
         return self.logarithmic and self.least > 0
 
 
@@ -225,7 +225,7 @@ class Slider(Themed, QSlider):
         self._update_accessible_value()
         self.update()
 
-    def let_go(self) -> None:
+    def release_knob(self) -> None:
         """Release the knob without a signal, even while the mouse holds it."""
         self._dragged = False
         self.update()
@@ -306,7 +306,7 @@ class Slider(Themed, QSlider):
         return self._span.value_at((x - MARGIN) / max(1.0, self.width() - 2 * MARGIN))
 
     def _value_after(self, steps: int) -> float:
-        """Return the number after some steps, which always differs unless the end is reached."""
+        """Return the number ``steps`` steps away; it differs from the current one unless the end is reached."""
         share = self._span.fraction_of_range(self._value)
         value = self._span.value_at(share + steps / self._span.steps)
         if self._span.whole and value == self._value:
@@ -322,7 +322,7 @@ class Slider(Themed, QSlider):
         self.slid.emit(value, held)
 
     def _follow_step(self, step: int) -> None:
-        """Follow a change that was caused by neither mouse nor keys, such as by a screen reader."""
+        """Follow a change that neither mouse nor keyboard caused, such as one by a screen reader."""
         self._move_to(self._span.value_at(step / self._span.steps), held=False)
 
     def _update_accessible_value(self) -> None:

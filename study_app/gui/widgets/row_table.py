@@ -1,6 +1,6 @@
-"""Tables in the program's look: rows chosen by pointer and keyboard, chips in cells, hairlines between rows.
+"""Tables in the style of the program: selectable rows, chips in cells, hairlines between rows.
 
-The model gives each cell's words as its display text, so that screen readers hear what is drawn.
+The model returns each cell's text in the display role, from which screen readers read it.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -28,21 +28,21 @@ Index = QModelIndex | QPersistentModelIndex
 CHIP_ROLE = Qt.ItemDataRole.UserRole + 1
 """Tone, icon and word of a chip, in place of the text."""
 BELOW_ROLE = Qt.ItemDataRole.UserRole + 2
-"""A word in lowercase letters below the text or chip."""
+"""A word in small type below the text or chip."""
 CARE_ROLE = Qt.ItemDataRole.UserRole + 3
-"""Whether the row is tinted because it needs care."""
+"""Whether the row is tinted because it needs attention."""
 
 
-NOWHERE = QModelIndex()
+NO_PARENT = QModelIndex()
 
 
 class Rows(QAbstractTableModel):
-    """Values as rows of a table.
+    """A table model with one value per row.
 
     Parameters
     ----------
     headings : name and heading of each column
-    cell : returns the values of a row's cell in the column of a name, by their roles
+    cell : returns the values of a cell by their roles, from the row's value and the name of the column
     """
 
     def __init__(self, headings: Mapping[str, str], cell: Callable[[Any, str], Mapping[int, Any]]) -> None:
@@ -57,48 +57,48 @@ class Rows(QAbstractTableModel):
         self.rows, self._cells = tuple(rows), {}
         self.endResetModel()
 
-    def rowCount(self, parent: Index = NOWHERE) -> int:
+    def rowCount(self, parent: Index = NO_PARENT) -> int:
         return 0 if parent.isValid() else len(self.rows)
 
-    def columnCount(self, parent: Index = NOWHERE) -> int:
+    def columnCount(self, parent: Index = NO_PARENT) -> int:
         return 0 if parent.isValid() else len(self._names)
 
     def headerData(self, section: int, orientation: Qt.Orientation, role: int = Qt.ItemDataRole.DisplayRole) -> Any:
-        across = orientation == Qt.Orientation.Horizontal and role == Qt.ItemDataRole.DisplayRole
-        return self._headings[section] if across else None
+        is_column = orientation == Qt.Orientation.Horizontal
+        return self._headings[section] if is_column and role == Qt.ItemDataRole.DisplayRole else None
 
     def data(self, index: Index, role: int = Qt.ItemDataRole.DisplayRole) -> Any:
-        at = index.row(), index.column()
-        if at not in self._cells:
-            self._cells[at] = self._cell(self.rows[at[0]], self._names[at[1]])
-        return self._cells[at].get(role)
+        key = index.row(), index.column()
+        if key not in self._cells:
+            self._cells[key] = self._cell(self.rows[key[0]], self._names[key[1]])
+        return self._cells[key].get(role)
 
 
 class _Cells(QStyledItemDelegate):
-    """Draws texts and chips; the table draws parts that span a row."""
+    """Draws texts and chips of cells; the table draws what spans a whole row."""
 
     def paint(self, painter: QPainter, option: QStyleOptionViewItem, index: Index) -> None:
         table = self.parent()
         assert isinstance(table, Table)  # noqa: S101 - made by it
         theme = table.theme
-        place = QRectF(option.rect).adjusted(MARGIN if index.column() == 0 else _GAP, 0, -_GAP, 0)  # type: ignore[attr-defined]
+        cell = QRectF(option.rect).adjusted(MARGIN if index.column() == 0 else _GAP, 0, -_GAP, 0)  # type: ignore[attr-defined]
         chip, below = index.data(CHIP_ROLE), index.data(BELOW_ROLE)
         painter.save()
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         if chip is not None:
-            width = min(chip_size(chip[2], small=True).width(), int(place.width()))
-            high, top = (20, place.top() + 4) if below else (24, place.center().y() - 12)
-            body = QRectF(place.left(), top, width, high)
+            width = min(chip_size(chip[2], small=True).width(), int(cell.width()))
+            height, top = (20, cell.top() + 4) if below else (24, cell.center().y() - 12)
+            body = QRectF(cell.left(), top, width, height)
             paint_chip(painter, body, theme, *chip, small=True)
             if below:
                 lower = QRectF(
-                    place.left() + _GAP, body.bottom(), place.width() - _GAP, place.bottom() - 4 - body.bottom()
+                    cell.left() + _GAP, body.bottom(), cell.width() - _GAP, cell.bottom() - 4 - body.bottom()
                 )
                 _write_text(painter, lower, font("small"), theme.text2, below)
             painter.restore()
             return
         face = index.data(Qt.ItemDataRole.FontRole) or font("label", weight=400, tabular=True)
-        upper = QRectF(place) if not below else QRectF(place.left(), place.top() + 3, place.width(), place.height() / 2)
+        upper = QRectF(cell) if not below else QRectF(cell.left(), cell.top() + 3, cell.width(), cell.height() / 2)
         _write_text(painter, upper, face, theme.text if index.column() == 0 else theme.text2, str(index.data() or ""))
         if below:
             lower = QRectF(upper).translated(0, upper.height() - 4)
@@ -106,11 +106,11 @@ class _Cells(QStyledItemDelegate):
         painter.restore()
 
 
-def _write_text(painter: QPainter, place: QRectF, face: QFont, ink: str, text: str) -> None:
+def _write_text(painter: QPainter, cell: QRectF, face: QFont, ink: str, text: str) -> None:
     painter.setFont(face)
     painter.setPen(QColor(ink))
-    shown = painter.fontMetrics().elidedText(text, Qt.TextElideMode.ElideRight, int(place.width()))
-    painter.drawText(place, Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignLeft, shown)
+    shown = painter.fontMetrics().elidedText(text, Qt.TextElideMode.ElideRight, int(cell.width()))
+    painter.drawText(cell, Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignLeft, shown)
 
 
 class Table(Themed, QTableView):
