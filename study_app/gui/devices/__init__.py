@@ -1,4 +1,4 @@
-"""Devices: the haptic and input devices of this machine, and their diagnosis."""
+"""The haptic and input devices of this machine, and their diagnosis."""
 
 from study_app.gui.devices.diagnosis_dialog import open_diagnosis
 from study_app.gui.devices.view import DevicesPlace

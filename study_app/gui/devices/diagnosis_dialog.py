@@ -1,4 +1,4 @@
-"""A device's diagnosis: what goes on while it is examined, then the report that `doctor` prints."""
+"""The diagnosis of a device: progress while it is examined, then the report that `doctor` prints."""
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -22,7 +22,7 @@ from study_app.store.support import NAME, write_support
 from study_app.store.workstation import MachineSettings
 from study_app.workers.server import Crashed, Refused
 
-_LOOK_MS = 100
+_POLL_MS = 100
 _PREPARING = "Preparing … On first use the driver is compiled, which takes about a minute."
 _SIZE = QSize(820, 700)
 
@@ -31,15 +31,15 @@ Begin: TypeAlias = Callable[..., ExaminationClient]
 
 
 class DiagnosisDialog(QDialog):
-    """Examines a device and shows its problems. Closing it ends the examination.
+    """A dialog that examines a device and shows the report; closing it ends the examination.
 
-    ``over(well)`` is emitted when the examination is finished.
+    ``over(well)`` is emitted when the examination has finished, with whether the device works.
 
     Parameters
     ----------
     name : name of the device as for ``--device``
     note : a sentence with further information
-    begin : starts an examination from name and options
+    begin : starts an examination, given the name and the options
     """
 
     over = Signal(bool)
@@ -61,7 +61,7 @@ class DiagnosisDialog(QDialog):
         self.setModal(False)
         self._examination: ExaminationClient | None = None
         self.leaving: ExaminationClient | None = None
-        self._wanted = False
+        self._start_pending = False
         self.report: Report | None = None
         self.step = label(_PREPARING, "body", "text2", wraps=True)
         self.note = label(note, "label", "warn", wraps=True)
@@ -81,10 +81,10 @@ class DiagnosisDialog(QDialog):
         self._lay_out(title)
         self._connect()
         self.setMinimumSize(680, 420)
-        room = self.screen().availableSize()
-        self.resize(_SIZE.boundedTo(QSize(room.width() - 40, room.height() - 60)))
+        available = self.screen().availableSize()
+        self.resize(_SIZE.boundedTo(QSize(available.width() - 40, available.height() - 60)))
         apply_theme(self, theme)
-        self._timer = QTimer(self, interval=_LOOK_MS)
+        self._timer = QTimer(self, interval=_POLL_MS)
         self._timer.timeout.connect(self._read_answers)
         self.examine()
 
@@ -125,14 +125,14 @@ class DiagnosisDialog(QDialog):
         self.copy.setEnabled(False)
         self.support.setEnabled(False)
         self.close_button.show_action("", "Cancel")
-        self._wanted = True
+        self._start_pending = True
         self._timer.start()
         self._read_answers()
 
     def _read_answers(self) -> None:
-        """Start once nothing else uses the device, then read the diagnosis' answers."""
-        if self._wanted and (self.leaving is None or self.leaving.ended):
-            self._wanted = False
+        """Start the examination as soon as the previous one has released the device, then read its answers."""
+        if self._start_pending and (self.leaving is None or self.leaving.ended):
+            self._start_pending = False
             self._examination = self._begin(self._name, options=self._options)
         for _, answer in [] if self._examination is None else self._examination.answers():
             if isinstance(answer, str):
@@ -141,21 +141,21 @@ class DiagnosisDialog(QDialog):
             else:
                 self._show_conclusion(answer)
 
-    def _show_conclusion(self, said: Report | Refused | Crashed) -> None:
+    def _show_conclusion(self, conclusion: Report | Refused | Crashed) -> None:
         self._timer.stop()
         self.bar.hide()
         self.again.setEnabled(True)
         self.support.setEnabled(True)
         self.close_button.show_action("", "Close")
         self._end_process()
-        if not isinstance(said, Report):
-            self._show_step(_sentence(said.sentence), "bad", "warning", "bad")
+        if not isinstance(conclusion, Report):
+            self._show_step(_as_sentence(conclusion.sentence), "bad", "warning", "bad")
             self.over.emit(False)
             return
-        self.report = said
+        self.report = conclusion
         self.copy.setEnabled(True)
-        well = said.well
-        sentence = said.conclusion if said.failure is None else _sentence(said.failure)
+        well = conclusion.well
+        sentence = conclusion.conclusion if conclusion.failure is None else _as_sentence(conclusion.failure)
         self._show_step(sentence, "text2" if well else "bad", "check" if well else "warning", "ok" if well else "bad")
         self.text.setPlainText(self._report_text())
         self.over.emit(well)
@@ -181,11 +181,11 @@ class DiagnosisDialog(QDialog):
         dialog.open()
 
     def save_support(self, path: Path) -> None:
-        """Write versions, settings, log, last error and report to ``path``; show the path or the error."""
+        """Write a zip file with versions, settings, log, last error and report; show its path, or the error."""
         try:
             write_support(path, self._report_text())
         except StoreError as error:
-            self.saved.setText(_sentence(str(error)))
+            self.saved.setText(_as_sentence(str(error)))
         else:
             self.saved.setText(
                 f"Saved as {path}. The file does not contain participant IDs, answers or liquid parameters."
@@ -193,7 +193,7 @@ class DiagnosisDialog(QDialog):
         self.saved.show()
 
     def _end_process(self) -> None:
-        """Ask the process to end without waiting: it closes the device first."""
+        """Ask the process to close the device and end, without waiting for it."""
         if self._examination is not None:
             self._examination.close()
             self.leaving, self._examination = self._examination, None
@@ -201,12 +201,12 @@ class DiagnosisDialog(QDialog):
     def done(self, result: int) -> None:
         """End the examination, however the dialog is closed."""
         self._timer.stop()
-        self._wanted = False
+        self._start_pending = False
         self._end_process()
         super().done(result)
 
 
-def _sentence(text: str) -> str:
+def _as_sentence(text: str) -> str:
     return text[:1].upper() + text[1:] + ("" if text.endswith((".", "!", "?")) else ".")
 
 
@@ -219,10 +219,10 @@ _HELD = (
 def open_diagnosis(
     parent: QWidget, theme: Theme, name: str, settings: MachineSettings, *, held: bool = False
 ) -> DiagnosisDialog:
-    """Open the diagnosis of a device; ``held``: a session has the device open."""
+    """Open the diagnosis of a device; ``held`` means that a session uses the device."""
     options = descriptor_of(name).window_values(settings.device_options)
-    made = DiagnosisDialog(parent, theme, name, options=options, note=_HELD if held else "")
-    made.finished.connect(made.deleteLater)
+    dialog = DiagnosisDialog(parent, theme, name, options=options, note=_HELD if held else "")
+    dialog.finished.connect(dialog.deleteLater)
     if settings.sound:
-        made.over.connect(lambda _well: QApplication.beep())
-    return made
+        dialog.over.connect(lambda _well: QApplication.beep())
+    return dialog

@@ -1,4 +1,4 @@
-"""The devices' place: every device, which one sessions begin with, and what is wrong with one; it opens none."""
+"""The page of devices: their states, the device of new sessions, and diagnoses; it opens no device itself."""
 
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -11,7 +11,7 @@ from study_app.devices.descriptor import Backend, DeviceOption
 from study_app.devices.registry import backends
 from study_app.gui.devices.diagnosis_dialog import DiagnosisDialog, open_diagnosis
 from study_app.gui.kit.devices import DeviceShown, devices_shown, remembered_options
-from study_app.gui.kit.fields import LEAST_WORDS, Editor, Field, typed_file
+from study_app.gui.kit.fields import MIN_TEXT_WIDTH, Editor, Field, typed_file
 from study_app.gui.theme.theme import SHADOW, font
 from study_app.gui.widgets.background import Background
 from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
@@ -21,11 +21,11 @@ from study_app.gui.widgets.labels import label, set_ink
 from study_app.gui.widgets.main_view import Place
 from study_app.store.workstation import DEFAULTS, MachineSettings
 
-_INSET = 30  # behind a radio's mark
+_INSET = 30  # indentation by the width of a radio button
 
 
 class _DeviceRow(QWidget):
-    """One device; ``diagnose`` is called with its name."""
+    """A row with a device; ``diagnose`` is called with its name."""
 
     def __init__(self, shown: DeviceShown, diagnose: Callable[[str], object]) -> None:
         super().__init__()
@@ -49,8 +49,8 @@ class _DeviceRow(QWidget):
 
     def show_device(self, shown: DeviceShown) -> None:
         self.chip.show_state(shown.tone, shown.sign, shown.word)
-        ways = shown.ways if len(shown.ways) > 1 else ()
-        for line, text in ((self.can, shown.can), (self.why, shown.why), (self.by, "   ·   ".join(ways))):
+        libraries = shown.ways if len(shown.ways) > 1 else ()
+        for line, text in ((self.can, shown.can), (self.why, shown.why), (self.by, "   ·   ".join(libraries))):
             line.setText(text)
             line.setVisible(bool(text))
         set_ink(self.why, "warn" if shown.tone == "warn" else "text2")
@@ -58,10 +58,10 @@ class _DeviceRow(QWidget):
 
 
 def _text_label(ink: str, *, small: bool = False) -> QLabel:
-    made = label("", "small" if small else "label", ink, wraps=True)  # type: ignore[arg-type]
-    made.setFont(font("small" if small else "label", weight=400))
-    made.setMinimumWidth(LEAST_WORDS)
-    return made
+    text_label = label("", "small" if small else "label", ink, wraps=True)  # type: ignore[arg-type]
+    text_label.setFont(font("small" if small else "label", weight=400))
+    text_label.setMinimumWidth(MIN_TEXT_WIDTH)
+    return text_label
 
 
 _STACKED_BELOW = 1000
@@ -71,12 +71,12 @@ PATIENCE_S = 5.0
 
 
 class _OptionCard(Card):
-    """The file for a device option; an empty field means none."""
+    """The card with the file of a device option; the field may be empty."""
 
     def __init__(self, option: DeviceOption) -> None:
         super().__init__(option.title, gap=8)
         about = label(option.about, "label", "text2", wraps=True, weight=400)
-        about.setMinimumWidth(LEAST_WORDS)
+        about.setMinimumWidth(MIN_TEXT_WIDTH)
         exists = partial(typed_file, option.name)
         field = Field(option.name, "File", "file", (), placeholder=_NONE, file_filter=option.file_filter, parse=exists)
         self.editor = Editor(field)
@@ -84,7 +84,7 @@ class _OptionCard(Card):
 
 
 class _HelpCard(Card):
-    """The next steps for a Falcon; a text without a window's state."""
+    """The card with the steps before the first session with a Falcon."""
 
     def __init__(self) -> None:
         super().__init__("Before the first session", gap=8)
@@ -96,15 +96,15 @@ class _HelpCard(Card):
             "“liquid-study devices bench” tests any force-feedback device and takes ten minutes.",
         ):
             line = label(paragraph, "label", "text2", wraps=True, weight=400)
-            line.setMinimumWidth(LEAST_WORDS)
+            line.setMinimumWidth(MIN_TEXT_WIDTH)
             self.column.addWidget(line)
 
 
 class DevicesPlace(Place):
-    """All devices with their states; devices are searched for on request, one search at a time.
+    """The page with all devices and their states, which are searched for when it is shown and on request.
 
-    ``looked`` is emitted after a search, ``changed`` with a setting and its new value, ``troubled`` with a title and a
-    sentence if a search failed.
+    ``looked`` is emitted after a search, ``changed`` with a setting and its new value, and ``troubled`` with a title
+    and a sentence if a search failed.
     """
 
     looked = Signal()
@@ -114,9 +114,9 @@ class DevicesPlace(Place):
     def __init__(self, settings: MachineSettings = DEFAULTS, look: Callable[[], Sequence[Backend]] = backends) -> None:
         super().__init__()
         self._settings, self.backends = settings, look
-        self.looking = Background(self, refusals=Exception)  # a driver's bug is a result of the search
-        self.looking.done.connect(self._show_devices_found)
-        self.looking.failed.connect(self._show_unexamined)
+        self.looking = Background(self, refusals=Exception)  # an exception in a driver must be reported, too
+        self.looking.done.connect(self._show_search_result)
+        self.looking.failed.connect(self._show_search_error)
         self._ended = False
         self.shown: tuple[DeviceShown, ...] = ()
         self.dialog: DiagnosisDialog | None = None
@@ -151,7 +151,7 @@ class DevicesPlace(Place):
         self.look_for_devices()
 
     def leave(self) -> None:
-        """End a running examination, so that it releases its device."""
+        """End a running diagnosis, so that it releases its device."""
         self.end_diagnosis()
 
     def look_for_devices(self) -> None:
@@ -160,16 +160,16 @@ class DevicesPlace(Place):
             self.looking.run(lambda: devices_shown(self.backends()))
 
     def stop_looking(self, patience_s: float = PATIENCE_S) -> None:
-        """Stop searching, wait for the running search and ignore its result, because the windows close."""
+        """Wait for a running search, ignore its result, and start no other, because the windows close."""
         self._ended = True
         self.looking.wait(min(patience_s, PATIENCE_S))
 
     def diagnose(self, name: str) -> None:
-        """Open the diagnosis of a device above the window, with the preferred serial number."""
+        """Open the diagnosis of a device, with the preferred argument (such as a serial number) of the settings."""
         preferred = self._settings.device
-        asked = preferred if preferred.partition(":")[0] == name else name
+        device = preferred if preferred.partition(":")[0] == name else name
         self.end_diagnosis()
-        self.dialog = open_diagnosis(self.window(), self.theme, asked, self._settings)
+        self.dialog = open_diagnosis(self.window(), self.theme, device, self._settings)
         self.dialog.finished.connect(self._forget_dialog)
         self.dialog.show()
 
@@ -180,26 +180,26 @@ class DevicesPlace(Place):
     def _forget_dialog(self) -> None:
         self.dialog = None
 
-    def _show_devices_found(self, devices: tuple[DeviceShown, ...]) -> None:
+    def _show_search_result(self, devices: tuple[DeviceShown, ...]) -> None:
         if not self._ended:
             self.show_looking(False)
             self.show_devices(devices)
             self.looked.emit()
 
-    def _show_unexamined(self, error: Exception) -> None:
+    def _show_search_error(self, error: Exception) -> None:
         if not self._ended:
             self.show_looking(False)
             self.troubled.emit("This machine could not be checked", f"{error}.")
 
     def show_devices(self, shown: tuple[DeviceShown, ...]) -> None:
-        """Show devices; existing rows are kept with their focus."""
+        """Show the devices; existing rows are kept, with their focus."""
         self.shown = shown
         for device in shown:
             if device.name in self.rows:
                 self.rows[device.name].show_device(device)
             else:
                 self._add_row(device)
-        self._group.setExclusive(False)  # otherwise the marked button could not be unmarked
+        self._group.setExclusive(False)  # otherwise the checked button could not be unchecked
         for name, row in self.rows.items():
             if isinstance(row.title, Radio):
                 row.title.setChecked(name == self._settings.device.partition(":")[0])
@@ -226,8 +226,7 @@ class DevicesPlace(Place):
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         stacked = self.width() < _STACKED_BELOW
-        way = QBoxLayout.Direction.TopToBottom if stacked else QBoxLayout.Direction.LeftToRight
-        self._body.setDirection(way)
+        self._body.setDirection(QBoxLayout.Direction.TopToBottom if stacked else QBoxLayout.Direction.LeftToRight)
         for card in (*self.options.values(), self.help):
             card.setMinimumWidth(0 if stacked else _COLUMN_PX)
             card.setMaximumWidth(QWIDGETSIZE_MAX if stacked else _COLUMN_PX)

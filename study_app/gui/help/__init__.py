@@ -1,1 +1,1 @@
-"""The documentation in the program: its pages, without a network."""
+"""The documentation inside the program, without a network."""

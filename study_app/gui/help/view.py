@@ -1,4 +1,4 @@
-"""The place Help: the list of pages, a search, and one page."""
+"""The page Help: the list of documentation pages, a search, and the current page."""
 
 import posixpath
 import re
@@ -50,7 +50,7 @@ _PAGES_OF_PLACES: Final = {
     "devices": "devices",
     "machine": "this-machine",
 }
-"""The page about each place of the main window."""
+"""The documentation page about each page of the main window."""
 
 _COMMENT: Final = re.compile(r"<!--.*?-->\n*", re.DOTALL)
 _HTML_IMAGE: Final = re.compile(r'<img src="([^"]+)"[^>]*alt="([^"]*)"[^>]*>')
@@ -59,7 +59,7 @@ _EMPTY_CELL: Final = re.compile(r"(?<=\|) *(?=\|)")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HelpEntry:
-    """One row of the list of pages: its page, its title, whether it heads a section, and its anchor."""
+    """A row of the list of pages: its page, title and anchor, and whether it ``heads`` a section."""
 
     page: str
     title: str
@@ -78,7 +78,7 @@ def help_entries() -> tuple[HelpEntry, ...]:
 
 
 def matching_entries(text: str) -> tuple[HelpEntry, ...]:
-    """Return the pages that contain the text, best first, each at its best heading; all pages for an empty text."""
+    """Return the pages that contain a text, best match first, each at its best heading; all pages for an empty text."""
     if not text.strip():
         return help_entries()
     titles = {entry.page: entry.title for entry in help_entries()}
@@ -94,7 +94,7 @@ def matching_entries(text: str) -> tuple[HelpEntry, ...]:
 
 @cache
 def page_markdown(page: str) -> str:
-    """Return a page as Markdown that Qt can show, without comments, HTML, empty cells and bars in cells."""
+    """Return a page as Markdown that Qt can display, without comments, HTML images, empty cells and escaped bars."""
     text = _HTML_IMAGE.sub(r"![\2](\1)", _COMMENT.sub("", documentation.page(page)))
     return "\n".join(
         _EMPTY_CELL.sub("\N{NO-BREAK SPACE}", line).replace(r"\|", "\N{DIVIDES}") if line.startswith("|") else line
@@ -102,9 +102,9 @@ def page_markdown(page: str) -> str:
     )
 
 
-_ENDING = ".md"
+_SUFFIX = ".md"
 CELL_PADDING, MARGIN = 6, 28
-_WIDEST_TEXT = 860  # px: longer lines are hard to read
+_WIDEST_TEXT = 860  # px; longer lines are hard to read
 _HEADING_SIZES = {1: 26, 2: 20, 3: 16, 4: 15}  # px
 _CODE_SIZE = 14  # px
 _PICTURE = "\N{OBJECT REPLACEMENT CHARACTER}"
@@ -112,27 +112,26 @@ CODE = (QTextFormat.Property.BlockCodeFence, QTextFormat.Property.BlockCodeLangu
 
 
 def _heading_font(level: int) -> QFont:
-    """Return the font of a heading; levels count from 1."""
-    made = font("title" if level == 1 else "card")
-    made.setPixelSize(_HEADING_SIZES[min(level, 4)])
-    return made
+    """Return the font of a heading; the highest level is 1."""
+    heading_font = font("title" if level == 1 else "card")
+    heading_font.setPixelSize(_HEADING_SIZES[min(level, 4)])
+    return heading_font
 
 
 def _code_font() -> QFont:
-    """Return the font of code."""
-    made = QFontDatabase.systemFont(QFontDatabase.SystemFont.FixedFont)
-    made.setPixelSize(_CODE_SIZE)
-    return made
+    code_font = QFontDatabase.systemFont(QFontDatabase.SystemFont.FixedFont)
+    code_font.setPixelSize(_CODE_SIZE)
+    return code_font
 
 
-def _text_format(used: QFont) -> QTextCharFormat:
-    made = QTextCharFormat()
-    made.setFont(used)
-    return made
+def _text_format(text_font: QFont) -> QTextCharFormat:
+    text_format = QTextCharFormat()
+    text_format.setFont(text_font)
+    return text_format
 
 
 class _PageReader(Coloured, QTextBrowser):
-    """A page of the documentation.
+    """A view of a documentation page.
 
     ``page_asked(name, anchor)`` is emitted for links to other pages; other links open outside the program.
     """
@@ -149,11 +148,11 @@ class _PageReader(Coloured, QTextBrowser):
         self.setFrameShape(QTextBrowser.Shape.NoFrame)
         self.setVerticalScrollBarPolicy(
             Qt.ScrollBarPolicy.ScrollBarAlwaysOn
-        )  # otherwise it changes the width, and the page is drawn twice
+        )  # otherwise it would change the width, and the page would be drawn twice
         self.anchorClicked.connect(self._follow_link)
 
     def show_page(self, name: str, anchor: str = "") -> None:
-        """Show a page from its start, or from the heading with an anchor."""
+        """Show a page from its start, or from the heading with ``anchor``."""
         if name != self.page:
             self.page = name
             self._draw_page()
@@ -181,15 +180,15 @@ class _PageReader(Coloured, QTextBrowser):
         return picture
 
     def resizeEvent(self, event: QResizeEvent) -> None:
-        """Redraw the page, since pictures are as wide as the text; the reading position stays visible."""
-        at = self.verticalScrollBar().value() / max(1, self.verticalScrollBar().maximum())
+        """Redraw the page, since pictures are as wide as the text, and keep the reading position."""
+        fraction = self.verticalScrollBar().value() / max(1, self.verticalScrollBar().maximum())
         super().resizeEvent(event)
         if self.page and event.size().width() != event.oldSize().width():
             self._draw_page()
-            self.verticalScrollBar().setValue(round(at * self.verticalScrollBar().maximum()))
+            self.verticalScrollBar().setValue(round(fraction * self.verticalScrollBar().maximum()))
 
     def _path_from_docs(self, path: str) -> str:
-        """Return the target of a path on the page, relative to the folder of the pages."""
+        """Return a path on the page as one relative to the folder of pages."""
         return posixpath.normpath(posixpath.join(posixpath.dirname(self.page), path))
 
     def _draw_page(self) -> None:
@@ -197,10 +196,10 @@ class _PageReader(Coloured, QTextBrowser):
         document.setMarkdown(page_markdown(self.page), QTextDocument.MarkdownFeature.MarkdownDialectGitHub)
         self._style_blocks(document)
         self._style_tables(document)
-        self.setDocument(document)  # last: laid out once
-        before, self._drawn = self._drawn, document
-        if before is not None:
-            before.deleteLater()  # with its cached pictures, which this widget would otherwise keep
+        self.setDocument(document)  # last, so that it is laid out once
+        previous, self._drawn = self._drawn, document
+        if previous is not None:
+            previous.deleteLater()  # and its cached pictures, which would accumulate
 
     def _style_blocks(self, document: QTextDocument) -> None:
         cursor = QTextCursor(document)
@@ -267,8 +266,8 @@ class _PageReader(Coloured, QTextBrowser):
         block = self.document().begin()
         while block.isValid():
             if block.blockFormat().headingLevel() and anchor_of(block.text()) == anchor:
-                at = self.document().documentLayout().blockBoundingRect(block).top()
-                self.verticalScrollBar().setValue(round(at) - MARGIN // 2)
+                top = self.document().documentLayout().blockBoundingRect(block).top()
+                self.verticalScrollBar().setValue(round(top) - MARGIN // 2)
                 return
             block = block.next()
 
@@ -278,23 +277,23 @@ class _PageReader(Coloured, QTextBrowser):
             QDesktopServices.openUrl(link)
         elif not path:
             self._scroll_to(anchor)
-        elif path.endswith(_ENDING):
-            self.page_asked.emit(self._path_from_docs(path.removesuffix(_ENDING)), anchor)
+        elif path.endswith(_SUFFIX):
+            self.page_asked.emit(self._path_from_docs(path.removesuffix(_SUFFIX)), anchor)
 
 
 LIST_WIDTH, ROW_PX, HEAD_PX = 280, 30, 40
 PAGE, ANCHOR = Qt.ItemDataRole.UserRole, Qt.ItemDataRole.UserRole + 1
-_MOVES = (Qt.Key.Key_Up, Qt.Key.Key_Down, Qt.Key.Key_PageUp, Qt.Key.Key_PageDown)
-_ENTERS = (Qt.Key.Key_Return, Qt.Key.Key_Enter)
+_MOVE_KEYS = (Qt.Key.Key_Up, Qt.Key.Key_Down, Qt.Key.Key_PageUp, Qt.Key.Key_PageDown)
+_ENTER_KEYS = (Qt.Key.Key_Return, Qt.Key.Key_Enter)
 
 
 class HelpPlace(Place):
-    """The documentation; ``open_page`` goes to one of its pages."""
+    """The page with the documentation; ``open_page`` shows one of its pages."""
 
     def __init__(self, folder: Path | None = None) -> None:
         super().__init__()
-        self._before: list[str] = []
-        self._came_from = ""
+        self._history: list[str] = []
+        self._origin = ""
         self.words = QLineEdit(placeholderText="Search the pages", clearButtonEnabled=True)
         self.words.setAccessibleName("Search the pages")
         self.words.setFont(font("label", weight=400))
@@ -330,42 +329,42 @@ class HelpPlace(Place):
         vbox(head, (body, 1), spacing=14, margins=(24, 24, 24, 18), parent=self)
 
     def open_page(self, name: str, anchor: str = "") -> None:
-        """Show a page, at the heading with an anchor; an unknown page is ignored."""
+        """Show a page, at the heading with ``anchor`` if given; ignore an unknown page."""
         if name not in documentation.names():
             return
         if self.reader.page and self.reader.page != name:
-            self._before.append(self.reader.page)
+            self._history.append(self.reader.page)
             self.back.setEnabled(True)
         self.reader.show_page(name, anchor)
         self._select(name)
 
     def open_from(self, place: str) -> None:
-        """Show the page about another place, to which *Back* returns; from Help itself, the first page."""
+        """Show the documentation about a page of the main window, to which *Back* returns; otherwise the first page."""
         if place not in _PAGES_OF_PLACES:
             self.open_page(_FIRST_PAGE)
             return
         self.open_page(_PAGES_OF_PLACES[place])
-        self._before, self._came_from = [], place
+        self._history, self._origin = [], place
         self.back.setEnabled(True)
 
     def go_back(self) -> None:
-        """Show the previous page; before the first one, the place where help was opened."""
-        if self._before:
-            name = self._before.pop()
-            self.back.setEnabled(bool(self._before or self._came_from))
+        """Show the previous page; at the first one, return to where help was opened."""
+        if self._history:
+            name = self._history.pop()
+            self.back.setEnabled(bool(self._history or self._origin))
             self.reader.show_page(name)
             self._select(name)
         else:
             self._go_to_origin()
 
     def _go_to_origin(self) -> None:
-        if self._came_from:
-            self.go_asked.emit(self._came_from)
+        if self._origin:
+            self.go_asked.emit(self._origin)
 
     def leave(self) -> None:
-        """Forget where help was opened."""
-        self._came_from = ""
-        self.back.setEnabled(bool(self._before))
+        """Forget from where help was opened."""
+        self._origin = ""
+        self.back.setEnabled(bool(self._history))
 
     def _show_rows(self, rows: tuple[HelpEntry, ...]) -> None:
         with QSignalBlocker(self.list):
@@ -393,11 +392,15 @@ class HelpPlace(Place):
             self.open_page(item.data(PAGE), item.data(ANCHOR))
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        """Let arrow keys in the search field move in the list; the first one, and Enter, open its first page."""
-        if event.type() == QEvent.Type.KeyPress and isinstance(event, QKeyEvent) and event.key() in (*_MOVES, *_ENTERS):
+        """Let arrow keys in the search field move in the list; the first key, or Enter, opens the first page."""
+        if (
+            event.type() == QEvent.Type.KeyPress
+            and isinstance(event, QKeyEvent)
+            and event.key() in (*_MOVE_KEYS, *_ENTER_KEYS)
+        ):
             if not self.list.selectedItems():
                 self.list.setCurrentRow(0)
-            elif event.key() in _MOVES:
+            elif event.key() in _MOVE_KEYS:
                 self.list.keyPressEvent(event)
             return True
         return super().eventFilter(watched, event)

@@ -22,18 +22,18 @@ from study_app.gui.widgets.live_plots import MINUS, Plot, draw_quickly, pen, tic
 from study_app.lab.live import LimiterCount
 from study_app.number_text import grouped
 
-_POINTS = 240  # points of a curve, one for one to two pixels; painting time grows with them
+_POINTS = 240  # of a curve: one for one to two pixels, since painting time grows with their number
 _STEPS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
 MOST_TICKS, TICK_PX = 5, 22
 LEGEND_LINE, LEGEND_GAP, STROKE_WIDTH = 20, 16.0, 24.0
-_LABEL_PX = 9.0  # half of a tick's number
-_SHRINKS_BELOW = 0.45  # hysteresis as a share of the height, so that the scale does not follow every peak
+_LABEL_PX = 9.0  # half the height of a tick's number
+_SHRINK_BELOW = 0.45  # part of the height below which the scale shrinks, so that it does not follow every peak
 _DASH: dict[str, tuple[float, float] | None] = {"solid": None, "long": (6.0, 3.0), "short": (3.0, 2.0)}
 
 
 @dataclass(frozen=True, slots=True)
 class _CurveStyle:
-    """A curve: its name, its colour in a theme, and its stroke."""
+    """The appearance of a curve: its name, its colour in a theme, and its stroke."""
 
     name: str
     colour: Callable[[Theme], str]
@@ -48,7 +48,7 @@ _LIMIT = _CurveStyle("limit", lambda theme: theme.bad, "short", 1.6)
 
 
 class _Legend(Themed, QWidget):
-    """Names of curves, each after a sample of its stroke."""
+    """The legend of a plot: the names of its curves, each after a sample of its stroke."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -68,24 +68,24 @@ class _Legend(Themed, QWidget):
         self._fit_height()
 
     def _fit_height(self) -> None:
-        lines = {place.y() for place in self._entry_places()}
+        lines = {place.y() for place in self._entry_positions()}
         self.setFixedHeight(LEGEND_LINE * max(1, len(lines)))
 
-    def _entry_places(self) -> list[QPointF]:
+    def _entry_positions(self) -> list[QPointF]:
         metrics = QFontMetricsF(self._font)
-        places, x, y = [], 0.0, LEGEND_LINE / 2
+        positions, x, y = [], 0.0, LEGEND_LINE / 2
         for _, text in self._entries:
             width = STROKE_WIDTH + 6 + metrics.horizontalAdvance(text)
             if x and x + width > self.width():
                 x, y = 0.0, y + LEGEND_LINE
-            places.append(QPointF(x, y))
+            positions.append(QPointF(x, y))
             x += width + LEGEND_GAP
-        return places
+        return positions
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         painter = smooth_painter(self)
         painter.setFont(self._font)
-        for (style, text), place in zip(self._entries, self._entry_places(), strict=True):
+        for (style, text), place in zip(self._entries, self._entry_positions(), strict=True):
             ink = style.colour(self.theme)
             painter.setPen(pen(ink, style.width * self.devicePixelRatioF(), _DASH[style.stroke]))
             painter.drawLine(place, place + QPointF(STROKE_WIDTH, 0))
@@ -94,7 +94,7 @@ class _Legend(Themed, QWidget):
 
 
 class _CurvePlot(Plot):
-    """Curves above 0 over the last 2.5 s; the scale grows at once and shrinks only by half."""
+    """A plot of curves above 0 over the last 2.5 s; the scale grows at once, but shrinks only by half."""
 
     def __init__(self, styles: tuple[_CurveStyle, ...], least: float) -> None:
         super().__init__()
@@ -112,18 +112,18 @@ class _CurvePlot(Plot):
         marks = np.arange(0.0, SPAN_S + 0.01, 0.5)
         self.show_ticks("bottom", [(-float(t), f"{MINUS}{t:g}" if t else "0") for t in marks])
         self._show_top(least)
-        self.box.sigResized.connect(self._lay_ticks)
+        self.box.sigResized.connect(self._draw_ticks)
         self.apply_theme(LIGHT)
 
     def sizeHint(self) -> QSize:
         return QSize(240, 120)
 
     def show_curves(self, t_s: Floats, values: tuple[Floats, ...], limit: float | None = None) -> None:
-        """Draw ``values``, each (n,), over ``t_s`` (n,), and a limit if there is one."""
-        peak = max((float(np.nanmax(it)) for it in values if len(it)), default=0.0)
+        """Draw ``values``, each (n,), over ``t_s`` (n,), and the limit, if any."""
+        peak = max((float(np.nanmax(curve)) for curve in values if len(curve)), default=0.0)
         self._show_top(max(peak, limit or 0.0, self._least))
-        for curve, it in zip(self.curves, values, strict=True):
-            curve.setData(*_thin_samples(t_s, it))
+        for curve, samples in zip(self.curves, values, strict=True):
+            curve.setData(*_thin_samples(t_s, samples))
         self.limit.setVisible(limit is not None)
         if limit is not None:
             self.limit.setPos(limit)
@@ -135,22 +135,22 @@ class _CurvePlot(Plot):
         self.limit.setPen(self.stroke(theme.bad, 1.5, _DASH["short"]))
 
     def _show_top(self, peak: float) -> None:
-        if _SHRINKS_BELOW * self._top <= peak <= self._top:
+        if _SHRINK_BELOW * self._top <= peak <= self._top:
             return
         self._peak = peak
-        self._lay_ticks()
+        self._draw_ticks()
 
-    def _lay_ticks(self) -> None:
-        """Choose grid lines up to the peak, as many as fit."""
+    def _draw_ticks(self) -> None:
+        """Draw grid lines up to the peak, as many as fit."""
         ticks = max(2, min(MOST_TICKS, int(self.box.height() // TICK_PX)))
-        step = next((it for it in _STEPS if self._peak / it <= ticks), _STEPS[-1])
+        step = next((size for size in _STEPS if self._peak / size <= ticks), _STEPS[-1])
         rows = max(1, int(np.ceil(self._peak / step - 1e-9)))
         self._top = rows * step
         self.show_ticks("left", [(k * step, tick_text(round(k * step, 6))) for k in range(rows + 1)])
-        self._make_room()
+        self._set_range()
 
-    def _make_room(self) -> None:
-        """Keep half a number's height free above the highest grid line."""
+    def _set_range(self) -> None:
+        """Leave space for half a number above the highest grid line."""
         share = min(_LABEL_PX / max(1.0, self.box.height()), 0.3)
         self.box.setYRange(-0.02 * self._top, self._top / (1 - share), padding=0)
 
@@ -174,9 +174,9 @@ class _ReadingCard(Card):
         add_layout(self.column, self.stack, 1)
 
     def show_blind(self, blind: bool) -> bool:
-        """Show the content, or that it is hidden; return whether it is hidden.
+        """Hide or show the content; return whether it is hidden.
 
-        Hidden content is not updated: a change of size would reveal that another setting is felt.
+        Hidden content must not be updated, since a change of its size would reveal that the felt setting changed.
         """
         self.stack.setCurrentIndex(int(blind))
         self.aside.setVisible(not blind)
@@ -184,7 +184,7 @@ class _ReadingCard(Card):
 
 
 class _PlotCard(_ReadingCard):
-    """A plot below its heading and the names of its curves."""
+    """A card with a plot and the legend above it."""
 
     def __init__(self, title: str, unit: str, plot: Plot, sentence: str) -> None:
         why = "The trace would reveal the settings."
@@ -197,7 +197,7 @@ class _PlotCard(_ReadingCard):
 
 
 class ForceCard(_PlotCard):
-    """The force of both settings for the same motion, and the limit of the one that is felt."""
+    """The plot of the force of both settings for the same motion, with the limit of the felt one."""
 
     def __init__(self) -> None:
         super().__init__("Force on the hand", f"N, last {SPAN_S:g} s", _CurvePlot((B, A), 1.0), _FORCE_SENTENCE)
@@ -218,7 +218,7 @@ class ForceCard(_PlotCard):
 
 
 class SpeedCard(_PlotCard):
-    """The speed of the body, and the wake velocity at it in both settings."""
+    """The plot of the body's speed, and of the wake's speed at the body in both settings."""
 
     def __init__(self) -> None:
         super().__init__("Body and wake", f"m/s, last {SPAN_S:g} s", _CurvePlot((_BODY, B, A), 0.5), _SPEED_SENTENCE)
@@ -247,14 +247,14 @@ def _thin_samples(t_s: Floats, values: Floats) -> tuple[Floats, Floats]:
 
 _NAME_WIDTH = 84
 _LINE = 26
-COST_HEIGHT, ERROR_HEIGHT = 252, 3 * _LINE + 6  # usual heights, kept free until the measurement
+COST_HEIGHT, ERROR_HEIGHT = 252, 3 * _LINE + 6  # usual heights, which are reserved until the measurement
 _UNKNOWN = "–"
 _LEAST_NS = 1.0  # the smallest cost that can be measured next to a running servo
 _LimiterState = Literal["acting", "acted", "quiet"]
 
 
 class _CostLine(QWidget):
-    """An effect, a bar relative to the most expensive effect, and its time in ns."""
+    """A line with an effect, its time in ns, and a bar relative to the most expensive effect."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -282,7 +282,7 @@ class _CostLine(QWidget):
 
 
 class _AbsentLine(QWidget):
-    """An effect without a cost, and the reason."""
+    """A line with an effect that has no cost, and the reason."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -298,7 +298,7 @@ class _AbsentLine(QWidget):
 
 
 class CostCard(_ReadingCard):
-    """The time of each effect per tick."""
+    """The card with the time of each effect per tick."""
 
     def __init__(self) -> None:
         super().__init__("Time per tick", label("", "small", "text2"), "Computation times would reveal the settings.")
@@ -311,7 +311,7 @@ class CostCard(_ReadingCard):
         self.sum.setAlignment(Qt.AlignmentFlag.AlignRight)
         whole = hbox(self.sum_name, (self.sum, 1))
         add_parts(self.content, self._costs, Rule(), whole, self._absent, STRETCH)
-        self._masked.setMinimumHeight(COST_HEIGHT)  # the lines may need more
+        self._masked.setMinimumHeight(COST_HEIGHT)  # the lines may be higher
 
     def show_view(self, view: LabView) -> None:
         if self.show_blind(view.workbench.blind):
@@ -320,28 +320,28 @@ class CostCard(_ReadingCard):
         if view.measuring and not view.cost and self.lines:
             self._show_waiting()
             return
-        here = [row for row in view.cost if row.ns is not None]
-        away = [row for row in view.cost if row.ns is None]
-        most_ns = max((row.ns or 0.0 for row in here), default=0.0)
-        _match_count(self.lines, len(here), _CostLine, self._costs)
-        _match_count(self.absent, len(away), _AbsentLine, self._absent)
-        for line, row in zip(self.lines, here, strict=True):
+        present = [row for row in view.cost if row.ns is not None]
+        missing = [row for row in view.cost if row.ns is None]
+        most_ns = max((row.ns or 0.0 for row in present), default=0.0)
+        _match_count(self.lines, len(present), _CostLine, self._costs)
+        _match_count(self.absent, len(missing), _AbsentLine, self._absent)
+        for line, row in zip(self.lines, present, strict=True):
             line.show_cost(row, most_ns)
-        for gone, row in zip(self.absent, away, strict=True):
-            gone.show_cost(row)
-        tick_ns = view.tick_ns if view.tick_ns is not None else sum(row.ns or 0.0 for row in here)
+        for absent, row in zip(self.absent, missing, strict=True):
+            absent.show_cost(row)
+        tick_ns = view.tick_ns if view.tick_ns is not None else sum(row.ns or 0.0 for row in present)
         period_ms = 1000 / view.workbench.in_hand.scene.rate_hz
         self.sum.setText(f"{grouped(round(tick_ns))} ns of {period_ms:g} ms" if view.cost else "not measured yet")
 
     def _show_waiting(self) -> None:
-        """Clear the numbers but keep the lines, so that the layout is stable while a slider is dragged."""
+        """Clear the numbers, but keep the lines, so that the layout is stable while a slider is dragged."""
         for line in self.lines:
             line.show_waiting()
         self.sum.setText(_UNKNOWN)
 
 
 class _ErrorLine(QWidget):
-    """A measure and its value."""
+    """A line with a measure and its value."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -356,7 +356,7 @@ class _ErrorLine(QWidget):
 
 
 class ErrorCard(_ReadingCard):
-    """The deviation of the felt setting from its reference."""
+    """The card with the deviation of the felt setting from its reference."""
 
     def __init__(self) -> None:
         why = "The errors relative to the reference would reveal the settings."
@@ -378,7 +378,7 @@ class ErrorCard(_ReadingCard):
 
 
 class _LimiterLine(Themed, QWidget):
-    """A limiter: a mark, its name, and the number of ticks in which it acted; tinted while it acts."""
+    """A line with a limiter and the number of ticks in which it acted; it is tinted while the limiter acts."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -421,7 +421,7 @@ class _LimiterLine(Themed, QWidget):
 
 
 class LimiterCard(_ReadingCard):
-    """The active limiters, and the number of ticks in which each acted in the last ten seconds."""
+    """The card with the limiters, and the number of ticks in which each acted in the last ten seconds."""
 
     def __init__(self) -> None:
         why = "Limiter counts would reveal the settings."

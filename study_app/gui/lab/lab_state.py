@@ -1,7 +1,7 @@
-"""What the liquid lab shows, as one frozen value: widgets only draw it. No Qt here.
+"""The content of the liquid lab as one immutable value, without Qt.
 
-Everything is in SI units and the scene frame unless said otherwise; a parameter's own ``factor`` and ``shown_unit`` say
-how it is written.
+Everything is in SI units and the scene frame, unless stated otherwise; the ``factor`` and ``shown_unit`` of a parameter
+determine how it is displayed.
 """
 
 from __future__ import annotations
@@ -21,10 +21,9 @@ if TYPE_CHECKING:
     from study_app.lab.shadow import Trace
 
 Choices: TypeAlias = tuple[tuple[str, str], ...]
-
+"""Pairs of a value and its label."""
 Floats: TypeAlias = NDArray[np.float64]
 Point: TypeAlias = tuple[float, float, float]
-"""Pairs of what is chosen and the words for it."""
 
 SPAN_S = 2.5
 SIDES: tuple[Side, Side] = ("A", "B")
@@ -32,7 +31,7 @@ SIDES: tuple[Side, Side] = ("A", "B")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Now:
-    """The current hand position [m, hand frame], force on the hand [N], and wake velocity at the body [m/s, scene]."""
+    """The current position of the hand [m, hand frame], the force on it [N], and the wake at the body [m/s, scene]."""
 
     position_m: Point
     force_n: Point = (0.0, 0.0, 0.0)
@@ -50,7 +49,7 @@ class CostRow:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ErrorRow:
-    """A deviation of the felt setting from its reference as text: ("Largest force error", "< 0.001 N")."""
+    """A deviation of the felt setting from its reference as text: "Largest force error", "< 0.001 N"."""
 
     measure: str
     value: str
@@ -59,9 +58,9 @@ class ErrorRow:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DeviceShown:
-    """The devices that can be chosen, the chosen one, and its ``state`` in one or two words.
+    """The choice of devices, the chosen device, and its ``state`` in one or two words.
 
-    ``pointer`` tells whether the mouse pointer moves it, ``diagnosable`` whether it can be examined.
+    ``pointer`` tells whether the mouse pointer moves the ball, ``diagnosable`` whether the device can be diagnosed.
     """
 
     choices: Choices
@@ -76,12 +75,12 @@ class DeviceShown:
 class LabView:
     """The content of the liquid lab.
 
-    ``liquids`` are the possible settings of a side, ``paths`` the programmed motions; ``path`` is the running one, None
-    for live motion. ``busy`` is the current activity ("Opening the Falcon"); ``refused`` is the parameter that could
-    not be changed and the reason, a new pair for every rejection; ``said`` names what was saved or opened last.
-    ``tail_a``, ``tail_b``, ``trace`` and ``now`` are None before the first motion, a tail also if the setting has no
-    wake. ``cost`` and ``errors`` are those of the felt setting, empty until they are measured; ``measuring`` is set
-    during a new measurement. ``study`` is the edited study that takes changes back, or "".
+    ``liquids`` are the liquids that a side can have. ``paths`` are the programmed motions, and ``path`` is the running
+    one, or None for free motion. ``busy`` is the current activity ("Opening the Falcon"). ``refused`` is the parameter
+    that could not be changed, and the reason; every rejection is a new pair. ``said`` names what was saved or opened
+    last. ``tail_a``, ``tail_b``, ``trace`` and ``now`` are None before the first motion; so is the tail of a setting
+    without a wake. ``cost`` and ``errors`` are those of the felt setting, and empty until they are measured;
+    ``measuring`` is set during a measurement. ``study`` names the edited study that changes can be put back into.
     """
 
     workbench: Workbench

@@ -1,6 +1,6 @@
-"""The lab's tank: the participant's glass and ball, with what they never see: tail, breaks, force and wake.
+"""The lab's tank: the participant's tank with tail, breaks, force and wake, which participants never see.
 
-With the mouse as the device a click takes the pointer for the ball, as in a session; a click or Esc lets it go.
+If the mouse is the device, a click captures the pointer, as in a session; another click or Esc releases it.
 """
 
 import itertools
@@ -31,7 +31,7 @@ from PySide6.QtWidgets import QProgressBar, QSizePolicy, QWidget
 from study_app.gui.lab.lab_state import Floats, LabView, Point
 from study_app.gui.participant.tank import sprites
 from study_app.gui.participant.tank.arrows import HEIGHTS, Arrow, draw_head, paint_arrows
-from study_app.gui.participant.tank.frame import BallPlace, BallPlacer, Box, Camera
+from study_app.gui.participant.tank.frame import BallPlacer, Box, Camera, DrawnBall
 from study_app.gui.participant.tank.layers import Backdrop, paint_backdrop
 from study_app.gui.participant.window import PointerCapture
 from study_app.gui.theme.icons import draw_icon
@@ -45,19 +45,20 @@ from study_app.gui.widgets.labels import Ink, label
 from study_app.lab.shadow import Tail
 from study_app.number_text import grouped
 
-_SHADES = 14  # steps of age that are distinguished
+_SHADES = 14  # number of shades that represent age
 THICKEST_PX, THINNEST_PX = 5.0, 1.6
 _RING_PX = 4.6
 _HEAD_PX = 11.0
 _STEP_PX = 2.5
-_LEAST_FOR_HEAD_PX = 46.0  # minimum length of a segment on the screen
+_LEAST_FOR_HEAD_PX = 46.0  # minimum length of a segment with an arrow head
 
 
 @dataclass(frozen=True, slots=True)
-class _TailPlaces:
-    """The screen positions of a tail: runs of one shade from old to new, segment starts, and arrow heads (place, turn).
+class _DrawnTail:
+    """The parts of a tail on the screen [px].
 
-    ``floor`` is the tail's shadow.
+    ``runs`` are lines of one shade, from old to new, ``breaks`` the starts of segments, and ``heads`` the position,
+    direction [rad] and shade of arrow heads. ``floor`` is the tail's shadow.
     """
 
     runs: tuple[tuple[int, QPolygonF], ...]
@@ -66,8 +67,8 @@ class _TailPlaces:
     floor: tuple[QPolygonF, ...]
 
 
-def _tail_places(tail: Tail, camera: Camera, box: Box) -> _TailPlaces:
-    """Return the screen positions of a tail."""
+def _drawn_tail(tail: Tail, camera: Camera, box: Box) -> _DrawnTail:
+    """Return the parts of a tail on the screen."""
     count = len(tail.positions_m)
     inside = (-box.x, box.x), (box.floor, box.water), (-box.z, box.z)
     x, y, z = (np.clip(tail.positions_m[:, k], *span) for k, span in enumerate(inside))
@@ -78,20 +79,20 @@ def _tail_places(tail: Tail, camera: Camera, box: Box) -> _TailPlaces:
     runs: list[tuple[int, QPolygonF]] = []
     shadows: list[QPolygonF] = []
     heads: list[tuple[QPointF, float, int]] = []
-    for first, behind in itertools.pairwise(bounds if count else ()):
-        rows = np.arange(max(0, first - 1), behind)  # a segment begins where the one before ended
+    for first, end in itertools.pairwise(bounds if count else ()):
+        rows = np.arange(max(0, first - 1), end)  # a segment starts at the end of the previous one
         rows = rows[_drawn_rows(pixels[rows])]
         runs += _shade_runs(_points(pixels[rows]), shades[rows])
         shadows.append(QPolygonF(_points(floor[rows])))
         head = _arrow_head(pixels[rows])
         if head is not None:
-            place, turn, row = head
-            heads.append((place, turn, int(shades[rows[row]])))
-    begins = [0, *(bound - 1 for bound in bounds[1:-1])] if count else []
-    return _TailPlaces(tuple(runs), tuple(_points(pixels[begins])), tuple(heads), tuple(shadows))
+            position, direction, row = head
+            heads.append((position, direction, int(shades[rows[row]])))
+    starts = [0, *(bound - 1 for bound in bounds[1:-1])] if count else []
+    return _DrawnTail(tuple(runs), tuple(_points(pixels[starts])), tuple(heads), tuple(shadows))
 
 
-def _paint_floor(painter: QPainter, places: _TailPlaces) -> None:
+def _paint_floor(painter: QPainter, places: _DrawnTail) -> None:
     """Paint the tail's shadow on the floor."""
     ink = QColor(TANK.shadow)
     ink.setAlphaF(0.44)
@@ -100,8 +101,8 @@ def _paint_floor(painter: QPainter, places: _TailPlaces) -> None:
         painter.drawPolyline(points)
 
 
-def _paint_tail(painter: QPainter, places: _TailPlaces) -> None:
-    """Paint the segments from oldest to newest, heads on those long enough, then the breaks."""
+def _paint_tail(painter: QPainter, places: _DrawnTail) -> None:
+    """Paint the segments from oldest to newest, then their arrow heads and the breaks."""
     painter.setBrush(Qt.BrushStyle.NoBrush)
     for shade, points in places.runs:
         ink, width = _shade_style(shade)
@@ -115,7 +116,7 @@ def _paint_tail(painter: QPainter, places: _TailPlaces) -> None:
 
 
 def _draw_ring(painter: QPainter, place: QPointF) -> None:
-    """Paint the mark of a break."""
+    """Paint the ring that marks a break."""
     painter.setPen(QPen(QColor(TANK.proxy_light), 2.0))
     painter.setBrush(QColor(TANK.shadow))
     painter.drawEllipse(place, _RING_PX, _RING_PX)
@@ -123,7 +124,7 @@ def _draw_ring(painter: QPainter, place: QPointF) -> None:
 
 @lru_cache(maxsize=_SHADES)
 def _shade_style(shade: int) -> tuple[QColor, float]:
-    """Return colour and width of a shade of age, 0 the newest."""
+    """Return the colour and line width of a shade; 0 is the newest."""
     newness = 1.0 - shade / (_SHADES - 1)
     old, new, mix = QColor(TANK.tail_old), QColor(TANK.tail), newness**1.6
     red, green, blue = (
@@ -135,7 +136,7 @@ def _shade_style(shade: int) -> tuple[QColor, float]:
 
 
 def _shade_runs(points: list[QPointF], shades: NDArray[np.int_]) -> list[tuple[int, QPolygonF]]:
-    """Return the runs of one shade, each beginning at the end of the previous one."""
+    """Return the lines of one shade, each beginning at the end of the previous one."""
     cuts = [0, *(int(cut) for cut in np.flatnonzero(np.diff(shades)) + 1), len(points) - 1]
     return [
         (int(shades[start]), QPolygonF(points[start : end + 1]))
@@ -145,7 +146,7 @@ def _shade_runs(points: list[QPointF], shades: NDArray[np.int_]) -> list[tuple[i
 
 
 def _arrow_head(pixels: Floats) -> tuple[QPointF, float, int] | None:
-    """Return midpoint, direction and row of a segment; None if it is too short."""
+    """Return position, direction [rad] and row of a segment's arrow head, or None if the segment is too short."""
     steps = np.hypot(*np.diff(pixels, axis=0).T)
     length = float(steps.sum())
     if length < _LEAST_FOR_HEAD_PX:
@@ -156,7 +157,7 @@ def _arrow_head(pixels: Floats) -> tuple[QPointF, float, int] | None:
 
 
 def _drawn_rows(pixels: Floats) -> NDArray[np.int_]:
-    """Return the rows that are drawn: both ends, and one every few px between them."""
+    """Return the rows that are drawn: both ends, and one every `_STEP_PX` between them."""
     arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(pixels, axis=0).T))])
     kept = np.flatnonzero(np.diff(np.floor(arc / _STEP_PX), prepend=-1.0))
     return np.unique(np.append(kept, len(pixels) - 1))
@@ -164,7 +165,7 @@ def _drawn_rows(pixels: Floats) -> NDArray[np.int_]:
 
 def _pixels(camera: Camera, x: Floats, y: Floats, z: Floats) -> Floats:
     """Return the screen positions of points (n, 2) [px]."""
-    place: Any = camera.point((x, y, z))  # type: ignore[arg-type]  # arithmetic alone: whole columns at once
+    place: Any = camera.point((x, y, z))  # type: ignore[arg-type]  # arrays, too
     return np.column_stack(place)
 
 
@@ -173,15 +174,15 @@ def _points(pixels: Floats) -> list[QPointF]:
 
 
 _WORKSPACE_M: Point = (0.1, 0.06, 0.06)
-_BALL_M = 0.0034  # radius for which the glass is drawn, independent of the ball's radius
+_BALL_M = 0.0034  # radius for which the glass is drawn, regardless of the ball's
 _RING = "break"
-Words: TypeAlias = tuple[str, str]
-"""What a plate says, and the icon before it."""
+Note: TypeAlias = tuple[str, str]
+"""The text of a note and the icon before it."""
 
 MARGIN_X, MARGIN_TOP, MARGIN_BOTTOM = 36.0, 26.0, 22.0
 CHIP_HEIGHT, CHIP_EDGE = 30.0, 14.0
 _WAKE_MPS = 2.0
-_PITCH = math.radians(27)  # higher than the participant's eye: wakes are mostly horizontal
+_PITCH = math.radians(27)  # steeper than in sessions, since wakes are mostly horizontal
 
 
 class LabTank(Themed, QWidget):
@@ -202,9 +203,9 @@ class LabTank(Themed, QWidget):
         self.box = Box.around(_WORKSPACE_M, _BALL_M)
         self._placer: BallPlacer | None = None
         self.still: Backdrop | None = None
-        self._wanted: object = None
+        self._requested: object = None
         self._painting = Background(self)
-        self._painting.done.connect(self._take_still)
+        self._painting.done.connect(self._show_backdrop)
         self.pointer = PointerCapture(self)
         self.pointer.moved.connect(self.moved)
         self.pointer.pressed.connect(self._press_buttons)
@@ -220,18 +221,18 @@ class LabTank(Themed, QWidget):
             self.camera = None
         if view.body_radius_m != self._radius_m:
             self._radius_m, self._placer = view.body_radius_m, None
-        if self.pointer.is_held and not self._takes_pointer:
+        if self.pointer.is_held and not self._can_capture:
             self.pointer.release()
         self.setAccessibleName(f"Tank. {self._first_note()}. {self._hint()}".replace("..", "."))
         self.update()
 
-    def let_go(self) -> None:
+    def release_pointer(self) -> None:
         if self.pointer.is_held:
             self.pointer.release()
             self.update()
 
     @property
-    def _takes_pointer(self) -> bool:
+    def _can_capture(self) -> bool:
         view = self._view
         return view is not None and view.device.pointer and view.path is None and not view.busy
 
@@ -243,12 +244,12 @@ class LabTank(Themed, QWidget):
         if event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_Space} and not self.pointer.is_held:
             self._capture_pointer()
         elif event.key() == Qt.Key.Key_Escape and self.pointer.is_held:
-            self.let_go()
+            self.release_pointer()
         else:
             event.ignore()
 
     def hideEvent(self, event: QHideEvent) -> None:
-        self.let_go()
+        self.release_pointer()
         super().hideEvent(event)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
@@ -257,14 +258,14 @@ class LabTank(Themed, QWidget):
 
     def _capture_pointer(self) -> None:
         self.setFocus(Qt.FocusReason.MouseFocusReason)
-        if self._takes_pointer and self._view is not None and not self.pointer.is_held:
+        if self._can_capture and self._view is not None and not self.pointer.is_held:
             self.pointer.capture(self, self._view.workspace_m)
             self.update()
 
     def _press_buttons(self, bits: int) -> None:
         self.pressed.emit(bits)
         if bits & 1:
-            self.let_go()
+            self.release_pointer()
 
     def _ready_camera(self) -> Camera:
         if self.camera is None:
@@ -277,55 +278,55 @@ class LabTank(Themed, QWidget):
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         camera = self._ready_camera()
-        still = self._still_image(camera)
+        backdrop = self._static_image(camera)
         painter = QPainter(self)
-        if still is None:
+        if backdrop is None:
             painter.fillRect(self.rect(), QColor(PARTICIPANT.window))
             return
-        painter.drawImage(QPointF(0, 0), still.back)
+        painter.drawImage(QPointF(0, 0), backdrop.back)
         painter.setRenderHints(QPainter.RenderHint.Antialiasing | QPainter.RenderHint.SmoothPixmapTransform)
         view = self._view
-        open_view = view if view is not None and not view.workbench.blind else None
-        tail = open_view.tail if open_view is not None else None
-        places = _tail_places(tail, camera, self.box) if tail is not None else None
-        if places is not None:
-            _paint_floor(painter, places)
-        ball = self._ball_place()
-        self._paint_ball_below(painter, ball)
-        if places is not None:
-            _paint_tail(painter, places)
+        visible_view = view if view is not None and not view.workbench.blind else None
+        tail = visible_view.tail if visible_view is not None else None
+        tail_parts = _drawn_tail(tail, camera, self.box) if tail is not None else None
+        if tail_parts is not None:
+            _paint_floor(painter, tail_parts)
+        ball = self._drawn_ball()
+        self._paint_shadow(painter, ball)
+        if tail_parts is not None:
+            _paint_tail(painter, tail_parts)
         if ball is not None:
-            if open_view is not None:
-                paint_arrows(painter, camera, self._arrows(open_view))
+            if visible_view is not None:
+                paint_arrows(painter, camera, self._arrows(visible_view))
             sprite = sprites.ball_sprite(ball.radius, self.devicePixelRatioF(), ball.haze)
             sprites.draw_sprite(painter, sprite, ball.middle)
-        painter.drawImage(still.front_at.topLeft(), still.front)
-        self._paint_words(painter, places)
+        painter.drawImage(backdrop.front_at.topLeft(), backdrop.front)
+        self._paint_notes(painter, tail_parts)
         self._paint_corners(painter)
 
-    def _still_image(self, camera: Camera) -> Backdrop | None:
-        """Return the image of the static parts at this size; None while it is painted in the background."""
-        wanted = ((self.width(), self.height()), self.devicePixelRatioF(), self.box, camera)
-        if wanted != self._wanted:
-            self._wanted, self.still = wanted, None
-            self._painting.run(lambda: (wanted, paint_backdrop(*wanted)))
+    def _static_image(self, camera: Camera) -> Backdrop | None:
+        """Return the image of the static parts, or None while it is painted in the background."""
+        requested = ((self.width(), self.height()), self.devicePixelRatioF(), self.box, camera)
+        if requested != self._requested:
+            self._requested, self.still = requested, None
+            self._painting.run(lambda: (requested, paint_backdrop(*requested)))
         return self.still
 
-    def _take_still(self, painted: tuple[object, Backdrop]) -> None:
-        if painted[0] == self._wanted:
+    def _show_backdrop(self, painted: tuple[object, Backdrop]) -> None:
+        if painted[0] == self._requested:
             self.still = painted[1]
             self.update()
 
-    def _ball_place(self) -> BallPlace | None:
+    def _drawn_ball(self) -> DrawnBall | None:
         if self._view is None or self._view.now is None or self._placer is None:
             return None
         return self._placer.place(self._view.now.position_m)
 
-    def _paint_ball_below(self, painter: QPainter, ball: BallPlace | None) -> None:
+    def _paint_shadow(self, painter: QPainter, ball: DrawnBall | None) -> None:
         if ball is None:
             return
-        dark = sprites.shadow_sprite(ball.floor_radius, self.devicePixelRatioF(), ball.floor_flat)
-        sprites.draw_sprite(painter, dark, ball.floor, opacity=ball.shade, grown=ball.spread)
+        sprite = sprites.shadow_sprite(ball.floor_radius, self.devicePixelRatioF(), ball.floor_flat)
+        sprites.draw_sprite(painter, sprite, ball.floor, opacity=ball.shade, scale=ball.spread)
         ink = QColor(TANK.proxy_light)
         ink.setAlphaF(0.62)
         painter.setPen(QPen(ink, 1.6, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap))
@@ -334,11 +335,11 @@ class LabTank(Themed, QWidget):
     def _arrows(self, view: LabView) -> list[Arrow]:
         if view.now is None:
             return []
-        high = HEIGHTS * (self.box.water - self.box.floor)
+        height_m = HEIGHTS * (self.box.water - self.box.floor)
         start = view.now.position_m
         limit_n = max(view.workbench.in_hand.scene.force_limit_n, 1e-9)
         return [
-            Arrow(word, start, (high * u / most, high * v / most, high * w / most), colour)
+            Arrow(word, start, (height_m * u / most, height_m * v / most, height_m * w / most), colour)
             for word, (u, v, w), most, colour in (
                 ("force", view.now.force_n, limit_n, TANK.proxy_light),
                 ("wake", view.now.wake_mps, _WAKE_MPS, TANK.wake),
@@ -365,16 +366,16 @@ class LabTank(Themed, QWidget):
     def _hint(self) -> str:
         if self.pointer.is_held:
             return "The mouse moves the ball: click or press Esc to release it"
-        return "Click to move the ball with the mouse" if self._takes_pointer else ""
+        return "Click to move the ball with the mouse" if self._can_capture else ""
 
-    def _paint_words(self, painter: QPainter, places: _TailPlaces | None) -> None:
+    def _paint_notes(self, painter: QPainter, places: _DrawnTail | None) -> None:
         view = self._view
         if view is None:
             return
         bench = view.workbench
         hint = self._hint()
         angle = bench.in_hand.value("wake.breaking_angle_deg") if places is not None else None
-        pairs: list[tuple[Words, Words]] = [
+        pairs: list[tuple[Note, Note]] = [
             (
                 (self._first_note(), "lock" if bench.blind else ""),
                 (f"a turn over {angle:g}° starts a new segment" if isinstance(angle, int | float) else "", _RING),
@@ -388,40 +389,40 @@ class LabTank(Themed, QWidget):
             ),
         ]
         for row, (left, right) in enumerate(pairs):
-            both = left[0] and right[0]
-            crowded = both and self._note_width(left) + self._note_width(right) > self.width() - 2.5 * CHIP_EDGE
+            has_both = left[0] and right[0]
+            overlap = has_both and self._note_width(left) + self._note_width(right) > self.width() - 2.5 * CHIP_EDGE
             top = CHIP_EDGE if row == 0 else self.height() - CHIP_EDGE - CHIP_HEIGHT
-            y = top + (CHIP_HEIGHT + 6) * (1 if row == 0 else -1) if crowded else top
+            y = top + (CHIP_HEIGHT + 6) * (1 if row == 0 else -1) if overlap else top
             self._draw_note(painter, left, CHIP_EDGE, top)
             self._draw_note(painter, right, self.width() - CHIP_EDGE - self._note_width(right), y)
 
-    def _note_width(self, note: Words) -> float:
+    def _note_width(self, note: Note) -> float:
         return _note_plate(note, self.devicePixelRatioF()).width() / self.devicePixelRatioF() if note[0] else 0.0
 
-    def _draw_note(self, painter: QPainter, note: Words, left: float, top: float) -> None:
+    def _draw_note(self, painter: QPainter, note: Note, left: float, top: float) -> None:
         if note[0]:
             painter.drawImage(QPointF(left, top), _note_plate(note, self.devicePixelRatioF()))
 
     def _paint_corners(self, painter: QPainter) -> None:
-        """Round the corners in the window's colour, and paint the focus ring."""
-        whole = QRectF(self.rect())
-        outside = QPainterPath()
-        outside.addRect(whole)
-        outside.addRoundedRect(whole, RADIUS_CARD, RADIUS_CARD)  # odd-even fill: the area between both
-        painter.fillPath(outside, QColor(self.theme.window))
+        """Paint the area corners the rounded corners in the window's colour, and the focus ring."""
+        area = QRectF(self.rect())
+        corners = QPainterPath()
+        corners.addRect(area)
+        corners.addRoundedRect(area, RADIUS_CARD, RADIUS_CARD)  # odd-even fill: the area between both
+        painter.fillPath(corners, QColor(self.theme.window))
         if self.hasFocus():
             painter.setBrush(Qt.BrushStyle.NoBrush)
             painter.setPen(QPen(QColor(PARTICIPANT.accent), 2))
-            painter.drawRoundedRect(whole.adjusted(2, 2, -2, -2), RADIUS_CARD - 2, RADIUS_CARD - 2)
+            painter.drawRoundedRect(area.adjusted(2, 2, -2, -2), RADIUS_CARD - 2, RADIUS_CARD - 2)
 
 
 @lru_cache(maxsize=64)
-def _note_plate(note: Words, ratio: float) -> QImage:
-    """Return a text with its icon on a dark plate, for a screen with pixel ratio ``ratio``."""
+def _note_plate(note: Note, ratio: float) -> QImage:
+    """Return an image of a note on a dark plate, for a screen with pixel ratio ``ratio``."""
     text, icon = note
-    face = font("label", weight=600, tabular=True)
-    wide = QFontMetricsF(face).horizontalAdvance(text) + (24 if icon else 0) + 24
-    image = QImage(math.ceil(wide * ratio), math.ceil(CHIP_HEIGHT * ratio), QImage.Format.Format_ARGB32_Premultiplied)
+    note_font = font("label", weight=600, tabular=True)
+    width = QFontMetricsF(note_font).horizontalAdvance(text) + (24 if icon else 0) + 24
+    image = QImage(math.ceil(width * ratio), math.ceil(CHIP_HEIGHT * ratio), QImage.Format.Format_ARGB32_Premultiplied)
     image.setDevicePixelRatio(ratio)
     image.fill(Qt.GlobalColor.transparent)
     painter = QPainter(image)
@@ -430,14 +431,14 @@ def _note_plate(note: Words, ratio: float) -> QImage:
     ground.setAlphaF(0.74)
     painter.setPen(Qt.PenStyle.NoPen)
     painter.setBrush(ground)
-    painter.drawRoundedRect(QRectF(0, 0, wide, CHIP_HEIGHT), 7, 7)
+    painter.drawRoundedRect(QRectF(0, 0, width, CHIP_HEIGHT), 7, 7)
     if icon == _RING:
         _draw_ring(painter, QPointF(18, CHIP_HEIGHT / 2))
     elif icon:
         draw_icon(painter, icon, QRectF(10, 7, 16, 16), PARTICIPANT.text, 2.0)
     painter.setPen(QColor(PARTICIPANT.text))
-    painter.setFont(face)
-    room = QRectF(36 if icon else 12, 0, wide, CHIP_HEIGHT)
+    painter.setFont(note_font)
+    room = QRectF(36 if icon else 12, 0, width, CHIP_HEIGHT)
     painter.drawText(room, Qt.AlignmentFlag.AlignVCenter, text)
     painter.end()
     return image
@@ -449,7 +450,7 @@ EDGE, FOOT = 16, 56
 
 
 class TankNote(Card):
-    """One sentence and one button, shown only if there is a problem. Waiting is shown after 300 ms."""
+    """A sentence and its buttons, shown if there is a problem or, after 300 ms, while the lab is busy."""
 
     def __init__(self, parent: QWidget) -> None:
         super().__init__(padding=12, gap=8)
@@ -479,7 +480,7 @@ class TankNote(Card):
         return super().eventFilter(watched, event)
 
     def show_view(self, view: LabView) -> None:
-        before, self._view = self._view, view
+        previous, self._view = self._view, view
         if view.busy and not view.trouble:
             if self.isHidden() and not self._wait.isActive():
                 self._wait.start()
@@ -490,11 +491,11 @@ class TankNote(Card):
         self._dismissed = self._dismissed if view.trouble == self._dismissed else ""
         if view.force_on and view.trouble == self._dismissed:
             self.hide()
-        elif self.isHidden() or before is None or _note_parts(before) != _note_parts(view):
+        elif self.isHidden() or previous is None or _note_parts(previous) != _note_parts(view):
             self._show_note()
 
     def place(self) -> None:
-        """Centre the note at the tank's lower edge, wide enough for its text and below the tank's top."""
+        """Place the note above the tank's lower edge, wide enough for its text."""
         parent = self.parentWidget()
         if parent is not None and not self.isHidden():
             room = parent.width() - 2 * EDGE
@@ -502,11 +503,11 @@ class TankNote(Card):
             if self.heightForWidth(width) > HIGH:
                 width = min(WIDEST, room)
             self.resize(width, max(self.minimumSizeHint().height(), self.heightForWidth(width)))
-            below = min(FOOT, parent.height() - self.height() - EDGE)
-            self.move((parent.width() - width) // 2, max(0, parent.height() - self.height() - below))
+            foot = min(FOOT, parent.height() - self.height() - EDGE)
+            self.move((parent.width() - width) // 2, max(0, parent.height() - self.height() - foot))
 
     def _dismiss(self) -> None:
-        """Hide this problem; the force stays on."""
+        """Hide the note about the current problem."""
         if self._view is not None:
             self._dismissed = self._view.trouble
         self.hide()

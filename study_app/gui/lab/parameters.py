@@ -1,4 +1,4 @@
-"""The lab's header and the form of a liquid's parameters."""
+"""The header of the lab, and the form with a liquid's parameters."""
 
 from dataclasses import dataclass
 
@@ -33,7 +33,7 @@ def _side_colour(theme: Theme, side: Side) -> str:
 
 
 def _draw_badge(painter: QPainter, middle: QPointF, theme: Theme, side: Side, letter: str) -> None:
-    """Paint a side's letter on a disc of its colour."""
+    """Paint a letter on a disc in the colour of a side."""
     painter.setPen(Qt.PenStyle.NoPen)
     painter.setBrush(QColor(_side_colour(theme, side)))
     painter.drawEllipse(middle, _BADGE / 2, _BADGE / 2)
@@ -44,7 +44,7 @@ def _draw_badge(painter: QPainter, middle: QPointF, theme: Theme, side: Side, le
 
 
 class _Badge(Themed, QWidget):
-    """The letter of a side on its own."""
+    """A badge with the letter of a side."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -62,7 +62,7 @@ class _Badge(Themed, QWidget):
 
 
 class _Segment(Themed, QPushButton):
-    """One side: its letter and its name; the felt side is raised, with an accent edge."""
+    """The button of a side, with its letter and name; that of the felt side is checked."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -93,11 +93,11 @@ class _Segment(Themed, QPushButton):
         self.setIcon(QIcon(picture))
 
     def nextCheckState(self) -> None:
-        """Do nothing: the view decides which side is felt."""
+        """Do nothing, because the view decides which side is felt."""
 
 
 class _SideSwitch(QWidget):
-    """A switch between both sides; ``switched`` is emitted when the other one should be felt. X does the same."""
+    """A switch between the sides; ``switched`` is emitted when the other side should be felt."""
 
     switched = Signal()
 
@@ -107,7 +107,7 @@ class _SideSwitch(QWidget):
         self.setFixedHeight(_SWITCH_HEIGHT)
         self.segments = {side: _Segment() for side in SIDES}
         for segment in self.segments.values():
-            segment.clicked.connect(lambda _on, it=segment: None if it.isChecked() else self.switched.emit())
+            segment.clicked.connect(lambda _on, segment=segment: None if segment.isChecked() else self.switched.emit())
         hbox(*self.segments.values(), 4, Cap(KEY), spacing=2, margins=(4, 4, 8, 4), parent=self)
         self.setToolTip("Feel the other setting (X)")
 
@@ -124,11 +124,11 @@ class _SideSwitch(QWidget):
 
 _BUTTON = 44
 _FREE = "Free motion"
-_LETTERS = 13  # width of a choice before it is elided
+_LETTERS = 13  # width of a list, in letters, beyond which choices are elided
 
 
 class _Picker(Choice):
-    """A list with an icon before its current label."""
+    """A drop-down list with an icon before its label."""
 
     def __init__(self, icon: str, name: str) -> None:
         super().__init__()
@@ -149,10 +149,10 @@ class _Picker(Choice):
                 self.addItem(text, value)
         self.setCurrentIndex(self.findData(chosen))
 
-    def set_whole(self, yes: bool) -> None:
-        """Make the list as wide as its longest label, or elide long ones."""
+    def set_whole(self, whole: bool) -> None:
+        """Make the list as wide as its longest label if ``whole``; otherwise elide long labels."""
         policy = self.SizeAdjustPolicy
-        self.setSizeAdjustPolicy(policy.AdjustToContents if yes else policy.AdjustToMinimumContentsLengthWithIcon)
+        self.setSizeAdjustPolicy(policy.AdjustToContents if whole else policy.AdjustToMinimumContentsLengthWithIcon)
 
     def paintEvent(self, event: QPaintEvent) -> None:
         super().paintEvent(event)
@@ -160,7 +160,7 @@ class _Picker(Choice):
 
 
 class LabHeader(QWidget):
-    """The header: one row in a wide window, two in a narrow one."""
+    """The header of the lab: one row in a wide window, two in a narrow one."""
 
     blind_asked = Signal(bool)
     device_chosen = Signal(str)
@@ -188,7 +188,7 @@ class LabHeader(QWidget):
 
     def _lay_out(self) -> None:
         self._grid = grid(16, 8, margins=(24, 12, 24, 13), parent=self)
-        self._left, self._middle, self._right = (_row() for _ in range(3))
+        self._left, self._middle, self._right = (hbox(spacing=10, margins=0) for _ in range(3))
         parts: dict[QHBoxLayout, tuple[QWidget, ...]] = {
             self._left: (self.title, self.sides),
             self._middle: (self.blind, self.device, self.path),
@@ -200,7 +200,7 @@ class LabHeader(QWidget):
         self._grid.setColumnStretch(2, 1)
 
     def arrange(self, *, narrow: bool) -> None:
-        """Use one row or two; the force stop stays at the right end of the first."""
+        """Use one row, or two if ``narrow``; the force stop stays at the right end of the first row."""
         if narrow == self._narrow:
             return
         self._narrow = narrow
@@ -233,13 +233,8 @@ class LabHeader(QWidget):
         self.save.setEnabled(not view.workbench.blind)
 
     def _ask_blind(self, on: bool) -> None:
-        self.blind.setChecked(not on)  # the view shows it once it applies
+        self.blind.setChecked(not on)  # until the view changes
         self.blind_asked.emit(on)
-
-
-def _row() -> QHBoxLayout:
-    row = hbox(spacing=10, margins=0)
-    return row
 
 
 LABEL_WIDTH, FIELD_WIDTH, UNIT_WIDTH = 108, 86, 44
@@ -262,7 +257,7 @@ class _FormRow:
 
 
 class _ParameterRow(QWidget):
-    """Common base of rows: ``changed(name, value, held)``, and a line below for the reason of a rejection."""
+    """The base class of rows; ``changed(name, value, held)`` requests a value, and a line below shows rejections."""
 
     changed = Signal(str, object, bool)
 
@@ -292,13 +287,13 @@ class _ParameterRow(QWidget):
         raise NotImplementedError
 
     def show_refused(self, why: str) -> None:
-        """Show in one line why a value is rejected; the typed text is kept."""
+        """Show why a value is rejected, or nothing; the typed text is kept."""
         self._refused = why
         self.why.setText(why)
         self._below.setVisible(bool(why))
 
-    def let_go(self) -> None:
-        """Release the slider, and hide the rejection, which belongs to another setting."""
+    def discard_input(self) -> None:
+        """Discard the user's input, because the row now shows another setting."""
         self.show_refused("")
 
     def parts(self) -> tuple[QWidget, ...]:
@@ -306,7 +301,7 @@ class _ParameterRow(QWidget):
 
 
 class _NumberRow(_ParameterRow):
-    """A number: slider and field, followed by the unit; the preset's value is a tick on the slider."""
+    """A row with slider, field and unit for a number; a tick on the slider marks the preset's value."""
 
     def __init__(self, parameter: Parameter) -> None:
         super().__init__(parameter)
@@ -321,33 +316,33 @@ class _NumberRow(_ParameterRow):
         name = f"{parameter.label}, {parameter.shown_unit}".rstrip(", ")
         self.slider.setAccessibleName(name)
         self.field.setAccessibleName(name)
-        self.slider.slid.connect(self._take_slide)
-        self.field.entered.connect(self._take_number)
+        self.slider.slid.connect(self._apply_slide)
+        self.field.entered.connect(self._apply_number)
         self.field.unread.connect(self._show_misread)
         self.field.abandoned.connect(self._restore_number)
         self.field.stepped.connect(self.slider.step)
 
     def show_row(self, row: _FormRow) -> None:
-        """Show the number unless it is being dragged or typed; changed numbers are bold."""
+        """Show the number, unless it is being dragged or typed; changed numbers are bold."""
         if self._row is not None and row.value != self._row.value:
             self.show_refused("")
         self._row = row
-        it = self.parameter = row.parameter
-        span = Range(it.least * it.factor, it.most * it.factor, it.logarithmic, it.whole)
+        p = self.parameter = row.parameter
+        span = Range(p.least * p.factor, p.most * p.factor, p.logarithmic, p.whole)
         number = row.value if isinstance(row.value, int | float) else None
         preset = row.preset if isinstance(row.preset, int | float) else None
         if not self.slider.dragged:
-            usual = it.default if isinstance(it.default, int | float) else it.least
-            at = (usual if number is None else number) * it.factor
-            self.slider.show_number(span, at, None if preset is None else preset * it.factor)
+            default = p.default if isinstance(p.default, int | float) else p.least
+            position = (default if number is None else number) * p.factor
+            self.slider.show_number(span, position, None if preset is None else preset * p.factor)
         if not self.refused:
             self.field.show_text("" if number is None else self._text(number))
             self.field.show_state("changed" if row.changed else "")
         self.field.setPlaceholderText("none" if number is None else "")
         self.name.setFont(font("label", weight=600 if row.changed else None))
-        was = "none" if preset is None else it.shown(preset)
-        self.setToolTip(f"{it.shown(it.least)} to {it.shown(it.most)}; initially {was}")
-        self.field.setAccessibleDescription(f"initially {was}" if row.changed else "")
+        initial = "none" if preset is None else p.shown(preset)
+        self.setToolTip(f"{p.shown(p.least)} to {p.shown(p.most)}; initially {initial}")
+        self.field.setAccessibleDescription(f"initially {initial}" if row.changed else "")
 
     def show_refused(self, why: str) -> None:
         super().show_refused(why)
@@ -356,9 +351,9 @@ class _NumberRow(_ParameterRow):
         if why:
             self.field.setAccessibleDescription(why)
 
-    def let_go(self) -> None:
-        super().let_go()
-        self.slider.let_go()
+    def discard_input(self) -> None:
+        super().discard_input()
+        self.slider.release_knob()
         self.field.restore_text()
 
     def parts(self) -> tuple[QWidget, ...]:
@@ -367,18 +362,18 @@ class _NumberRow(_ParameterRow):
     def _text(self, value: float) -> str:
         return write_number(value * self.parameter.factor, self.parameter.decimals)
 
-    def _take_slide(self, shown: float, held: bool) -> None:
+    def _apply_slide(self, shown: float, held: bool) -> None:
         self.show_refused("")
         self.field.show_text(write_number(shown, self.parameter.decimals))
         self.field.restore_text()
         self.changed.emit(self.parameter.name, self._value(shown), held)
 
-    def _take_number(self, shown: float) -> None:
+    def _apply_number(self, shown: float) -> None:
         self.show_refused("")
         self.changed.emit(self.parameter.name, self._value(shown), False)
 
     def _value(self, shown: float) -> float:
-        """Return the displayed number in SI units, or the exact preset or current value if it reads the same."""
+        """Return a displayed number in SI units, or the exact preset or current value if that is displayed alike."""
         row = self._row
         for known in (row.preset, row.value) if row is not None else ():
             if isinstance(known, int | float) and read_number(self._text(known)) == shown:
@@ -391,8 +386,8 @@ class _NumberRow(_ParameterRow):
         if len(readings_of(text)) == 2:
             self.show_refused(f"{unclear_number(text)}, or press Esc.")
             return
-        said = f"“{text}” is not a number" if text.strip() else "This field needs a number"
-        self.show_refused(f"{said}: enter a value such as {example}, or press Esc.")
+        problem = f"“{text}” is not a number" if text.strip() else "This field needs a number"
+        self.show_refused(f"{problem}: enter a value such as {example}, or press Esc.")
 
     def _restore_number(self) -> None:
         self.show_refused("")
@@ -402,7 +397,7 @@ class _NumberRow(_ParameterRow):
 
 
 class _ChoiceRow(_ParameterRow):
-    """A choice between a few values."""
+    """A row with a choice between a few values."""
 
     def __init__(self, parameter: Parameter) -> None:
         super().__init__(parameter)
@@ -430,14 +425,14 @@ class _ChoiceRow(_ParameterRow):
         return (self.choice,)
 
     def _ask_for_choice(self, index: int) -> None:
-        """Request another choice; the view shows it once it applies."""
+        """Request another value; it is shown once it applies."""
         self.show_refused("")
         self.choice.setCurrentIndex(self.choice.findData(self._value))
         self.changed.emit(self.parameter.name, self.choice.itemData(index), False)
 
 
 class _SwitchRow(_ParameterRow):
-    """On or off."""
+    """A row with a switch."""
 
     def __init__(self, parameter: Parameter) -> None:
         super().__init__(parameter)
@@ -456,7 +451,7 @@ class _SwitchRow(_ParameterRow):
         return (self.toggle,)
 
     def _ask_to_switch(self, on: bool) -> None:
-        """Request the other state; the view shows it once it applies."""
+        """Request the other state; it is shown once it applies."""
         self.show_refused("")
         self.toggle.setChecked(not on)
         self.changed.emit(self.parameter.name, ON if on else OFF, False)
@@ -470,22 +465,22 @@ def _row_for(parameter: Parameter) -> _ParameterRow:
 
 
 def _name_label(text: str) -> QLabel:
-    made = label(text, "label", "text")
-    made.setFixedWidth(LABEL_WIDTH)
-    made.setMinimumHeight(HEIGHT)
-    made.setWordWrap(True)
-    return made
+    name = label(text, "label", "text")
+    name.setFixedWidth(LABEL_WIDTH)
+    name.setMinimumHeight(HEIGHT)
+    name.setWordWrap(True)
+    return name
 
 
 HIDDEN = "Hidden during a blind comparison"
 
 
 class _SectionBlock(QWidget):
-    """A heading with its rows, and the number of changed ones; two switches share a line."""
+    """A section of the form: a heading, the number of changed rows, and the rows; two switches share a line."""
 
     def __init__(self, section: Section) -> None:
         super().__init__()
-        self.rows = {it.name: _row_for(it) for it in section.parameters}
+        self.rows = {parameter.name: _row_for(parameter) for parameter in section.parameters}
         self.count = label("", "small", "text2")
         head = hbox(label(section.title, "strong", heading=True), STRETCH, self.count)
         cells = grid(8, 2, margins=0)
@@ -501,7 +496,7 @@ class _SectionBlock(QWidget):
             line += 1
 
     def show_section(self, section: Section, setting: Setting) -> None:
-        rows = [_FormRow(it, setting.value(it.name), setting.chosen_value(it.name)) for it in section.parameters]
+        rows = [_FormRow(p, setting.value(p.name), setting.chosen_value(p.name)) for p in section.parameters]
         for row in rows:
             self.rows[row.parameter.name].show_row(row)
         changed = sum(row.changed for row in rows)
@@ -509,7 +504,7 @@ class _SectionBlock(QWidget):
 
 
 class FormPanel(Card):
-    """Liquid and parameters of the felt side; hidden, with the space kept, while the comparison is blind."""
+    """The card with liquid and parameters of the felt side, whose content is hidden during a blind comparison."""
 
     changed = Signal(str, object, bool)
     liquid_chosen = Signal(str, object)
@@ -540,14 +535,14 @@ class FormPanel(Card):
     def _lay_out(self) -> None:
         head = hbox(self.badge, (self.liquid, 1), self.copy, spacing=8)
         self.area = scrolled(QWidget())
-        whole = QWidget()
-        column = vbox(head, Rule(), (self.area, 1), spacing=8, margins=0, parent=whole)
+        form = QWidget()
+        column = vbox(head, Rule(), (self.area, 1), spacing=8, margins=0, parent=form)
         column.addWidget(Rule())
-        column.addWidget(self.said)  # above the buttons, so that they stay in place when it appears
+        column.addWidget(self.said)  # above the buttons, so that they do not move when it appears
         add_parts(column, self.back, self.open)
         self.hidden = MaskedPanel(HIDDEN, "The parameters would reveal the settings.")
         self._stack = QStackedLayout()
-        self._stack.addWidget(whole)
+        self._stack.addWidget(form)
         self._stack.addWidget(self.hidden)
         add_layout(self.column, self._stack, 1)
 
@@ -563,9 +558,9 @@ class FormPanel(Card):
         self.back.setToolTip(plain_tip(f"{view.study} is open in the study designer"))
         setting = bench.in_hand
         if setting != self._setting or bench.presented != self._side:
-            refused = self._side != bench.presented
+            has_switched = self._side != bench.presented
             self._setting, self._side = setting, bench.presented
-            self._show_form(setting, forget=refused)
+            self._show_form(setting, discard_input=has_switched)
         if view.refused is not self._refused:
             self._refused = view.refused
             name, why = view.refused or ("", "")
@@ -587,21 +582,21 @@ class FormPanel(Card):
         text = f"Copy to {other_side(bench.presented)}"
         self.copy.show_action("copy", text)
 
-    def _show_form(self, setting: Setting, *, forget: bool) -> None:
+    def _show_form(self, setting: Setting, *, discard_input: bool) -> None:
         parts = sections(setting.scene)
-        shape = [(section.title, tuple(it.name for it in section.parameters)) for section in parts]
+        shape = [(section.title, tuple(parameter.name for parameter in section.parameters)) for section in parts]
         if shape != [(title, tuple(block.rows)) for title, block in self.blocks.items()]:
             self._make_rows(parts)
-        elif forget:
+        elif discard_input:
             for row in self.rows.values():
-                row.let_go()
+                row.discard_input()
         for section in parts:
             self.blocks[section.title].show_section(section, setting)
 
     def _make_rows(self, form_sections: tuple[Section, ...]) -> None:
-        """Create new rows; focus and scroll position are kept."""
+        """Create new rows, but keep focus and scroll position."""
         rows = self.rows.items()
-        focused = [(name, at) for name, row in rows for at, part in enumerate(row.parts()) if part.hasFocus()]
+        focused = [(name, index) for name, row in rows for index, part in enumerate(row.parts()) if part.hasFocus()]
         scrolled_px = self.area.verticalScrollBar().value()
         self.blocks = {section.title: _SectionBlock(section) for section in form_sections}
         self.rows = {name: row for block in self.blocks.values() for name, row in block.rows.items()}
@@ -613,14 +608,14 @@ class FormPanel(Card):
         ]
         vbox(*parts, STRETCH, spacing=0, margins=(0, 0, 6, 0), parent=inside)
         replace_inside(self.area, inside)
-        before: QWidget = self.copy
+        previous: QWidget = self.copy
         for part in (part for row in self.rows.values() for part in row.parts()):
-            QWidget.setTabOrder(before, part)
-            before = part
+            QWidget.setTabOrder(previous, part)
+            previous = part
         QTimer.singleShot(0, self.area, lambda: self.area.verticalScrollBar().setValue(scrolled_px))
-        for name, at in focused:
+        for name, index in focused:
             if name in self.rows:
-                self.rows[name].parts()[at].setFocus()
+                self.rows[name].parts()[index].setFocus()
 
     def _choose_liquid(self, index: int) -> None:
         self.liquid_chosen.emit(self._side, self._liquids[index])

@@ -1,6 +1,6 @@
-"""The liquid lab: left what can be changed, in the middle what it does, right what it costs.
+"""The liquid lab: parameters on the left, tank and plots in the middle, cost and limiters on the right.
 
-It draws a `LabView` and says what is asked for; it knows no device and no servo.
+It shows a `LabView` and emits requests; it does not depend on device or servo.
 """
 
 from functools import partial
@@ -31,12 +31,12 @@ _SUFFIX = ".toml"
 
 
 class LabPlace(Place):
-    """The lab as a page of the operator's window.
+    """The lab as a page of the main window.
 
-    ``asked(what, details)`` carries named requests: for parameters in SI (``held`` while a slider is dragged), for the
-    mouse while it moves the ball [m, hand frame], for files with the felt `Setting`, for the device and the force;
-    "enter" and "leave" when the page is shown and hidden. ``put_back_asked`` carries the felt side and its `Setting`,
-    for the edited study.
+    ``asked(request, details)`` carries requests by name: changes of parameters in SI units (``held`` while a slider is
+    dragged), positions of the mouse [m, hand frame], files with the felt `Setting`, and requests about device and
+    force; "enter" and "leave" when the page is shown and hidden. ``put_back_asked`` carries the felt side and its
+    `Setting` for the edited study.
     """
 
     asked = Signal(str, tuple)
@@ -61,9 +61,9 @@ class LabPlace(Place):
         self._escape = EscapeKey(self, anywhere=True)
         self._lay_out()
         self._connect()
-        for sequence, what in ((KEY, "switch"), ("Ctrl+Z", "undo"), ("Ctrl+Shift+Z", "redo"), ("Ctrl+Y", "redo")):
+        for sequence, request in ((KEY, "switch"), ("Ctrl+Z", "undo"), ("Ctrl+Shift+Z", "redo"), ("Ctrl+Y", "redo")):
             shortcut = QShortcut(QKeySequence(sequence), self, context=Qt.ShortcutContext.WidgetWithChildrenShortcut)
-            shortcut.activated.connect(partial(self.ask, what))
+            shortcut.activated.connect(partial(self.ask, request))
         self._arrange(wide=True)
 
     def _lay_out(self) -> None:
@@ -71,7 +71,7 @@ class LabPlace(Place):
         self._middle = grid(_GAP, _GAP, margins=0)
         self._middle.setColumnStretch(0, 1)
         self._middle.setColumnStretch(1, 1)
-        framed = vbox(self.tank, margins=(SHADOW, SHADOW - 1, SHADOW, SHADOW))  # as the neighbouring cards
+        framed = vbox(self.tank, margins=(SHADOW, SHADOW - 1, SHADOW, SHADOW))  # aligned with the neighbouring cards
         add_layout(self._middle, framed, 0, 0, 1, 2)
         self._middle.addWidget(self.force, 1, 0)
         self._middle.addWidget(self.speed, 1, 1)
@@ -89,7 +89,7 @@ class LabPlace(Place):
         vbox(self.header, (self._body, 1), spacing=0, margins=0, parent=self)
 
     def _arrange(self, *, wide: bool) -> None:
-        """Place the right column next to the middle, or below it if there is no room."""
+        """Place the right column next to the middle if ``wide``, otherwise below it."""
         if wide == self._wide:
             return
         self._wide = wide
@@ -101,14 +101,14 @@ class LabPlace(Place):
                 self._column.addWidget(card, number, 0)
                 self._column.setRowStretch(number, int(card is self.limiters))
             else:
-                row, at = divmod(number, 2)
-                self._side.addWidget(card, row, at, 1, 2 if card is self.limiters else 1)
+                row, column = divmod(number, 2)
+                self._side.addWidget(card, row, column, 1, 2 if card is self.limiters else 1)
         self._side_area.setVisible(wide)
         self._side_area.setFixedWidth(SIDE_WIDTH)
 
     def _connect(self) -> None:
         header, form, tank = self.header, self.form, self.tank
-        for part, what in (
+        for part, request in (
             (header.blind_asked, "blind"),
             (header.device_chosen, "device"),
             (header.path_chosen, "path"),
@@ -117,8 +117,8 @@ class LabPlace(Place):
             (tank.moved, "point"),
             (tank.pressed, "press"),
         ):
-            part.connect(partial(self.ask, what))
-        for pressed, what in (
+            part.connect(partial(self.ask, request))
+        for pressed, request in (
             (header.sides.switched, "switch"),
             (header.undo.clicked, "undo"),
             (header.redo.clicked, "redo"),
@@ -128,7 +128,7 @@ class LabPlace(Place):
             (self.note.cancel.clicked, "cancel"),
             (self.note.diagnose.clicked, "diagnose"),
         ):
-            pressed.connect(lambda *_checked, what=what: self.ask(what))
+            pressed.connect(lambda *_checked, request=request: self.ask(request))
         for button, ask in (
             (header.save, self.ask_where_to_save),
             (form.open, self.ask_which_to_open),
@@ -137,9 +137,9 @@ class LabPlace(Place):
             button.clicked.connect(ask)
         self._escape.held.connect(self._ask_to_stop)
 
-    def ask(self, what: str, *details: Any) -> None:
-        """Emit a request by name."""
-        self.asked.emit(what, details)
+    def ask(self, request: str, *details: Any) -> None:
+        """Emit a request with its details."""
+        self.asked.emit(request, details)
 
     @property
     def view(self) -> LabView | None:
@@ -153,34 +153,34 @@ class LabPlace(Place):
             part.show_view(view)
 
     def ask_where_to_save(self) -> None:
-        """Ask for the preset's file; the dialog is not modal, so that the force can be stopped."""
-        if (setting := self._setting_unless_asking()) is not None:
+        """Ask for the file of a preset; the dialog is not modal, so that the force can be stopped."""
+        if (setting := self._available_setting()) is not None:
             dialog = self._ask_for_file(f"Save preset: {setting.title}", "Presets", "save", setting, saves=True)
             dialog.setDefaultSuffix(_SUFFIX[1:])
             dialog.selectFile(f"{_preset_name(setting.title)}{_SUFFIX}")
 
     def ask_which_to_open(self) -> None:
-        if self._setting_unless_asking() is not None:
+        if self._available_setting() is not None:
             self._ask_for_file("Open preset", "Presets and protocols", "preset")
 
     def ask_to_put_back(self) -> None:
-        if (setting := self._setting_unless_asking()) is not None and self._view is not None:
+        if (setting := self._available_setting()) is not None and self._view is not None:
             self.put_back_asked.emit(self._view.felt, setting)
 
-    def _setting_unless_asking(self) -> Setting | None:
-        """Return the felt setting; None while another question is open or the comparison is blind."""
+    def _available_setting(self) -> Setting | None:
+        """Return the felt setting, or None while a dialog is open or the comparison is blind."""
         if self.dialog is not None or self._view is None or self._view.workbench.blind:
             return None
         return self._view.workbench.in_hand
 
-    def _ask_for_file(self, title: str, files: str, what: str, *details: Any, saves: bool = False) -> QFileDialog:
-        """Ask for a file, starting in the workspace's protocols, then emit the request."""
+    def _ask_for_file(self, title: str, files: str, request: str, *details: Any, saves: bool = False) -> QFileDialog:
+        """Ask for a file in the workspace's protocols; emit the request when it is chosen."""
         dialog = self.dialog = QFileDialog(self, title, str(workspace().protocols), f"{files} (*{_SUFFIX})")
         if saves:
             dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
         else:
             dialog.setFileMode(QFileDialog.FileMode.ExistingFile)
-        dialog.fileSelected.connect(lambda name: self.ask(what, Path(name), *details))
+        dialog.fileSelected.connect(lambda name: self.ask(request, Path(name), *details))
         dialog.finished.connect(self._forget_dialog)
         dialog.show()
         return dialog
@@ -191,14 +191,14 @@ class LabPlace(Place):
         self.dialog = None
 
     def _ask_to_stop(self) -> None:
-        """Request zero force after Esc was held in any window of the program."""
+        """Stop the force after Esc was held in any window of the program."""
         if self.isVisible():
             self.ask("stop")
 
     def changeEvent(self, event: QEvent) -> None:
         super().changeEvent(event)
         if event.type() == QEvent.Type.ActivationChange and not self.isActiveWindow():
-            self.tank.let_go()
+            self.tank.release_pointer()
 
     def showEvent(self, event: QShowEvent) -> None:
         super().showEvent(event)
@@ -212,7 +212,7 @@ class LabPlace(Place):
             self.dialog.reject()
 
     def resizeEvent(self, event: QResizeEvent) -> None:
-        """Shrink in a small window: first the header, then the right column; the middle and the form scroll."""
+        """Adapt to the width: in a narrow window the header has two rows, then the right column moves down."""
         super().resizeEvent(event)
         self.header.arrange(narrow=self.width() < ONE_ROW)
         self._arrange(wide=self.width() >= WIDE)
@@ -220,6 +220,6 @@ class LabPlace(Place):
 
 
 def _preset_name(title: str) -> str:
-    """Return a file name for a preset from its title: "Water, edited" becomes "water-edited"."""
+    """Return a file name for the title of a preset: "water-edited" for "Water, edited"."""
     parts = "".join(letter if letter.isalnum() else " " for letter in title.lower()).split()
     return "-".join(parts) or "preset"

@@ -1,1 +1,1 @@
-"""Settings of this machine: screens, distance, text, display offset, device, folders."""
+"""The settings of this machine: screens, viewing distance, text size, display offset, device and folders."""

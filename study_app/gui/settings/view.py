@@ -1,10 +1,10 @@
-"""The machine's place: what this computer and its screens are like, apart from every study; kept at once, with undo.
+"""The page "This machine": the settings of this computer and its screens, which apply to every study.
 
-`FIELDS` says what is set, as does a title in `MachineSettings`; `MachinePlace` says where it stands. It reads and
-writes no file.
+`FIELDS` and the titles in `MachineSettings` describe the settings; `MachinePlace` arranges them. It reads and writes no
+file.
 
-The display test shows the photodiode's patch and frames, full-screen where a participant would look: frames are asked
-for as a session asks for them, the time of each painting is kept, and the patch is the tank's own.
+The display test paints the tank's photodiode patch full-screen on the participant's screen. It requests frames as a
+session does, and records when each is painted.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ from PySide6.QtWidgets import QBoxLayout, QButtonGroup, QFileDialog, QLabel, QWi
 
 from study_app.devices.registry import list_devices, title_of
 from study_app.gui.display.screens import Frames, ScreenShown, screens_shown
-from study_app.gui.kit.fields import LEAST_WORDS, Editor, Field, choice_field, number_field
-from study_app.gui.participant.tank.layers import paint_patch, patch_place
+from study_app.gui.kit.fields import MIN_TEXT_WIDTH, Editor, Field, choice_field, number_field
+from study_app.gui.participant.tank.layers import paint_patch, patch_rectangle
 from study_app.gui.theme.theme import PARTICIPANT, RADIUS_CONTROL, SHADOW, font
 from study_app.gui.theme.themed import apply_theme, remove_widget
 from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, grid, hbox, vbox
@@ -61,11 +61,11 @@ from study_app.video.sources import USUAL
 
 _LEAST_S: Final = 2.0
 _KEPT_S: Final = 10.0
-_LATE: Final = 1.5  # gap in refreshes from which at least one was missed
+_LATE: Final = 1.5  # gap [refreshes] above which at least one refresh was missed
 
 
 class FrameTimes:
-    """Records the time of every frame.
+    """Records the times of frames and computes figures.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ class FrameTimes:
             self._times.popleft()
 
     def figure_texts(self) -> tuple[str, ...]:
-        """Return rate, median gap, 99th percentile of the gaps and missed refreshes; dashes until enough are known."""
+        """Return rate, median and 99th percentile of the gaps, and missed refreshes; dashes until enough is known."""
         times = list(self._times)
         if len(times) < 3 or times[-1] - times[0] < self._least_ns:
             return ("–",) * len(_NAMES)
@@ -105,12 +105,12 @@ _FIRST_MS = 500.0
 _FORM_PX = 320
 _NAMES = ("Frames painted", "Median gap", "99 % of gaps within", "Missed in the last 10 s")
 _LEAST = QSize(960, 600)
-_HOWS = ("photodiode", "high-speed camera", "data sheet")
+_METHODS = ("photodiode", "high-speed camera", "data sheet")
 _DECIMALS = 2
 
 
 class _OffsetForm(QWidget):
-    """Two numbers and a method; ``kept(mean [ms], spread [ms], how)``, and ``forgotten``."""
+    """The form of the display offset: ``kept(mean [ms], spread [ms], how)`` saves it, ``forgotten`` deletes it."""
 
     kept = Signal(float, float, str)
     forgotten = Signal()
@@ -120,27 +120,27 @@ class _OffsetForm(QWidget):
         fields = (
             number_field("mean", "Mean", "ms", OFFSET_MS, _DECIMALS, may_miss=False),
             number_field("spread", "Spread", "ms", SPREAD_MS, _DECIMALS),
-            choice_field("how", "Measured by", {way: way.capitalize() for way in _HOWS}),
+            choice_field("how", "Measured by", {method: method.capitalize() for method in _METHODS}),
         )
         self.editors = {field.name: Editor(field) for field in fields}
         self.said = label("", "label", "text2", wraps=True, weight=400, tabular=True)
-        self.said.setMinimumWidth(LEAST_WORDS)
+        self.said.setMinimumWidth(MIN_TEXT_WIDTH)
         self.keep = ActionButton("save", "Save offset", height=38)
         self.forget = ActionButton("", "Forget", height=38)
         foot = hbox(self.keep, self.forget, STRETCH, spacing=12)
         vbox(self.said, *self.editors.values(), foot, spacing=8, margins=0, parent=self)
-        self.keep.clicked.connect(self._keep_offset)
+        self.keep.clicked.connect(self._submit_offset)
         self.forget.clicked.connect(self.forgotten)
 
     def show_offset(self, offset: DisplayOffset | None, screen: str) -> None:
-        """Show the measured offset, and whether it was measured on a screen other than ``screen``."""
+        """Show the measured offset, and if it was measured on a screen other than ``screen``."""
         self.forget.setEnabled(offset is not None)
         self.said.setText(_offset_sentence(offset, screen))
         if offset is not None:
             for name, value in (("mean", offset.mean_ms), ("spread", offset.spread_ms), ("how", offset.how)):
                 self.editors[name].show_value(value)
 
-    def _keep_offset(self) -> None:
+    def _submit_offset(self) -> None:
         values = []
         for editor in self.editors.values():
             try:
@@ -168,11 +168,11 @@ def _offset_sentence(offset: DisplayOffset | None, screen: str) -> str:
 
 
 class DisplayTest(QWidget):
-    """A test pattern on one screen; Esc leaves it, and ``left`` is emitted when its window has closed.
+    """The display test on one screen; Esc closes it, and ``left`` is emitted when it has closed.
 
     Parameters
     ----------
-    screen_words : name of the screen, for the heading
+    screen_text : description of the screen, for the heading
     refresh_hz : refresh rate reported by the system
     least_s : minimum duration before figures are shown
     """
@@ -181,7 +181,7 @@ class DisplayTest(QWidget):
 
     def __init__(
         self,
-        screen_words: str,
+        screen_text: str,
         refresh_hz: float,
         *,
         now_ns: Callable[[], int] = time.perf_counter_ns,
@@ -202,7 +202,7 @@ class DisplayTest(QWidget):
         self.interval.show_value(_FIRST_MS)
         self.values: list[QLabel] = [figures("–", "number") for _ in _NAMES]
         self.leave = ActionButton("", "Leave (Esc)", height=40)
-        self._lay_out(screen_words)
+        self._lay_out(screen_text)
         self.leave.clicked.connect(self.close)
         self.interval.changed.connect(lambda _name, value: self._set_interval(value))
         apply_theme(self, PARTICIPANT)
@@ -211,8 +211,8 @@ class DisplayTest(QWidget):
         self.report_timer = QTimer(self, interval=_REPORT_MS)
         self.report_timer.timeout.connect(self.show_figures)
 
-    def _lay_out(self, screen_words: str) -> None:
-        titles = vbox(label("Display test", "title"), label(screen_words, "body", "text2"), spacing=2)
+    def _lay_out(self, screen_text: str) -> None:
+        titles = vbox(label("Display test", "title"), label(screen_text, "body", "text2"), spacing=2)
         head = hbox(titles, STRETCH, (self.leave, 0, Qt.AlignmentFlag.AlignTop))
         cells = grid(40, 2)
         for place, (name, value) in enumerate(zip(_NAMES, self.values, strict=True)):
@@ -237,7 +237,7 @@ class DisplayTest(QWidget):
         self.report_timer.start()
 
     def draw_frame(self) -> None:
-        """Request a frame as in a session; toggle the patch when it is due."""
+        """Request a frame, as a session does, and toggle the patch if it is due."""
         now_ns = self._now_ns()
         if now_ns - self._toggled_ns >= 1e6 * self.interval_ms:
             self._toggled_ns = now_ns
@@ -251,7 +251,7 @@ class DisplayTest(QWidget):
             value.setText(text)
 
     def patch_area(self) -> QRect:
-        return patch_place(self.width(), self.height()).toAlignedRect()
+        return patch_rectangle(self.width(), self.height()).toAlignedRect()
 
     def _set_interval(self, value: float | None) -> None:
         self.interval_ms = value or _FIRST_MS
@@ -260,7 +260,7 @@ class DisplayTest(QWidget):
     def paintEvent(self, event: QPaintEvent) -> None:
         painter = QPainter(self)
         painter.fillRect(event.rect(), QColor(PARTICIPANT.window))
-        paint_patch(painter, patch_place(self.width(), self.height()), lit=self.lit)
+        paint_patch(painter, patch_rectangle(self.width(), self.height()), lit=self.lit)
         painter.end()
         if self._unpainted:
             self._unpainted = False
@@ -333,9 +333,9 @@ FIELDS = (
         file_filter="Certificates (*.pem *.crt *.cer)", parse=_check_path, write=_text_or_empty,
     ),
 )  # fmt: skip
-_OF_PROGRAM = tuple(  # the fields of `MachineSettings` with a title: a choice or a switch
-    choice_field(name, setting.title, {word: word.capitalize() for word in words})
-    if (words := get_args(setting.annotation))
+_PROGRAM_FIELDS = tuple(  # of the fields of `MachineSettings` with a title: choices and switches
+    choice_field(name, setting.title, {choice: choice.capitalize() for choice in choices})
+    if (choices := get_args(setting.annotation))
     else Field(name, setting.title, "switch")
     for name, setting in MachineSettings.model_fields.items()
     if setting.title
@@ -343,7 +343,7 @@ _OF_PROGRAM = tuple(  # the fields of `MachineSettings` with a title: a choice o
 
 
 class _ScreensCard(Card):
-    """All screens, with a mark at the participant's; ``chosen`` carries another choice."""
+    """The card with all screens, of which one is the participant's; ``chosen`` carries a newly chosen one."""
 
     chosen = Signal(object)
 
@@ -351,7 +351,7 @@ class _ScreensCard(Card):
         super().__init__("Participant's screen", gap=10)
         self.radios: list[Radio] = []
         self.note = label("", "label", "warn", wraps=True)
-        self.note.setMinimumWidth(LEAST_WORDS)
+        self.note.setMinimumWidth(MIN_TEXT_WIDTH)
         self.test = ActionButton("screen", "Display test …", height=38)
         self._rows = QWidget()
         self._shown: tuple[ScreenShown, ...] = ()
@@ -359,7 +359,7 @@ class _ScreensCard(Card):
         add_parts(self.column, self._host, self.note, hbox(self.test, STRETCH))
 
     def show_screens(self, screens: tuple[ScreenShown, ...], chosen: int, missing: str) -> None:
-        """Show screens; ``chosen`` is the participant's number, ``missing`` the name of an unplugged screen."""
+        """Show the screens; ``chosen`` is the number of the participant's, ``missing`` the name of an unplugged one."""
         if screens != self._shown:
             self._shown, old, self._rows = screens, self._rows, QWidget()
             group, rows = QButtonGroup(self._rows), vbox(spacing=8, margins=0, parent=self._rows)
@@ -372,7 +372,7 @@ class _ScreensCard(Card):
                 group.addButton(radio)
                 size = f"{screen.width_mm:.0f} × {screen.height_mm:.0f} mm" if screen.width_mm > 0 else "size unknown"
                 about = label(f"{screen.words}  ·  {size}", "label", "text2", wraps=True, weight=400, tabular=True)
-                about.setMinimumWidth(LEAST_WORDS)
+                about.setMinimumWidth(MIN_TEXT_WIDTH)
                 name = Elided("label", "text2")
                 name.show_text(screen.name)
                 name.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
@@ -381,8 +381,8 @@ class _ScreensCard(Card):
                 self.radios.append(radio)
             self._host.addWidget(self._rows)
             remove_widget(old)
-        for at, radio in enumerate(self.radios, start=1):
-            radio.setChecked(at == chosen)
+        for number, radio in enumerate(self.radios, start=1):
+            radio.setChecked(number == chosen)
         self.note.setText(
             f"{missing} is not connected, so the last screen in the list is used instead." if missing else ""
         )
@@ -390,11 +390,11 @@ class _ScreensCard(Card):
 
 
 class MachinePlace(Place):
-    """The settings of this computer under headings.
+    """The page with the settings of this computer.
 
     ``changed(values)`` carries new values by their names in `MachineSettings`; ``offset_measured(mean [ms], spread
-    [ms], how, screen)`` a photodiode measurement of a screen; ``undo_asked`` reverts the last change; ``check_asked``
-    opens the check of this computer.
+    [ms], how, screen)`` carries the display offset of a screen. ``undo_asked`` reverts the last change, and
+    ``check_asked`` opens the check of this computer.
     """
 
     changed = Signal(dict)
@@ -411,7 +411,7 @@ class MachinePlace(Place):
         self.change = ActionButton("", "Change …", height=40)
         self.editors = {
             field.name: Editor(field, self.devices if field.name == "device" else None)
-            for field in (*FIELDS, *_OF_PROGRAM)
+            for field in (*FIELDS, *_PROGRAM_FIELDS)
         }
         for editor in self.editors.values():
             editor.changed.connect(lambda name, value: self.changed.emit({name: value}))
@@ -425,13 +425,15 @@ class MachinePlace(Place):
             f"border: 1px solid {PARTICIPANT.border}; border-radius: {RADIUS_CONTROL}px"
         )
         self.said = label("", "label", "text2", wraps=True, weight=400, tabular=True)
-        self.said.setMinimumWidth(LEAST_WORDS)
+        self.said.setMinimumWidth(MIN_TEXT_WIDTH)
         self.folder, self.kept_in = Elided("label", "text"), Elided("label", "text2")
         self.kept_in.setFont(font("label", weight=400))
         self.undo = ActionButton("undo", "Undo")
         self.check = ActionButton("check", "Check this computer …")
         self._lay_out()
-        self.screens.chosen.connect(lambda it: self.changed.emit({"screen": it.name, "screen_number": it.number}))
+        self.screens.chosen.connect(
+            lambda screen: self.changed.emit({"screen": screen.name, "screen_number": screen.number})
+        )
         self.screens.test.clicked.connect(self.open_test)
         self.devices.clicked.connect(lambda: self.go_asked.emit("devices"))
         self.change.clicked.connect(self._choose_folder)
@@ -443,24 +445,24 @@ class MachinePlace(Place):
 
     def _lay_out(self) -> None:
         def card(title: str, *parts: str | QWidget | QBoxLayout) -> Card:
-            made = Card(title, gap=10)
-            add_parts(made.column, *(self.editors[part] if isinstance(part, str) else part for part in parts))
-            return made
+            new_card = Card(title, gap=10)
+            add_parts(new_card.column, *(self.editors[part] if isinstance(part, str) else part for part in parts))
+            return new_card
 
         workspace = label("Workspace, the folder for protocols and results", "label", "text2")
         folder = vbox(workspace, hbox((self.folder, 1), self.change, spacing=8), spacing=6)
-        seen = "viewing_distance_mm", "screen_width_mm", self.sample, self.said
+        text_size = "viewing_distance_mm", "screen_width_mm", self.sample, self.said
         columns = (
             (
                 self.screens,
-                card("Text size for the participant", *seen),
+                card("Text size for the participant", *text_size),
                 card("Other programs", "lsl_markers", "lsl_samples", Rule(), "triggers"),
                 card("Proofs kept elsewhere", "proofs", "stamps", "stamp_root"),
             ),
             (
                 card("Display offset", self.offset, Rule(), "photodiode"),
                 card("New sessions", "device", folder, "camera"),
-                card("This program", *(field.name for field in _OF_PROGRAM)),
+                card("This program", *(field.name for field in _PROGRAM_FIELDS)),
             ),
         )
         self._body = QBoxLayout(QBoxLayout.Direction.LeftToRight)
@@ -476,7 +478,7 @@ class MachinePlace(Place):
         vbox(scrolled(inside), margins=0, parent=self)
 
     def enter(self) -> None:
-        """Reread the screens, since one may have been plugged in."""
+        """Show the screens again, since one may have been plugged in."""
         self._show_all()
 
     def leave(self) -> None:
@@ -517,7 +519,7 @@ class MachinePlace(Place):
         if self.test is not None:
             return
         screen, screens = self.participants, QGuiApplication.screens()
-        if screen.number > len(screens):  # it was unplugged
+        if screen.number > len(screens):  # the screen was unplugged
             self._show_all()
             return
         text = "  ·  ".join(filter(None, (f"Screen {screen.number}", screen.name, screen.words)))
@@ -537,14 +539,14 @@ class MachinePlace(Place):
 
 
 def _width_sentence(settings: MachineSettings, screen: ScreenShown) -> str:
-    """Return a sentence on the screen width that the system reports."""
+    """Return a sentence about the screen width that the system reports."""
     reported = screen.width_mm > 0
     known = f"The system reports {screen.width_mm:.0f} mm." if reported else "The system does not report the width."
     return known if settings.screen_width_mm is None else f"{known} The measured value is used instead."
 
 
 def _text_size_sentence(settings: MachineSettings, screen: ScreenShown, scale: float) -> str:
-    """Return a sentence on the text size for the viewing distance."""
+    """Return a sentence about the size of the participant's text."""
     seen, least = settings.x_height_deg(screen.width_px, screen.width_mm), f"{LEAST_X_HEIGHT_DEG:g}°"
     if seen is None:
         enlarged = f"Measure the viewing distance; text is then enlarged until the letter x subtends {least}."

@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QDialog, QWidget
 from study_app.devices.descriptor import DRIVER_READY, NONE, NOT_AVAILABLE, READY, Backend
 from study_app.devices.registry import backends, list_devices
 from study_app.gui.devices.view import DevicesPlace
-from study_app.gui.kit.devices import device_before_look, device_named, devices_shown
+from study_app.gui.kit.devices import device_before_search, device_named, devices_shown
 from study_app.store.workstation import DEFAULTS
 from tests.golden import check_kept
 from tests.golden_values import value_lines
@@ -43,8 +43,8 @@ def told() -> Iterator[str]:
     shown = devices_shown([MOUSE, falcon("connected: FT1"), EMULATED])
     for name in ("falcon:FT1", "falcon-emulated", "hammer"):
         yield from value_lines(device_named(name, shown), f"preferred {name}")
-    assert device_named("falcon", ()) == device_before_look("falcon")
-    yield from value_lines(device_before_look("falcon"), "before anybody looked")
+    assert device_named("falcon", ()) == device_before_search("falcon")
+    yield from value_lines(device_before_search("falcon"), "before anybody looked")
 
 
 def test_devices_are_told_as_reviewed() -> None:
