@@ -1,7 +1,7 @@
-"""The participant's tank: a still backdrop, and the few things that move before it.
+"""The participant's tank: a static backdrop and the moving parts in front of it.
 
-Everything drawn here is as old as the view that is given: proxy, lit target, dwell arc and count run on the same
-delayed clock, and nothing is smoothed or eased. Nothing here knows which liquid is felt.
+Proxy, lit target, dwell arc and count are drawn as of the time of the view, so that they share its delay; nothing is
+smoothed. The tank does not know which liquid is presented.
 """
 
 from __future__ import annotations
@@ -20,18 +20,18 @@ from study_app.gui.participant.tank import sprites
 from study_app.gui.participant.tank.captions import Captions
 from study_app.gui.participant.tank.frame import (
     DEPTH_STEPS,
-    BallPlace,
     BallPlacer,
     Box,
     Camera,
-    Placed,
+    DrawnBall,
+    DrawnPart,
+    DrawnTarget,
     Point,
-    TargetPlace,
     TaskShown,
     ball_parts,
     changed_region,
+    drawn_target,
     paint_marks,
-    target_place,
 )
 from study_app.gui.participant.tank.layers import (
     Backdrop,
@@ -40,8 +40,8 @@ from study_app.gui.participant.tank.layers import (
     VideoLayer,
     paint_backdrop,
     paint_patch,
-    patch_place,
-    video_place,
+    patch_rectangle,
+    video_area,
 )
 from study_app.gui.theme.theme import TANK
 from study_app.gui.widgets.accessible import announce
@@ -49,10 +49,10 @@ from study_app.protocol.wording import Words
 from study_app.session.pages import TaskPage
 from study_app.session.tasks import TankView, new_tracker
 
-# Where the tank lies in the window, in shares of it.
+# Left, top, width and height of the tank, relative to the window.
 _AREA = (0.075, 0.122, 0.85, 0.712)
-_NEAR_RADII = 2.0  # in target radii: distance within which the ball is before or behind a target
-_ALWAYS = QRegion(0, 0, 1, 1)  # a frame without motion counts, too
+_NEAR_RADII = 2.0  # the ball is in front of or behind a target within this distance [target radii]
+_ALWAYS = QRegion(0, 0, 1, 1)  # repainted in every frame, so that frames without motion are painted, too
 
 
 def _tank_and_camera(page: TaskPage, captions: Captions, width: int, height: int) -> tuple[Box, Camera]:
@@ -65,7 +65,7 @@ def _tank_and_camera(page: TaskPage, captions: Captions, width: int, height: int
 
 
 def paint_ahead(page: TaskPage, wording: Words, text_scale: float, size: QSize, ratio: float) -> Thread:
-    """Paint the static images of the next page in a separate thread, so that it appears at once."""
+    """Start a thread that paints the static images of the next page, so that it appears at once; return the thread."""
     width, height = size.width(), size.height()
     box, camera = _tank_and_camera(page, Captions(page, wording, text_scale), width, height)
     painting = Thread(target=paint_backdrop, args=((width, height), ratio, box, camera), name="backdrop")
@@ -76,11 +76,11 @@ def paint_ahead(page: TaskPage, wording: Words, text_scale: float, size: QSize, 
 class TankWidget(QWidget):
     """Draws a task page and, on it, each new view at once.
 
-    ``painted(sample_ns)`` is emitted once per view with the time that it shows: when it was painted and passed to the
-    window system, or with ``on_card``, on a graphics card's surface, after the buffer swap. ``swapped`` is emitted
-    after each swap. ``photodiode`` adds a corner that toggles at each movement onset. With ``by_mouse`` a mouse moves
-    the hand: a click continues, there is no force to stop, and if only the depth is wrong, a line tells which way to
-    turn the wheel.
+    ``painted(sample_ns)`` is emitted once per view with its sample time, as soon as the window system has received it.
+    With ``on_card`` the tank is a surface of the graphics card, ``painted`` is emitted after the buffer swap, and
+    ``swapped`` after each swap. ``photodiode`` adds a corner that toggles at each movement onset. With ``by_mouse`` a
+    mouse moves the hand: a click continues, there is no force to stop, and if only the depth is wrong, a hint tells
+    which way to turn the wheel.
     """
 
     painted = Signal(object)
@@ -116,10 +116,10 @@ class TankWidget(QWidget):
         self._unpainted = False
         self._showing = False
         self._drawn_ns: int | None = None
-        self.things: dict[str, Placed] = {}
-        self.ball: BallPlace | None = None
+        self.parts: dict[str, DrawnPart] = {}
+        self.ball: DrawnBall | None = None
         self.camera: Camera | None = None
-        self.targets: tuple[TargetPlace, ...] = ()
+        self.targets: tuple[DrawnTarget, ...] = ()
         self.placer: BallPlacer | None = None
         self._stroke = 1.0
         self.controls: SettingControls | None = None
@@ -153,11 +153,11 @@ class TankWidget(QWidget):
         self._captions.show_interval(page)
         if self.controls is not None:
             self.controls.show_interval(page)
-        if self.view is not None:  # the ball stays where it is until the next view
+        if self.view is not None:  # until the next view, the ball stays where it is
             self.view = replace(self.view, task=new_tracker(page.task).now(), ball_hidden=False)
         self._unpainted = False
         self.video.show_frame(None)
-        self.things = self._frame_parts()
+        self.parts = self._frame_parts()
         self._announce()
         if self._pane is None:
             self.repaint()
@@ -172,7 +172,7 @@ class TankWidget(QWidget):
 
     def paint_ahead(self) -> None:
         """Paint the static images now, so that the first frame is not delayed."""
-        self._still_images()
+        self._static_images()
 
     def show_view(self, view: TankView) -> None:
         """Draw the proxy's position in ``view``, and the task at that time."""
@@ -181,13 +181,13 @@ class TankWidget(QWidget):
         x, y, z = (float(value) for value in view.position_m)
         self.patch.follow_motion((x, y, z), view.sample_time_ns)
         self.video.show_frame(view.video)
-        self._still_images()
-        things = self._frame_parts()
-        changed = changed_region(self.things, things) + _ALWAYS
-        self.things = things
+        self._static_images()
+        parts = self._frame_parts()
+        changed = changed_region(self.parts, parts) + _ALWAYS
+        self.parts = parts
         if self._pane is None:
             self._drawn_ns, self._showing = None, True
-            self.repaint(changed)  # pending work would make the view older
+            self.repaint(changed)  # at once, since queued events would delay the view
             self._showing = False
             self._emit_painted()
         else:
@@ -223,22 +223,22 @@ class TankWidget(QWidget):
         self._emit_painted()
 
     def _emit_painted(self) -> None:
-        """Emit once for every view that it was painted."""
+        """Emit ``painted``, once for every view."""
         if self._unpainted and self._drawn_ns is not None:
             self._unpainted = False
             self.painted.emit(self._drawn_ns)
 
     def _paint(self, painter: QPainter, region: QRegion) -> None:
-        still = self._still_images()
+        backdrop = self._static_images()
         painter.setRenderHint(QPainter.RenderHint.SmoothPixmapTransform)
         if self._page.video:
             self.video.paint(painter, region)
         else:
-            painter.drawImage(QPointF(0, 0), still.back)
+            painter.drawImage(QPointF(0, 0), backdrop.back)
         if self._page.overlay:
-            self._paint_things(painter, region)
-        if not self._page.video and region.intersects(still.front_at.toAlignedRect()):
-            painter.drawImage(still.front_at.topLeft(), still.front)
+            self._paint_parts(painter, region)
+        if not self._page.video and region.intersects(backdrop.front_at.toAlignedRect()):
+            painter.drawImage(backdrop.front_at.topLeft(), backdrop.front)
         self._captions.draw(painter, region, self._task, self._hint_text())
         place = self.patch_area()
         if self._photodiode and region.intersects(place.toAlignedRect()):
@@ -250,25 +250,26 @@ class TankWidget(QWidget):
         return None if self.view is None else self.view.task
 
     def _hint_text(self) -> str:
-        """Return how the ball reaches the target; nearer or further if a wheel moves it and only the depth is wrong.
+        """Return the hint how to move the ball to the target, or "" if none is needed.
 
-        In a rest that waits for the ball it says to return; otherwise it is "".
+        With a mouse, it says "nearer" or "further away" if only the depth is wrong. In a rest that waits for the ball,
+        it says to return.
         """
-        todo, view, wording = self._page.task, self.view, self._words
+        definition, view, wording = self._page.task, self.view, self._words
         if self._page.adjusts:
             return self._captions.setting_keys if self._by_mouse else ""
-        following = todo.paced and not self.resting
-        if view is None or view.task.lit is None or following:
+        is_paced = definition.paced and not self.resting
+        if view is None or view.task.lit is None or is_paced:
             return ""
-        target = todo.targets_m[view.task.lit] if todo.targets_m else todo.start_m
+        target = definition.targets_m[view.task.lit] if definition.targets_m else definition.start_m
         if target is None:
             return ""
-        x, y, z = (goal - float(here) for goal, here in zip(target, view.position_m, strict=True))
-        if self._by_mouse and math.hypot(x, y) <= _NEAR_RADII * todo.radius_m and abs(z) > todo.radius_m:
+        x, y, z = (goal - float(current) for goal, current in zip(target, view.position_m, strict=True))
+        if self._by_mouse and math.hypot(x, y) <= _NEAR_RADII * definition.radius_m and abs(z) > definition.radius_m:
             return wording.nearer if z > 0 else wording.further_away
-        return wording.back_to_target if self.resting and math.hypot(x, y, z) > todo.radius_m else ""
+        return wording.back_to_target if self.resting and math.hypot(x, y, z) > definition.radius_m else ""
 
-    def _still_images(self) -> Backdrop:
+    def _static_images(self) -> Backdrop:
         """Return the static images for the current size and screen; update the layout if they changed."""
         ratio = self.devicePixelRatioF()
         if self.camera is None:
@@ -281,47 +282,46 @@ class TankWidget(QWidget):
         self._box, self.camera = _tank_and_camera(self._page, self._captions, width, height)
         self._captions.lay_out(width, height, self.camera.point((0, self._box.floor, self._box.z))[1])
         if self.controls is not None:
-            self.controls.place_at_foot(self._captions.small_scale, self._captions.controls_middle)
+            self.controls.lay_out_controls(self._captions.small_scale, self._captions.controls_middle)
         self.placer = BallPlacer(self.camera, self._box, self._page.body_radius_m)
-        self.video.place = video_place(self.camera, self._box)
+        self.video.place = video_area(self.camera, self._box)
         for step in range(DEPTH_STEPS):
             radius, haze = self.placer.size(step)
             sprites.ball_sprite(radius, ratio, haze)
-        todo = self._page.task
-        self.targets = self._placed_targets(todo.targets_m)
+        self.targets = self._placed_targets(self._page.task.targets_m)
         self._stroke = max(2.0, self.camera.scale((0, 0, 0)) * 0.0010)
-        self.things = self._frame_parts()
+        self.parts = self._frame_parts()
 
-    def _placed_targets(self, centres_m: tuple[Point, ...]) -> tuple[TargetPlace, ...]:
+    def _placed_targets(self, centres_m: tuple[Point, ...]) -> tuple[DrawnTarget, ...]:
         if self.camera is None:
             return ()
-        # the ball is inside the ring while its centre counts
-        around_m = self._page.task.radius_m + self._page.body_radius_m
-        return tuple(target_place(self.camera, self._box, centre, around_m) for centre in centres_m)
+        # The ball is inside the ring as long as its centre is in the target.
+        radius_m = self._page.task.radius_m + self._page.body_radius_m
+        return tuple(drawn_target(self.camera, self._box, centre, radius_m) for centre in centres_m)
 
-    def _frame_parts(self) -> dict[str, Placed]:
+    def _frame_parts(self) -> dict[str, DrawnPart]:
         task = self._task
         lit = task.lit if task else None
         if (moving_m := (task and task.target_m) or self._page.task.target_m(0.0)) is not None:
             self.targets = self._placed_targets((moving_m,))
-        things: dict[str, Placed] = {}
+        parts: dict[str, DrawnPart] = {}
         for index, target in enumerate(self.targets):
             is_lit, x = index == lit, target.middle.x()
-            things[f"target {index}"] = Placed((is_lit, task.dwell if task and is_lit else 0.0, x), target.place)
-            things[f"marks {index}"] = Placed((is_lit, x), target.marks)
+            parts[f"target {index}"] = DrawnPart((is_lit, task.dwell if task and is_lit else 0.0, x), target.place)
+            parts[f"marks {index}"] = DrawnPart((is_lit, x), target.marks)
         self.ball = None
         if self.view is not None and not self.view.ball_hidden and self.placer is not None:
             x, y, z = (float(value) for value in self.view.position_m)
             self.ball = self.placer.place((x, y, z))
-            things |= ball_parts(self.ball)
-        things |= self._captions.things(task, self._hint_text())
+            parts |= ball_parts(self.ball)
+        parts |= self._captions.parts(task, self._hint_text())
         if self._page.video:
-            things["video"] = self.video.placed_frame
+            parts["video"] = self.video.placed_frame
         if self._photodiode:
-            things["patch"] = Placed(self.patch.lit, self.patch_area())
-        return things
+            parts["patch"] = DrawnPart(self.patch.lit, self.patch_area())
+        return parts
 
-    def _paint_things(self, painter: QPainter, region: QRegion) -> None:
+    def _paint_parts(self, painter: QPainter, region: QRegion) -> None:
         """Paint floor marks and shadow, then ball and targets from far to near."""
         lit = self._task.lit if self._task else None
         for index, target in enumerate(self.targets):
@@ -329,9 +329,9 @@ class TankWidget(QWidget):
                 paint_marks(painter, target, self._stroke, is_lit=index == lit)
         ratio = self.devicePixelRatioF()
         ball = self.ball
-        if ball is not None and region.intersects(self.things["shadow"].place.toAlignedRect()):
-            dark = sprites.shadow_sprite(ball.floor_radius, ratio, ball.floor_flat)
-            sprites.draw_sprite(painter, dark, ball.floor, opacity=ball.shade, grown=ball.spread)
+        if ball is not None and region.intersects(self.parts["shadow"].place.toAlignedRect()):
+            sprite = sprites.shadow_sprite(ball.floor_radius, ratio, ball.floor_flat)
+            sprites.draw_sprite(painter, sprite, ball.floor, opacity=ball.shade, scale=ball.spread)
         order = sorted(range(len(self.targets)), key=lambda index: -self.targets[index].depth_m)
         drawn = False
         for index in order:
@@ -344,7 +344,7 @@ class TankWidget(QWidget):
         if ball is not None and not drawn:
             self._paint_ball(painter, region, ball)
 
-    def _paint_target(self, painter: QPainter, target: TargetPlace, *, is_lit: bool) -> None:
+    def _paint_target(self, painter: QPainter, target: DrawnTarget, *, is_lit: bool) -> None:
         ratio = self.devicePixelRatioF()
         if not is_lit:
             sprites.draw_sprite(
@@ -361,15 +361,15 @@ class TankWidget(QWidget):
             circle = QRectF(target.middle.x() - radius, target.middle.y() - radius, 2 * radius, 2 * radius)
             painter.drawArc(circle, 90 * 16, -round(min(dwell, 1.0) * 360 * 16))
 
-    def _paint_ball(self, painter: QPainter, region: QRegion, ball: BallPlace) -> None:
-        if region.intersects(self.things["plumb"].place.toAlignedRect()):
+    def _paint_ball(self, painter: QPainter, region: QRegion, ball: DrawnBall) -> None:
+        if region.intersects(self.parts["plumb"].place.toAlignedRect()):
             ink = QColor(TANK.proxy_light)
             ink.setAlphaF(0.62)
             painter.setPen(QPen(ink, self._stroke * 0.36, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap))
             painter.drawPoints(ball.feet)
-        if region.intersects(self.things["ball"].place.toAlignedRect()):
+        if region.intersects(self.parts["ball"].place.toAlignedRect()):
             sprite = sprites.ball_sprite(ball.radius, self.devicePixelRatioF(), ball.haze)
             sprites.draw_sprite(painter, sprite, ball.middle)
 
     def patch_area(self) -> QRectF:
-        return patch_place(self.width(), self.height())
+        return patch_rectangle(self.width(), self.height())

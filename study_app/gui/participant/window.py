@@ -1,4 +1,4 @@
-"""The participant's window: one page at a time, and the pointer where it is the device."""
+"""The participant's window, which shows one page at a time, and the capture of a pointer that is the device."""
 
 from __future__ import annotations
 
@@ -52,18 +52,19 @@ from study_app.session.pages import (
 from study_app.session.tasks import TankView
 from study_app.session.transitions.events import Continue, ForceStopped, PauseRequested
 
-SHARE_OF_SCREEN = 0.6  # of the screen's height that moves the hand through the height of the workspace
-NOTCHES = 24  # of the wheel through the depth of the workspace
-_NOTCH = 120  # eighths of a degree
-_WITHOUT_GRAB = ("offscreen", "minimal")  # there is no other window that could take the pointer
+SHARE_OF_SCREEN = 0.6  # part of the screen's height over which the pointer moves the hand through the workspace
+NOTCHES = 24  # wheel notches from the front to the back of the workspace
+_NOTCH = 120  # turn of the wheel per notch [eighths of a degree]
+_WITHOUT_GRAB = ("offscreen", "minimal")  # platforms without another window that could take the pointer
 _BUTTONS = {Qt.MouseButton.LeftButton: 1 << 0, Qt.MouseButton.RightButton: 1 << 1}
 
 
 class PointerCapture(QObject):
     """Captures the pointer while a widget is shown.
 
-    ``moved(x, y, z)`` is the hand's position [m, hand frame], which is kept between captures; ``pressed(bits)`` are the
-    held buttons, bit 0 the left one. Wheel, and motion with Shift, change the depth: forwards is away.
+    ``moved(x, y, z)`` carries the hand's position [m, hand frame], which is kept between captures, and
+    ``pressed(bits)`` the held buttons, of which bit 0 is the left one. The wheel, and motion with Shift, change the
+    depth; forwards moves the hand away.
     """
 
     moved = Signal(float, float, float)
@@ -77,14 +78,14 @@ class PointerCapture(QObject):
         self.gain = 0.0
         self._bits = 0
         self._last = QPoint()
-        self._returning = False
+        self._awaits_jump = False
 
     @property
     def is_held(self) -> bool:
         return self._widget is not None
 
     def capture(self, widget: QWidget, workspace_m: tuple[float, float, float]) -> None:
-        """Hide the pointer in ``widget`` and convert its motion into the hand's, within the workspace (full sizes)."""
+        """Hide the pointer in ``widget``; its motion moves the hand within the workspace (full sizes)."""
         self.release()
         self._widget = widget
         width, height, depth = workspace_m
@@ -95,13 +96,13 @@ class PointerCapture(QObject):
         widget.installEventFilter(self)
         if QGuiApplication.platformName() not in _WITHOUT_GRAB:
             widget.grabMouse()
-        self._last = self._middle_of_widget()
-        self._returning = False
+        self._last = self._widget_centre()
+        self._awaits_jump = False
         QCursor.setPos(self._last)
         self._move_hand(0.0, 0.0, 0.0)
 
     def release(self) -> None:
-        """Release the pointer; its buttons count as released."""
+        """Release the pointer, and report its buttons as released."""
         if self._widget is None:
             return
         widget, self._widget = self._widget, None
@@ -131,39 +132,42 @@ class PointerCapture(QObject):
             return True
         return False
 
-    def _middle_of_widget(self) -> QPoint:
-        assert self._widget is not None  # noqa: S101  # asked only while held
+    def _widget_centre(self) -> QPoint:
+        assert self._widget is not None  # noqa: S101  # called only while captured
         return self._widget.mapToGlobal(self._widget.rect().center())
 
-    def _follow_pointer(self, place: QPoint, modifiers: Qt.KeyboardModifier) -> None:
-        """Move the hand by the pointer's step; recentre a pointer far from the centre."""
-        assert self._widget is not None  # noqa: S101  # events come only while held
-        middle = self._middle_of_widget()
-        if self._returning and _distance_px(place, middle) < _distance_px(place, self._last):
-            self._last, self._returning = middle, False
-        step = place - self._last
-        self._last = place
+    def _follow_pointer(self, position: QPoint, modifiers: Qt.KeyboardModifier) -> None:
+        """Move the hand by the pointer's step; recentre the pointer if it is far from the centre."""
+        assert self._widget is not None  # noqa: S101  # called only while captured
+        centre = self._widget_centre()
+        if self._awaits_jump and _distance_px(position, centre) < _distance_px(position, self._last):
+            self._last, self._awaits_jump = centre, False
+        step = position - self._last
+        self._last = position
         right, down = step.x() * self.gain, step.y() * self.gain
         if modifiers & Qt.KeyboardModifier.ShiftModifier:
             self._move_hand(right, 0.0, down)
         else:
             self._move_hand(right, -down, 0.0)
-        if not self._returning and _distance_px(place, middle) > min(self._widget.width(), self._widget.height()) // 4:
-            self._recentre_pointer(middle)
+        if (
+            not self._awaits_jump
+            and _distance_px(position, centre) > min(self._widget.width(), self._widget.height()) // 4
+        ):
+            self._recentre_pointer(centre)
 
-    def _recentre_pointer(self, middle: QPoint) -> None:
+    def _recentre_pointer(self, centre: QPoint) -> None:
         """Move the pointer to the centre and follow it from there.
 
-        On X11 the query of its position is answered after the jump, and Qt then delivers only the last motion, so that
-        the next one is counted from the centre. On other systems earlier motions may still arrive: until one is closer
-        to the centre than to the last position, they are counted from there.
+        On X11, querying the position waits until the pointer has moved, so that the next motion starts at the centre.
+        On other systems, motions from before may still arrive; they are relative to the last position, until one is
+        closer to the centre than to the last position.
         """
-        QCursor.setPos(middle)
+        QCursor.setPos(centre)
         if QGuiApplication.platformName() == "xcb":
             QCursor.pos()
-            self._last = middle
+            self._last = centre
         else:
-            self._returning = True
+            self._awaits_jump = True
 
     def _move_hand(self, right: float, up: float, near: float) -> None:
         for axis, step in enumerate((right, up, near)):
@@ -189,8 +193,8 @@ _WINDOWED_SIZE = QSize(1366, 768)
 _PILOT_FRAME = 10
 _WAITING_MS = 15
 _TIME_UP_MS = 1500  # duration of "Time is up" before the questions
-_AHEAD_MS = 100  # delay after a page before painting the next one ahead
-_SETTLING_MS = 100  # longest time without a focused window when the focus moves between the program's windows
+_AHEAD_MS = 100  # delay after which the next page is painted in advance
+_SETTLING_MS = 100  # longest time without focus while it moves between the program's windows
 
 
 class ParticipantWindow(QWidget):
@@ -198,8 +202,8 @@ class ParticipantWindow(QWidget):
 
     Parameters
     ----------
-    said : the interface's texts in the participant's language, until a page has another one
-    clock : seconds since the session's origin, for the events' times
+    wording : the interface's texts in the participant's language, until a page has another language
+    clock : returns the seconds since the session's origin, for the times of events
     windowed : whether to open a window of at least 1024 × 640 instead of using the whole screen
     captures_pointer : whether to capture and hide the pointer in the tank, because it is the device
     pilot : whether a coloured frame and the title mark the session as a pilot
@@ -208,12 +212,12 @@ class ParticipantWindow(QWidget):
     photodiode : whether the tank has a corner for a photodiode
     strip : a widget above every page, if the operator has no separate screen
 
-    While ``may_close`` is false, closing the window during a session is a pause.
+    While ``may_close`` is false, closing the window during a session pauses it.
 
-    ``event`` carries the session's events; ``pointer`` the hand's position [m] and ``buttons`` the buttons' bits while
-    the pointer is captured; ``painted`` the sample time [ns] of every view, while it is drawn. ``swapped`` is emitted
-    after each buffer swap, ``left`` when the participant has closed the last page. ``painting`` is the last thread that
-    painted in advance.
+    ``event`` carries the session's events; while the pointer is captured, ``pointer`` carries the hand's position [m]
+    and ``buttons`` the held buttons; ``painted`` carries the sample time [ns] of every painted view. ``swapped`` is
+    emitted after each buffer swap, ``left`` when the participant has closed the last page. ``painting`` is the last
+    thread that painted a page in advance.
     """
 
     event = Signal(object)  # type: ignore[assignment]  # hides QWidget.event() from Python, not from Qt
@@ -225,7 +229,7 @@ class ParticipantWindow(QWidget):
 
     def __init__(
         self,
-        said: Words,
+        wording: Words,
         *,
         clock: Callable[[], float],
         windowed: bool = False,
@@ -241,7 +245,7 @@ class ParticipantWindow(QWidget):
         self.strip = strip
         self._on_card = on_card
         self._photodiode = photodiode
-        self._words = said
+        self._words = wording
         self._clock = clock
         self.text_scale = text_scale
         self._windowed = windowed
@@ -251,18 +255,18 @@ class ParticipantWindow(QWidget):
         self.frame_px = _PILOT_FRAME if pilot else 0
         self._page: Page | None = None
         self._presses = key_presses()
-        self._widget: PageWidget | TankWidget = self._wait_page(said.preparing)
+        self._widget: PageWidget | TankWidget = self._make_waiting_page(wording.preparing)
         self._capture = PointerCapture(self)
         self._capture.moved.connect(self.pointer)
-        self._capture.pressed.connect(self._take_click)
+        self._capture.pressed.connect(self._handle_click)
         self.settling = QTimer(self, interval=_SETTLING_MS)
         self.settling.timeout.connect(self._pause_if_left)
         self.waiting = QTimer(self, interval=_WAITING_MS)
         self.waiting.timeout.connect(self._show_if_painted)
         self.time_up = QTimer(self, singleShot=True, interval=_TIME_UP_MS)
         self.time_up.timeout.connect(self._show_questions)
-        self._ahead = QTimer(self, singleShot=True, interval=_AHEAD_MS)
-        self._ahead.timeout.connect(self._paint_ahead)
+        self._ahead_timer = QTimer(self, singleShot=True, interval=_AHEAD_MS)
+        self._ahead_timer.timeout.connect(self._paint_ahead)
         self._escape = EscapeKey(self)
         self._escape.held.connect(self._stop_force)
         self._escape.tapped.connect(self._ask_to_pause)
@@ -294,7 +298,7 @@ class ParticipantWindow(QWidget):
 
     def open_on(self, screen: QScreen | None = None) -> None:
         """Open the window on ``screen`` (None: the system's choice), full-screen unless windowed."""
-        give_role(self, QAccessible.Role.Window)  # again: later connections to its methods removed it
+        give_role(self, QAccessible.Role.Window)  # again, since connecting signals to its methods removes it
         if screen is not None:
             self.setScreen(screen)
             self.move(screen.geometry().topLeft())
@@ -312,7 +316,7 @@ class ParticipantWindow(QWidget):
         self.activateWindow()
 
     def show_page(self, page: Page) -> None:
-        """Replace the current page at once; the tank is kept throughout a trial's intervals."""
+        """Replace the current page at once, but keep the tank during the intervals of a trial."""
         tank = self.tank
         if isinstance(page, TaskPage) and page.interval and tank is not None and tank.page.trial == page.trial:
             self._page = page
@@ -325,40 +329,40 @@ class ParticipantWindow(QWidget):
             self._words = words(page.language)
             self._set_title()
         self._page = page
-        up = tank is not None and tank.page.interval is None and tank.time_is_up
-        if isinstance(page, QuestionnairePage) and up:
+        is_time_up = tank is not None and tank.page.interval is None and tank.time_is_up
+        if isinstance(page, QuestionnairePage) and is_time_up:
             self.time_up.start()
-            self._show_widget(self._wait_page(self._words.time_is_up))
+            self._show_widget(self._make_waiting_page(self._words.time_is_up))
         elif isinstance(page, TaskPage) and self.painting is not None and self.painting.is_alive():
             self.waiting.start()
-            self._show_widget(self._wait_page(self._words.trouble_title))
+            self._show_widget(self._make_waiting_page(self._words.trouble_title))
         else:
             self._show_widget(self._make_widget(page, self._widget))
 
-    def _show_widget(self, made: PageWidget | TankWidget) -> None:
-        self._presses.begin_page(made)
+    def _show_widget(self, widget: PageWidget | TankWidget) -> None:
+        self._presses.begin_page(widget)
         old = self._widget
         if isinstance(old, TankWidget):
-            old.painted.disconnect(self.painted)  # a late frame of one trial's tank must not begin the next trial
-        made.setGeometry(self._room())
-        if isinstance(made, TankWidget):
-            made.paint_ahead()
-        self._widget = made
-        made.show()
-        made.raise_()
-        if isinstance(made, TankWidget):
+            old.painted.disconnect(self.painted)  # so that a late frame of this trial does not begin the next one
+        widget.setGeometry(self._page_area())
+        if isinstance(widget, TankWidget):
+            widget.paint_ahead()
+        self._widget = widget
+        widget.show()
+        widget.raise_()
+        if isinstance(widget, TankWidget):
             self.activateWindow()
             self.setFocus()
-            made.setCursor(Qt.CursorShape.BlankCursor)
+            widget.setCursor(Qt.CursorShape.BlankCursor)
             if self._captures:
-                self._capture.capture(made, made.page.workspace_m)
+                self._capture.capture(widget, widget.page.workspace_m)
         else:
-            made.focus_first()
-        old.hide()  # only now, or Qt would move the focus itself
+            widget.focus_first()
+        old.hide()  # after the new widget has the focus, which Qt would move otherwise
         old.deleteLater()
-        if isinstance(made, TankWidget):
-            made.repaint()  # repaint everything, so that its first view does not wait
-        self._ahead.start()
+        if isinstance(widget, TankWidget):
+            widget.repaint()  # completely, so that the first view is not delayed
+        self._ahead_timer.start()
 
     def show_view(self, view: TankView) -> None:
         if self.tank is not None:
@@ -369,7 +373,7 @@ class ParticipantWindow(QWidget):
         if controls is not None and controls.press_key(event):
             return
         key = event.key()
-        if key in (Qt.Key.Key_Space, Qt.Key.Key_Return, Qt.Key.Key_Enter) and self._may_leave_tank():
+        if key in (Qt.Key.Key_Space, Qt.Key.Key_Return, Qt.Key.Key_Enter) and self._can_leave_tank():
             self.event.emit(Continue(self._clock()))
         else:
             super().keyPressEvent(event)
@@ -401,10 +405,10 @@ class ParticipantWindow(QWidget):
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         if self.strip is not None:
-            room = self._room()
-            self.strip.setGeometry(room.left(), self.frame_px, room.width(), self.strip.height())
-        self._widget.setGeometry(self._room())
-        self._ahead.start()
+            area = self._page_area()
+            self.strip.setGeometry(area.left(), self.frame_px, area.width(), self.strip.height())
+        self._widget.setGeometry(self._page_area())
+        self._ahead_timer.start()
 
     def closeEvent(self, event: QCloseEvent) -> None:
         """Pause instead of closing, since the participant must not end a session by accident."""
@@ -427,11 +431,11 @@ class ParticipantWindow(QWidget):
     def _paint_ahead(self) -> None:
         """Paint the tank that follows a text or a pause while that page is shown."""
         if isinstance(self._page, TextPage | PausePage) and self._page.coming is not None:
-            size, ratio = self._room().size(), self.devicePixelRatioF()
+            size, ratio = self._page_area().size(), self.devicePixelRatioF()
             self.painting = paint_ahead(self._page.coming, self._words, self.text_scale, size, ratio)
 
-    def _wait_page(self, words_said: str) -> ReadingPage:
-        column = ("clock", words_said, (), PARTICIPANT.accent)
+    def _make_waiting_page(self, title: str) -> ReadingPage:
+        column = ("clock", title, (), PARTICIPANT.accent)
         return ReadingPage(column, self._context)
 
     def _show_if_painted(self) -> None:
@@ -449,7 +453,7 @@ class ParticipantWindow(QWidget):
         self.setWindowTitle(self._words.window_title + (" – pilot" if self._pilot else ""))
         self.setAccessibleName(self.windowTitle())
 
-    def _room(self) -> QRect:
+    def _page_area(self) -> QRect:
         frame = self.frame_px
         above = self.strip.height() if self.strip is not None else 0
         return self.rect().adjusted(frame, frame + above, -frame, -frame)
@@ -462,21 +466,20 @@ class ParticipantWindow(QWidget):
         if isinstance(page, TaskPage):
             return self._make_tank(page)
         context = self._context
-        if isinstance(page, PausePage):  # on a picture of the previous page; a second pause keeps the first one's
-            grabbed = old.grab() if old.width() > 0 else None
-            made: PageWidget = PauseWidget(page, context, old.under if isinstance(old, PauseWidget) else grabbed)
+        if isinstance(page, PausePage):  # over a picture of the page, or that of the pause before
+            picture = old.grab() if old.width() > 0 else None
+            widget: PageWidget = PauseWidget(page, context, old.under if isinstance(old, PauseWidget) else picture)
         elif isinstance(page, QuestionnairePage):
-            made = (QuestionnaireWidget if page.labels else FormWidget)(page, context)
+            widget = (QuestionnaireWidget if page.labels else FormWidget)(page, context)
         else:
-            made = _WIDGETS[type(page)](page, context)
-        made.event_made.connect(self.event)
-        return made
+            widget = _WIDGETS[type(page)](page, context)
+        widget.event_made.connect(self.event)
+        return widget
 
     def _make_tank(self, page: TaskPage) -> TankWidget:
-        said, shown = self._words, not self._captures
         tank = TankWidget(
             page,
-            said,
+            self._words,
             self,
             text_scale=self.text_scale,
             on_card=self._on_card,
@@ -486,24 +489,24 @@ class ParticipantWindow(QWidget):
         tank.painted.connect(self.painted)
         tank.swapped.connect(self.swapped)
         if page.question:
-            tank.controls = SettingControls(page, said, self._clock, tank, buttons=shown)
+            tank.controls = SettingControls(page, self._words, self._clock, tank, buttons=not self._captures)
             tank.controls.event_made.connect(self.event)
         return tank
 
-    def _may_leave_tank(self) -> bool:
+    def _can_leave_tank(self) -> bool:
         return self.tank is not None and self.tank.may_leave
 
-    def _take_click(self, bits: int) -> None:
-        """Handle a click of a mouse that is the device: as Space to continue, else as a device button."""
+    def _handle_click(self, bits: int) -> None:
+        """Handle a click of the captured mouse: continue as with Space if allowed, otherwise emit the device button."""
         if bits and ignores_clicks(self._widget):
             return
-        if bits & _BUTTONS[Qt.MouseButton.LeftButton] and self._may_leave_tank():
+        if bits & _BUTTONS[Qt.MouseButton.LeftButton] and self._can_leave_tank():
             self.event.emit(Continue(self._clock()))
         else:
             self.buttons.emit(bits)
 
     def _pause_if_left(self) -> None:
-        """Pause if the pointer is the device and another program (not the operator's window) becomes active."""
+        """Pause if the pointer is the device and another program, not the operator's window, is active."""
         if self.tank is None or self._capture.is_held:
             self.settling.stop()
         elif QGuiApplication.focusWindow() is None:

@@ -192,7 +192,7 @@ def test_where_the_mouse_is_the_device_keys_are_named_and_no_button_is_shown(cap
     controls = setting(captured)
     captured.window.show_view(view(lit=0, target_m=(0.0, 0.0, 0.0)))
     assert controls.isHidden()
-    assert captured.page.things["hint"].state == "← Less · More → · Enter: Done"
+    assert captured.page.parts["hint"].state == "← Less · More → · Enter: Done"
     QTest.keyClick(captured.window, KEY.Key_Left)
     assert steps(captured) == [-1]
     captured.window.findChild(PointerCapture).pressed.emit(1)

@@ -2,7 +2,7 @@
 
 import pytest
 
-from study_app.gui.display.screens import IN_SOFTWARE, has_graphics_card, opengl_renderer
+from study_app.gui.display.screens import SOFTWARE_RENDERERS, has_graphics_card, opengl_renderer
 from tests.end_to_end.real_windows import needs_display
 from tests.gui.participant.driver import on_a_display
 
@@ -75,7 +75,7 @@ def test_the_picture_on_a_surface_is_the_same_and_every_view_is_told_of_once_aft
     assert told["painted"] == list(range(FRAMES))
     assert told["swaps"] >= FRAMES
     assert told["locked"], "frames follow the swaps"
-    assert told["card"] == (not any(word in told["renderer"].lower() for word in IN_SOFTWARE))
+    assert told["card"] == (not any(word in told["renderer"].lower() for word in SOFTWARE_RENDERERS))
 
 
 def test_without_a_screen_there_is_no_card(qapp):

@@ -315,7 +315,7 @@ def lines(seen: Participant) -> Iterator[str]:
     yield f"keyboard at {getattr(focus, 'text', focus.accessibleName)()!r}"
     yield from spoken(seen.window)
     if (tank := seen.window.tank) is not None:
-        yield from (f"thing {name}: {plain(thing.state)} @{plain(thing.place)}" for name, thing in tank.things.items())
+        yield from (f"thing {name}: {plain(thing.state)} @{plain(thing.place)}" for name, thing in tank.parts.items())
 
 
 def act(seen: Participant, step: Any) -> None:

@@ -42,7 +42,7 @@ class Painted(QObject):
 
 
 def hint(tank: TankWidget) -> Any:
-    return tank.things["hint"].state
+    return tank.parts["hint"].state
 
 
 def ball_of(tank: TankWidget, position_m: tuple[float, float, float]) -> Any:

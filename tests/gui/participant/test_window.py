@@ -145,7 +145,7 @@ def test_the_first_view_adds_the_ball_and_nothing_else(opening: Opening) -> None
     differs = (before != pixels(on_screen(opened.window))).any(axis=2)
     inside = np.zeros_like(differs)
     for name in ("ball", "shadow", "plumb"):
-        place = opened.page.things[name].place.toAlignedRect()
+        place = opened.page.parts[name].place.toAlignedRect()
         inside[place.top() : place.bottom() + 1, place.left() : place.right() + 1] = True
     assert differs.any()
     assert not (differs & ~inside).any()

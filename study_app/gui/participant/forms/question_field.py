@@ -1,4 +1,4 @@
-"""What the widgets of all kinds of questions have in common: the words at one side, the answer at the other."""
+"""The base classes of question widgets, which show the question at one side and its answer at the other."""
 
 from __future__ import annotations
 
@@ -39,14 +39,14 @@ if TYPE_CHECKING:
 else:
     Widget = object
 
-_HIGHEST = 2000  # of wrapped words [px]
+_MAX_HEIGHT = 2000  # of wrapped text [px]
 
 
-class _QuestionWords(QWidget):
-    """Number, text and note of a question in one widget, since a page has many of them.
+class _QuestionText(QWidget):
+    """The number, text and note of a question in a single widget, since a page has many questions.
 
-    The number has its own column, so that the texts of all questions are aligned. A missing answer has a sign before
-    the note.
+    The number has its own column, so that the texts of all questions are aligned. If the answer is missing, a sign
+    precedes the note.
     """
 
     def __init__(self, number: int, text: str, parent: QWidget) -> None:
@@ -56,17 +56,17 @@ class _QuestionWords(QWidget):
         self._number_width = 0
         self._faces = (QFont(), QFont(), QFont())
         self._sign, self._sign_gap = 0.0, 0.0
-        self._known: dict[int, tuple[int, int]] = {}  # heights by width
+        self._cached_heights: dict[int, tuple[int, int]] = {}  # heights by width
         policy = QSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Preferred)
         policy.setHeightForWidth(True)
         self.setSizePolicy(policy)
 
     def fill_row(self) -> None:
-        """Use the room that a row of fixed height leaves, without a minimum."""
+        """Fill a row of fixed height, without a minimum size."""
         self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Ignored)
 
     def show_note(self, note: str, *, missing: bool) -> None:
-        """Show a small note, or none; a missing answer gets a sign and a colour."""
+        """Show a note below the text, or none; ``missing`` marks it with a sign and a colour."""
         if (note, missing) != (self.note, self.missing):
             self.note, self.missing = note, missing
             self._forget_sizes()
@@ -86,7 +86,7 @@ class _QuestionWords(QWidget):
             self._forget_sizes()
 
     def sizeHint(self) -> QSize:
-        """Return the minimum size: the width is a fraction of the row, and the height follows from it."""
+        """Return the minimum size; the width is a fraction of the row and determines the height."""
         return self.minimumSizeHint()
 
     def minimumSizeHint(self) -> QSize:
@@ -101,16 +101,16 @@ class _QuestionWords(QWidget):
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         width, left = self.width(), self._number_width
-        high, note_high = self._heights(width)
-        top = (self.height() - high - note_high + 1) // 2
+        text_height, note_high = self._heights(width)
+        top = (self.height() - text_height - note_high + 1) // 2
         painter = page_painter(self)
         painter.setLayoutDirection(Qt.LayoutDirection.LayoutDirectionAuto)  # the text has its own language's direction
         ink = PARTICIPANT.warn if self.missing else PARTICIPANT.text3
-        note_top, note_left = top + high, left + self._note_left
+        note_top, note_left = top + text_height, left + self._note_left
         text_face, note_face, number_face = self._faces
         for face, colour, place, text in (
-            (number_face, ink, QRect(0, top, left, high), self._number),
-            (text_face, PARTICIPANT.text, QRect(left, top, width - left, high), self.text),
+            (number_face, ink, QRect(0, top, left, text_height), self._number),
+            (text_face, PARTICIPANT.text, QRect(left, top, width - left, text_height), self.text),
             (note_face, ink, QRect(note_left, note_top, width - note_left, note_high), self.note),
         ):
             painter.setFont(face)
@@ -131,32 +131,32 @@ class _QuestionWords(QWidget):
 
     @property
     def _note_left(self) -> int:
-        """The left edge of the note, after the number's column [px]."""
+        """The distance of the note from the number's column, which the sign needs [px]."""
         return round(self._sign + self._sign_gap) if self.missing else 0
 
     def _mirror_place(self, place: QRect) -> QRectF:
         return QRectF(QStyle.visualRect(self.layoutDirection(), self.rect(), place))
 
     def _bounds(self, face: QFont, text: str, width: int) -> QRect:
-        return QFontMetrics(face).boundingRect(0, 0, width, _HIGHEST, self._flags, text)
+        return QFontMetrics(face).boundingRect(0, 0, width, _MAX_HEIGHT, self._flags, text)
 
     def _heights(self, width: int) -> tuple[int, int]:
-        """Return the heights [px] of number and text, and of the note."""
-        if width not in self._known:
-            self._known[width] = self._measured_heights(width)
-        return self._known[width]
+        """Return the height of number and text, and that of the note [px]."""
+        if width not in self._cached_heights:
+            self._cached_heights[width] = self._measure_heights(width)
+        return self._cached_heights[width]
 
-    def _measured_heights(self, width: int) -> tuple[int, int]:
+    def _measure_heights(self, width: int) -> tuple[int, int]:
         text, note, number = self._faces
         room = width - self._number_width
-        high = max(self._bounds(text, self.text, room).height(), QFontMetrics(number).height())
+        text_height = max(self._bounds(text, self.text, room).height(), QFontMetrics(number).height())
         if not self.note:
-            return high, 0
+            return text_height, 0
         note_high = self._bounds(note, self.note, room - self._note_left).height()
-        return high, max(note_high, round(self._sign)) if self.missing else note_high
+        return text_height, max(note_high, round(self._sign)) if self.missing else note_high
 
     def _forget_sizes(self) -> None:
-        self._known.clear()
+        self._cached_heights.clear()
         self.updateGeometry()
         self.update()
 
@@ -176,17 +176,17 @@ _NOTE_GAP = 5.0
 
 
 class QuestionField(QWidget):
-    """A question and its answer: one Tab stop, and for screen readers a group with its answers.
+    """A question and its answer; it is a single Tab stop, and for screen readers a group of its answers.
 
     ``answered(value)`` is emitted when an answer is given or changed, ``retracted`` when an entry was emptied, ``left``
-    when a key answered it so that the next question can get the focus; ``seen`` at the first painting.
+    when a key has answered the question, so that the next one can get the focus, and ``seen`` when it is first painted.
     """
 
     ANSWER: ClassVar[int] = 2
     """The column of the answer in ``grid``."""
     widget_id: ClassVar[str] = ""
     last = False
-    """Whether no line is drawn under it."""
+    """Whether the question is the last of its part, which has no line below it."""
 
     answered = Signal(object)
     retracted = Signal()
@@ -204,7 +204,7 @@ class QuestionField(QWidget):
         self._answer: QWidget | None = None
         self.scale = 1.0
         give_role(self, QAccessible.Role.Grouping)
-        self.statement = _QuestionWords(view.number, view.text, self)
+        self.statement = _QuestionText(view.number, view.text, self)
         self.grid = grid(0, parent=self)
         self.grid.addWidget(self.statement, 0, 0)
         self.grid.setColumnStretch(0, WORDS_SHARE)
@@ -223,18 +223,18 @@ class QuestionField(QWidget):
         return self.view.keys
 
     def put_answer_part(self, answer: QWidget) -> None:
-        """Insert the part with the answer after the question's text."""
+        """Insert the widget with the answer after the question's text."""
         self._answer = answer
         self.grid.addWidget(answer, 0, self.ANSWER, Qt.AlignmentFlag.AlignVCenter)
 
     def show_answer(self, value: Value) -> None:
-        self.keep_answer(value)
+        self.set_answer(value)
 
     def spoken_answer(self) -> str:
         return str(self.value)
 
     def finish(self) -> bool:
-        """Accept the typed text; return False if it is not an answer."""
+        """Accept typed text; return whether it is a valid answer."""
         return True
 
     def set_scale(self, scale: float) -> None:
@@ -242,7 +242,7 @@ class QuestionField(QWidget):
         self.set_fonts(font("statement", scale=scale), font("label", scale=scale, weight=600), scale)
         margin, gap = self.horizontal_margin, round(8 * scale)
         self.grid.setContentsMargins(margin, gap, margin, gap)
-        self.set_words_columns(_NUMBER_WIDTH * scale, 24 * scale)
+        self.set_column_widths(_NUMBER_WIDTH * scale, 24 * scale)
 
     @property
     def horizontal_margin(self) -> int:
@@ -254,30 +254,30 @@ class QuestionField(QWidget):
         number = font("cell", scale=scale * 0.9, weight=700 if self.missing else 400)
         self.statement.set_fonts(statement, note, number, _NOTE_GAP * scale)
 
-    def set_words_columns(self, number: float, after: float) -> None:
-        """Set the width of the number's column and the room after the text [px]."""
+    def set_column_widths(self, number: float, after: float) -> None:
+        """Set the width of the number's column and the space after the text [px]."""
         self.statement.set_number_width(round(number))
         self.grid.setColumnMinimumWidth(1, round(after))
 
     def height_in(self, width: int, room: int) -> int:
-        """Return the height that text, note and answer need at a width; ``room`` is available [px]."""
-        self.statement.show_note(self.note or self._words.please_answer, missing=True)  # once Continue is pressed
+        """Return the height that text, note and answer need at a width, if ``room`` is available [px]."""
+        self.statement.show_note(self.note or self._words.please_answer, missing=True)  # as after Continue
         if self._answer is not None:
-            self._answer.updateGeometry()  # the layout keeps what it asked for before
+            self._answer.updateGeometry()  # the layout caches its size hint
         self.grid.invalidate()
         height = self.grid.totalHeightForWidth(width)
         self._update_state()
         return height
 
     def point_at(self, place: int) -> None:
-        """Point at an answer, or (-1) at none; typed answers cannot be pointed at."""
+        """Point at an answer, or at none (-1); overridden by questions with options."""
 
     def set_missing(self, *, missing: bool) -> None:
         self.missing = missing and not self.is_answered
         self._update_state()
 
     def give_answer(self, value: Value) -> None:
-        """Set an answer, and emit it if it is new."""
+        """Set the answer, and emit ``answered`` if it has changed."""
         changed = not self.is_answered or value != self.value
         self.value, self.is_answered, self.missing = value, True, False
         self._update_state()
@@ -292,15 +292,15 @@ class QuestionField(QWidget):
             self.retracted.emit()
 
     def forget_answer(self) -> None:
-        """Discard the answer without a signal, because another answer hid the question."""
+        """Discard the answer without a signal, because another answer has hidden the question."""
         self.value, self.is_answered, self.missing = None, False, False
         self.clear_answer()
         self._update_state()
 
     def clear_answer(self) -> None:
-        """Show no answer; painting follows `value`."""
+        """Show no answer; overridden by fields that do not paint `value`."""
 
-    def keep_answer(self, value: Value) -> None:
+    def set_answer(self, value: Value) -> None:
         """Set the answer without a signal."""
         self.value, self.is_answered, self.missing = value, True, False
         self._update_state()
@@ -321,14 +321,14 @@ class QuestionField(QWidget):
             self._seen = True
             self.seen.emit()
 
-    def _holds_keyboard(self) -> bool:
+    def _contains_focus(self) -> bool:
         focused = self.window().focusWidget()
         return focused is not None and (focused is self or self.isAncestorOf(focused))
 
     def _paint_ground(self, painter: QPainter) -> None:
         theme, scale = PARTICIPANT, self.scale
         ring = QRectF(self.rect()).adjusted(1, 1, -1, -1)
-        focus = self._holds_keyboard()
+        focus = self._contains_focus()
         if focus or self.missing:
             painter.setPen(QPen(QColor(theme.accent), 2) if focus else Qt.PenStyle.NoPen)
             painter.setBrush(QColor(theme.selected))
@@ -360,20 +360,20 @@ class QuestionField(QWidget):
 
 def question_of(part: QWidget) -> QuestionField | None:
     """Return the question that contains a widget."""
-    above: QWidget | None = part
-    while above is not None and not isinstance(above, QuestionField):
-        above = above.parentWidget()
-    return above
+    widget: QWidget | None = part
+    while widget is not None and not isinstance(widget, QuestionField):
+        widget = widget.parentWidget()
+    return widget
 
 
 _CENTRE = int(Qt.AlignmentFlag.AlignCenter | Qt.TextFlag.TextWordWrap)
 _MARK = 19.0
-ROOM = 14.0  # between edge and words
-_TAKEN = _MARK + 6 + ROOM  # of the width, by mark and room
+ROOM = 14.0  # between edge and text
+_TAKEN = _MARK + 6 + ROOM  # width of mark and margins
 NO_WORDS = "–"
-_GROWS = QSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Minimum)
+_EXPANDING = QSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Minimum)
 Look: TypeAlias = Literal["words", "point", "off scale"]
-"""Words that can be chosen, a point of a scale, or an answer off it, with an edge of dashes."""
+"""An option with a text, a point of a scale, or an answer off the scale, which has a dashed edge."""
 
 
 @lru_cache(maxsize=1024)
@@ -385,7 +385,7 @@ def _widest_word(text: str, scale: float) -> float:
 
 @lru_cache(maxsize=1024)
 def _size_of(text: str, scale: float) -> QSize:
-    """Return a clickable size, as wide as the longest word [px]."""
+    """Return the size of an answer, which fits its longest word and is large enough to be clicked [px]."""
     least = target_px(scale)
     return QSize(round(max(least, _widest_word(text, scale) + _TAKEN * scale)), round(least))
 
@@ -397,8 +397,8 @@ def _height_of(text: str, scale: float, width_px: float) -> float:
     return QFontMetricsF(font("chosen", scale=scale)).boundingRect(room, _CENTRE, text).height()
 
 
-class _OpenLook(NamedTuple):
-    """The appearance of an answer that is not chosen: size [px], pointed at, strong text."""
+class _UnchosenLook(NamedTuple):
+    """The appearance of an answer that is not chosen; sizes in px."""
 
     words: str
     look: Look
@@ -413,11 +413,11 @@ class _OpenLook(NamedTuple):
         inset = 0.75 if pointed else 0.5
         body = QRectF(0, 0, self.width, self.height).adjusted(inset, inset, -inset, -inset)
         edge = QPen(QColor(theme.text if pointed else theme.ctl), 1.5 if pointed else 1.0)
-        open_ = self.look == "off scale" and not pointed
-        if open_:
+        is_hollow = self.look == "off scale" and not pointed
+        if is_hollow:
             edge.setDashPattern([3, 3])
         painter.setPen(edge)
-        painter.setBrush(Qt.BrushStyle.NoBrush if open_ else QColor(theme.hover if pointed else theme.surface))
+        painter.setBrush(Qt.BrushStyle.NoBrush if is_hollow else QColor(theme.hover if pointed else theme.surface))
         painter.drawRoundedRect(body, RADIUS_CONTROL * scale, RADIUS_CONTROL * scale)
         painter.setFont(font("cell", scale=scale))
         painter.setPen(QColor(theme.text if self.strong else theme.text2))
@@ -425,21 +425,21 @@ class _OpenLook(NamedTuple):
 
 
 @lru_cache(maxsize=256)
-def _answer_picture(look: _OpenLook, ground: str) -> QImage:
-    """Return the picture of an answer on a plain background."""
-    made = QImage(look.width, look.height, QImage.Format.Format_RGB32)
-    made.fill(QColor(ground))
-    painter = QPainter(made)
+def _answer_picture(look: _UnchosenLook, ground: str) -> QImage:
+    """Return the picture of an answer that is not chosen, on the background ``ground``."""
+    image = QImage(look.width, look.height, QImage.Format.Format_RGB32)
+    image.fill(QColor(ground))
+    painter = QPainter(image)
     painter.setRenderHint(QPainter.RenderHint.Antialiasing)
     look.paint(painter)
     painter.end()
-    return made
+    return image
 
 
 class OptionLook(Button):
-    """The appearance of an answer: the whole rectangle is clickable; shape, fill and check mark show the choice.
+    """The appearance of an answer; its whole rectangle is clickable, and shape, fill and check mark show the choice.
 
-    ``place`` is its index among the answers of its question, which is notified when the pointer enters and leaves.
+    ``place`` is the index among the answers of the question, which is notified when the pointer enters or leaves.
     """
 
     place = -1
@@ -456,7 +456,7 @@ class OptionLook(Button):
         self.setAccessibleDescription(description)
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)  # the question has the keyboard focus
         self.setCursor(Qt.CursorShape.PointingHandCursor)
-        self.setSizePolicy(_GROWS)
+        self.setSizePolicy(_EXPANDING)
 
     def set_scale(self, scale: float) -> None:
         self._scale = scale
@@ -464,7 +464,7 @@ class OptionLook(Button):
         self.update()
 
     def show_pointed(self, pointed: bool) -> None:
-        """Show the mouse pointer, or the keyboard's pointer, on this answer."""
+        """Show whether mouse or keyboard point at this answer."""
         if pointed != self.pointed:
             self.pointed = pointed
             self.update()
@@ -479,7 +479,7 @@ class OptionLook(Button):
         return self.sizeHint()
 
     def hasHeightForWidth(self) -> bool:
-        """Return True if the text wraps; scale points are short."""
+        """Return whether the text wraps; points of a scale are too short to wrap."""
         return self._look != "point"
 
     def heightForWidth(self, width: int) -> int:
@@ -488,27 +488,27 @@ class OptionLook(Button):
 
     def enterEvent(self, event: QEnterEvent) -> None:
         super().enterEvent(event)
-        self._tell_pointed(self.place)
+        self._notify_question(self.place)
 
     def leaveEvent(self, event: QEvent) -> None:
         super().leaveEvent(event)
-        self._tell_pointed(-1)
+        self._notify_question(-1)
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
         super().mouseReleaseEvent(event)
         if event.device().type() == QInputDevice.DeviceType.TouchScreen:
-            self._tell_pointed(-1)
+            self._notify_question(-1)
 
-    def _tell_pointed(self, place: int) -> None:
+    def _notify_question(self, place: int) -> None:
         if (question := question_of(self)) is not None:
             question.point_at(place)
 
     def paintEvent(self, _event: QPaintEvent) -> None:
-        """Draw the answer; points look the same in all questions and are drawn only once."""
+        """Paint the answer; pictures of points are cached, since they look the same in all questions."""
         painter = page_painter(self)
         in_focus = self._has_focus()
         strong = self._look == "words" or self.pointed or in_focus
-        look = _OpenLook(self._words, self._look, self._scale, self.width(), self.height(), self.pointed, strong)
+        look = _UnchosenLook(self._words, self._look, self._scale, self.width(), self.height(), self.pointed, strong)
         if self.isChecked():
             self._paint_chosen(painter)
         elif self._look == "point" and self.devicePixelRatioF() == 1 and self.window().graphicsProxyWidget() is None:
@@ -538,28 +538,28 @@ class OptionLook(Button):
         width = QFontMetricsF(face).boundingRect(room, _CENTRE, text).width()
         left = body.center().x() - (mark + gap + width) / 2
         flip = self.layoutDirection() == Qt.LayoutDirection.RightToLeft
-        x_mark, x_words = (left + width + gap, left) if flip else (left, left + mark + gap)
-        draw_icon(painter, "check", QRectF(x_mark, body.center().y() - mark / 2, mark, mark), theme.on_accent, 2.4)
+        mark_x, text_x = (left + width + gap, left) if flip else (left, left + mark + gap)
+        draw_icon(painter, "check", QRectF(mark_x, body.center().y() - mark / 2, mark, mark), theme.on_accent, 2.4)
         painter.setFont(face)
         painter.setPen(QColor(theme.on_accent))
-        painter.drawText(QRectF(x_words - 1, 0, width + 2, body.height()), _CENTRE, text)
+        painter.drawText(QRectF(text_x - 1, 0, width + 2, body.height()), _CENTRE, text)
 
 
 class RadioOption(OptionLook, QRadioButton):
-    """One of several answers."""
+    """An answer that excludes the others."""
 
 
 class CheckOption(OptionLook, QCheckBox):
-    """One of several answers that can be combined."""
+    """An answer that can be combined with others."""
 
 
 _MOST_DIGITS = 9
 
 
 class OptionsField(QuestionField):
-    """Digits choose; arrows move a separate pointer, at which Space chooses; mouse and touch choose, too.
+    """A question with options, which digits, mouse and touch choose; arrows move a pointer, at which Space chooses.
 
-    ``pointed_at(place)`` carries the option at which mouse or keyboard point, -1 for none.
+    ``pointed_at(place)`` carries the index of the option at which mouse or keyboard point, -1 for none.
     """
 
     several = False
@@ -571,7 +571,7 @@ class OptionsField(QuestionField):
     def set_options(self, options: Sequence[OptionLook]) -> None:
         self.options = options
         self._group = QButtonGroup(self, exclusive=not self.several)
-        # Not the methods themselves: Qt would forget the role of this widget (`give_role`).
+        # Connecting the methods themselves would make Qt forget the role of this widget (`give_role`).
         self._group.idClicked.connect(lambda place: self._choose_by_click(place))  # noqa: PLW0108
         self._group.idToggled.connect(lambda place, on: self._toggle(place, on))  # noqa: PLW0108
         for place, option in enumerate(options):
@@ -596,7 +596,7 @@ class OptionsField(QuestionField):
         raise NotImplementedError
 
     def show_answer(self, value: Value) -> None:
-        self.keep_answer(value)
+        self.set_answer(value)
         self._check()
 
     def clear_answer(self) -> None:
@@ -610,7 +610,7 @@ class OptionsField(QuestionField):
             option.set_scale(scale)
 
     def point_at(self, place: int) -> None:
-        """Point at an option, at none with -1."""
+        """Point at the option with an index, or at none (-1)."""
         if place == self.pointed:
             return
         self.pointed = place
@@ -619,7 +619,7 @@ class OptionsField(QuestionField):
         self.pointed_at.emit(place)
 
     def choose(self, place: int, *, by_key: bool) -> None:
-        """Answer with an option; an answer by key leads to the next question."""
+        """Answer with an option; after an answer ``by_key``, the next question gets the focus."""
         self.give_answer(self.value_at(place))
         self._check()
         point_screen_reader_at(self.options[place])
@@ -627,10 +627,10 @@ class OptionsField(QuestionField):
             self.left.emit()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Choose with digits and Space, point with left and right; other keys go to the page."""
+        """Choose with digits and Space, and point with left and right; the page handles other keys."""
         number = digit_of(event)
-        plain = not event.modifiers() & Qt.KeyboardModifier.ControlModifier
-        if number is not None and 1 <= number <= self.digits and plain:
+        has_no_control = not event.modifiers() & Qt.KeyboardModifier.ControlModifier
+        if number is not None and 1 <= number <= self.digits and has_no_control:
             self.choose(number - 1, by_key=True)
         elif event.key() in (Qt.Key.Key_Left, Qt.Key.Key_Right):
             self._point_by(self.forward if event.key() == Qt.Key.Key_Right else -self.forward)
@@ -659,7 +659,7 @@ class OptionsField(QuestionField):
             self.choose(place, by_key=False)
 
     def _toggle(self, place: int, on: bool) -> None:
-        """Choose an option that a click or a screen reader checked."""
+        """Choose an option that was checked by a click or a screen reader."""
         if on != (place in self.chosen) and (on or self.several):
             self.choose(place, by_key=False)
 
@@ -672,7 +672,7 @@ class OptionsField(QuestionField):
 
 
 class ScaleField(OptionsField):
-    """A row of points; "cannot judge" is separate, at the end of the line."""
+    """A question with a row of points and, separately at the end, "cannot judge"."""
 
     labels: tuple[str, ...] = ()
 
@@ -694,7 +694,7 @@ class ScaleField(OptionsField):
 
     @property
     def answer_keys(self) -> str:
-        """The digits of its points; points beyond 9 are reached by the arrows."""
+        """The digits of the points; arrows reach points beyond 9."""
         return f"1–{self.digits}"
 
     @property
@@ -704,7 +704,7 @@ class ScaleField(OptionsField):
         return (self.value - 1 if isinstance(self.value, int) else len(self.points),)
 
     def value_at(self, place: int) -> Value:
-        """Return the point, None off the scale."""
+        """Return the number of the point, or None for the off-scale answer."""
         return place + 1 if place < len(self.points) else None
 
     def spoken_answer(self) -> str:
@@ -716,17 +716,17 @@ _VERTICAL = (Qt.Key.Key_Up, Qt.Key.Key_Down)
 
 
 class EntryKeys(Widget):
-    """A text widget that leaves Esc to the window and other keys to the page, and shows its question's focus ring."""
+    """A text widget that leaves Esc to the window and some keys to the page, and updates its question's focus ring."""
 
-    def leaves_to_page(self, event: QKeyEvent) -> bool:
-        """Return whether a key has no meaning in the field, so that the page handles it."""
+    def is_left_to_page(self, event: QKeyEvent) -> bool:
+        """Return whether the page handles a key, because it has no meaning in the field."""
         return event.key() in (*ENTER, *_VERTICAL)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         escape = event.key() == Qt.Key.Key_Escape
         if escape and (question := question_of(self)) is not None:
-            question.finish()  # before a pause replaces the page
-        if escape or self.leaves_to_page(event):
+            question.finish()  # now, since a pause will replace the page
+        if escape or self.is_left_to_page(event):
             event.ignore()
         else:
             super().keyPressEvent(event)
@@ -744,13 +744,13 @@ class EntryKeys(Widget):
 
 
 class TypedField(QuestionField):
-    """A typed answer, which is accepted when typing pauses, and at the latest when the question is left."""
+    """A question with a typed answer, which is accepted when typing pauses or the question loses the focus."""
 
-    def give_keyboard_to(self, entry: QWidget, wait_ms: int, take: Callable[[], object]) -> None:
-        """Give ``entry`` the focus; call ``take`` this time after the last key press."""
+    def set_entry(self, entry: QWidget, wait_ms: int, accept: Callable[[], object]) -> None:
+        """Make ``entry`` the question's entry; call ``accept`` when typing has paused for ``wait_ms``."""
         self.setFocusProxy(entry)
         self._timer = QTimer(self, singleShot=True, interval=wait_ms)
-        self._timer.timeout.connect(take)
+        self._timer.timeout.connect(accept)
 
     def typed_text(self) -> str:
         raise NotImplementedError

@@ -1,4 +1,4 @@
-"""The questionnaire: all statements of a setting on one page, answered with mouse, keyboard or touch alone."""
+"""The questionnaire: all statements of a setting on one page, which can be answered by mouse, keyboard or touch."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from study_app.session.pages import QuestionnairePage
 
 _LEAST_CELL = 44.0
 _NARROW = 900.0
-_FEW = 5  # statements a page at most where a window is too small for all of them
+_FEW = 5  # maximum statements per page in a window that is too narrow for all
 _NUMBER = 32.0
 _AFTER_STATEMENT = 16.0
 _CELL_GAP = 6.0
@@ -31,11 +31,11 @@ _POINTS = 7
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Asked:
-    """The measured texts of a questionnaire at scale 1 [px].
+class TextWidths:
+    """The widths of a questionnaire's texts at scale 1 [px].
 
-    ``statement`` is the width of the longest statement on one line, ``judge`` that of the longest word above the column
-    "cannot judge", 0 without it, and ``word`` that of the labels above the scale.
+    ``statement`` is the width of the longest statement on one line, ``judge`` that of the longest word in "cannot
+    judge" (0 without it), and ``word`` that of the longest word in the scale's labels.
     """
 
     statement: float
@@ -73,49 +73,49 @@ class Grid:
     def can_be_hit(self) -> bool:
         return min(self.cell_height, self.cell_width) >= _LEAST_CELL * self.scale - 0.01
 
-    def with_rows(self, room: float, per_page: int) -> Grid:
-        """Return the sizes if ``room`` [px] is divided among ``per_page`` rows."""
+    def divide_rows(self, room: float, per_page: int) -> Grid:
+        """Return the sizes with ``room`` [px] divided among ``per_page`` rows."""
         return replace(self, pitch=math.floor(min(room / per_page, 68 * self.text)))
 
 
 def _part_sizes(items: int, width: float) -> Iterator[int]:
-    """Yield the possible numbers of statements per page, the largest first: all, then even parts."""
+    """Yield the numbers of statements per page to try: all, then those that divide the statements evenly."""
     if width >= _NARROW:
         yield items
     for most in range(min(_FEW, items), 0, -1):
         yield math.ceil(items / math.ceil(items / most))
 
 
-def grid(width: float, height: float, asked: Asked, margin: float, *, text_scale: float = 1.0) -> Grid:
-    """Return the column widths in a window; ``margin`` is between its edges and the text [logical px].
+def grid(width: float, height: float, texts: TextWidths, margin: float, *, text_scale: float = 1.0) -> Grid:
+    """Return the column widths in a window, with ``margin`` between its edges and the text [logical px].
 
-    Texts are enlarged by at least ``text_scale``. Rows may be too low for their texts or cells: see `Grid.can_be_hit`.
+    Texts are enlarged by at least ``text_scale``. Rows may be too low for their texts or cells (see `Grid.can_be_hit`).
     """
     scale = page_scale(width, height)
     text = font_scale(width, height, text_scale)
     content = width - 2 * margin
-    roomy = content >= 1100
-    judge = max((112 if roomy else 92) * scale, asked.judge * text + 8 * scale) if asked.judge else 0.0
-    gap = (42 if roomy else 24) * scale if asked.judge else 0.0
-    number, after = _NUMBER * text, _AFTER_STATEMENT * scale
-    wide = content - number - after - judge - gap
-    statements = 400 * scale if text <= scale else 480 * text  # statements get as much as they need; cells shrink first
-    narrowest = max(52 * scale, asked.word * text / 2 + 2)  # a label may be twice as wide as its column
-    fewest = min(max((wide - statements) / _POINTS, narrowest), max(98 * scale, narrowest))
-    pitch = min(max((wide - asked.statement * text - 8) / _POINTS, fewest), 120 * max(scale, 0.8 * text))
+    is_wide = content >= 1100
+    judge = max((112 if is_wide else 92) * scale, texts.judge * text + 8 * scale) if texts.judge else 0.0
+    gap = (42 if is_wide else 24) * scale if texts.judge else 0.0
+    number_width, statement_gap = _NUMBER * text, _AFTER_STATEMENT * scale
+    available = content - number_width - statement_gap - judge - gap
+    statements = 400 * scale if text <= scale else 480 * text  # cells shrink before statements do
+    narrowest = max(52 * scale, texts.word * text / 2 + 2)  # a label may be as available as two columns
+    fewest = min(max((available - statements) / _POINTS, narrowest), max(98 * scale, narrowest))
+    pitch = min(max((available - texts.statement * text - 8) / _POINTS, fewest), 120 * max(scale, 0.8 * text))
     return Grid(
         scale=scale,
         text=text,
         tight=height < 740 * text,
-        number_width=number,
-        statement_width=wide - _POINTS * pitch + _CELL_GAP * scale,
+        number_width=number_width,
+        statement_width=available - _POINTS * pitch + _CELL_GAP * scale,
         cell_pitch=pitch,
         judge_gap=gap,
         judge_width=judge,
     )
 
 
-_SHRINKING = (1.0, 0.94, 0.88, 0.82, 0.76)  # factors tried on enlarged text if the window is too small
+_SHRINKING = (1.0, 0.94, 0.88, 0.82, 0.76)  # factors by which text is reduced if the window is too small
 _WRAP_LEFT = int(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignTop | Qt.TextFlag.TextWordWrap)
 
 _Fitted: TypeAlias = tuple[QFont, QFont, float, float]
@@ -123,13 +123,13 @@ _Fitted: TypeAlias = tuple[QFont, QFont, float, float]
 
 @lru_cache(maxsize=256)
 def _statement_height(text: str, scale: float, weight: int, width_px: int) -> float:
-    """Return the height of a statement wrapped at a width [px]; cached, since pages of statements recur."""
+    """Return the height of a statement wrapped at a width [px]; cached, since pages recur."""
     room = QRectF(0, 0, width_px, 1e4)
     return QFontMetricsF(font("statement", scale=scale, weight=weight)).boundingRect(room, _WRAP_LEFT, text).height()
 
 
 class StatementField(ScaleField):
-    """A statement with its cells, whose labels are shown once above the columns of all statements."""
+    """A row with a statement and its cells; the labels are shown once, above the columns of all statements."""
 
     def __init__(
         self, view: ItemView, labels: tuple[str, ...], judge: str | None, wording: Words, parent: QWidget
@@ -152,7 +152,7 @@ class StatementField(ScaleField):
 
     @property
     def note(self) -> str:
-        """The small line below the focused statement: the keys that answer it."""
+        """The note below the statement; if a missing one has the focus, with the keys that answer it."""
         if self.missing and self.hasFocus():
             return f"{self._words.please_answer} · {self._words.press_keys}"
         return super().note
@@ -167,14 +167,14 @@ class StatementField(ScaleField):
         """The position of the rule between the scale and "cannot judge" [px]; None without that answer."""
         if self.judge is None:
             return None
-        (first, _), (last, width), (left, wide) = (self.columns[place] for place in (0, -2, -1))
-        return (left + wide + first) / 2 if left < first else (last + width + left) / 2
+        (first, _), (last, width), (left, judge_width) = (self.columns[place] for place in (0, -2, -1))
+        return (left + judge_width + first) / 2 if left < first else (last + width + left) / 2
 
     def set_sizes(self, sizes: Grid) -> None:
         self.sizes, self.scale = sizes, sizes.scale
         margin = self.horizontal_margin
         self.grid.setContentsMargins(margin, 0, margin, 0)
-        self.set_words_columns(sizes.number_width, _AFTER_STATEMENT * sizes.scale)
+        self.set_column_widths(sizes.number_width, _AFTER_STATEMENT * sizes.scale)
         width, height = math.floor(sizes.cell_width), math.floor(sizes.cell_height + 0.01)
         self.cells.setSpacing(round(_CELL_GAP * sizes.scale))
         for point in self.points:
@@ -196,10 +196,12 @@ class StatementField(ScaleField):
 
         Text that has a required size (``sizes.text`` beyond ``sizes.scale``) is not reduced; a note may be.
         """
-        must = sizes.text > sizes.scale
-        shrunk = ((1.0, 1.0), (1.0, sizes.scale / sizes.text)) if must else ((s, max(s, 0.88)) for s in _SHRINKING)
-        for shrink, note_shrink in shrunk:
-            fitted = self._measured_fonts(sizes, note, shrink, note_shrink)
+        is_required = sizes.text > sizes.scale
+        factors = (
+            ((1.0, 1.0), (1.0, sizes.scale / sizes.text)) if is_required else ((s, max(s, 0.88)) for s in _SHRINKING)
+        )
+        for shrink, note_shrink in factors:
+            fitted = self._measure_fonts(sizes, note, shrink, note_shrink)
             if fitted[2] + fitted[3] <= sizes.pitch - 3 * sizes.scale:
                 return fitted
         return None
@@ -213,14 +215,14 @@ class StatementField(ScaleField):
         self._update_state()
 
     def _smallest_fonts(self, sizes: Grid, note: str) -> _Fitted:
-        """Return the fonts of a row that is the only one on its page and still too low."""
+        """Return the fonts for a row that is too low even as the only one on its page."""
         for percent in range(95, 30, -5):
-            fitted = self._measured_fonts(sizes, note, percent / 100, percent / 100)
+            fitted = self._measure_fonts(sizes, note, percent / 100, percent / 100)
             if fitted[2] + fitted[3] <= sizes.pitch - 3 * sizes.scale:
                 break
         return fitted
 
-    def _measured_fonts(self, sizes: Grid, note: str, shrink: float, note_shrink: float) -> _Fitted:
+    def _measure_fonts(self, sizes: Grid, note: str, shrink: float, note_shrink: float) -> _Fitted:
         weight = 500 if self.missing or self.hasFocus() else 400
         face = font("statement", scale=sizes.text * shrink, weight=weight)
         note_face = font("label", scale=sizes.text * note_shrink, weight=600)
@@ -247,15 +249,15 @@ class StatementField(ScaleField):
         painter.drawLine(QPointF(x, middle - half), QPointF(x, middle + half))
 
 
-_NOTE_SIGN = 1.6  # width of the sign in front of a note with its gap, in heights of the note's line
-_LABEL_WIDTH = 98.0  # in which a label over a column wraps, where there is room
-_SHARES = (1.0, 1.2, 1.4, 1.6, 1.8)
+_NOTE_SIGN = 1.6  # width of a note's sign and its gap, in line heights of the note
+_LABEL_WIDTH = 98.0  # width at which a label above a column wraps if there is space [px at scale 1]
+_LABEL_WIDTHS = (1.0, 1.2, 1.4, 1.6, 1.8)
 
 
 def _label_height(labels: tuple[str, ...], widest: float) -> float:
     """Return the height of labels at scale 1 wrapped at ``widest`` px [px]."""
     metrics = QFontMetricsF(font("label", weight=600))
-    room = QRectF(0, 0, min(_LABEL_WIDTH, 0.95 * widest), 1e3)  # letter widths are not quite proportional to the size
+    room = QRectF(0, 0, min(_LABEL_WIDTH, 0.95 * widest), 1e3)  # letter widths do not quite scale
     return max((metrics.boundingRect(room, _WRAP_LEFT, text).height() for text in labels), default=0.0)
 
 
@@ -265,7 +267,7 @@ def _widest_word(metrics: QFontMetricsF, text: str) -> float:
 
 
 class _Heading(QWidget):
-    """The labels above the columns: both ends and the middle, and the one that is pointed at.
+    """The labels above the columns: the ends, the middle, and the label of the column that is pointed at.
 
     ``row`` returns a displayed row, whose cells define the columns.
     """
@@ -291,7 +293,7 @@ class _Heading(QWidget):
         self.update()
 
     def show_pointed(self, column: int) -> None:
-        """Show the label of ``column`` as well, -1 for none."""
+        """Show the label of ``column`` as well; -1 for none."""
         if column != self._pointed:
             self._pointed = column
             self.update()
@@ -312,7 +314,7 @@ class _Heading(QWidget):
         painter.end()
 
     def columns(self) -> set[int]:
-        """Return the columns with a visible label; labels in the way of the pointed one are hidden."""
+        """Return the columns with a visible label; labels that would overlap the pointed one are hidden."""
         if self._pointed < 0:
             return self._fixed
         neighbours = {
@@ -328,13 +330,13 @@ class _Heading(QWidget):
 
     def _fits(self, column: int, width: float) -> bool:
         """Return whether a label fits ``width`` [px] and the height of the heading."""
-        assert self._sizes is not None  # noqa: S101  # asked only when laid out
+        assert self._sizes is not None  # noqa: S101  # called only after layout
         metrics = QFontMetricsF(font("label", scale=self._sizes.text, weight=600))
         bounds = metrics.boundingRect(QRectF(0, 0, width, 1e4), _WRAP_LEFT, self._labels[column])
         return bounds.width() <= width and bounds.height() <= self.height() + 1
 
     def _bounds(self, column: int) -> tuple[float, float]:
-        """Return the left and right limits of a label [px]; labels of the scale do not cross the rule at its end."""
+        """Return the left and right limits of a label [px]; labels of the scale end at the rule."""
         row = self._row()
         if row.rule is None or column == _POINTS:
             return 0.0, self.width()
@@ -342,23 +344,23 @@ class _Heading(QWidget):
 
     def column_area(self, column: int) -> QRectF:
         """Return the area of a label: its column, extended on either side as needed, within the row."""
-        assert self._sizes is not None  # noqa: S101  # painted only when laid out
+        assert self._sizes is not None  # noqa: S101  # called only after layout
         left, width = self._row().columns[column]
         pitch = min(self._sizes.cell_pitch, _LABEL_WIDTH * self._sizes.text) if column < _POINTS else width
-        wide = next((pitch * share for share in _SHARES if self._fits(column, pitch * share)), 2 * pitch)
+        label_width = next((pitch * share for share in _LABEL_WIDTHS if self._fits(column, pitch * share)), 2 * pitch)
         low, high = self._bounds(column)
-        middle = max(min(left + width / 2, high - wide / 2), low + wide / 2)
-        return QRectF(middle - wide / 2, 0, wide, self.height())
+        middle = max(min(left + width / 2, high - label_width / 2), low + label_width / 2)
+        return QRectF(middle - label_width / 2, 0, label_width, self.height())
 
 
 class QuestionnaireWidget(QuestionsPage):
-    """Statements that are rated on one scale: rows, with the scale's labels above their columns."""
+    """A page of statements that are rated on one scale, with the scale's labels above the columns."""
 
     fields: tuple[StatementField, ...]
 
     def __init__(self, page: QuestionnairePage, context: PageContext) -> None:
         super().__init__(page, context)
-        self._heading = _Heading(page.labels, page.cannot_judge, self._row_shown, self)
+        self._heading = _Heading(page.labels, page.cannot_judge, self._visible_row, self)
         self.questions.insertWidget(0, self._heading)
         for field in self.fields:
             field.pointed_at.connect(self._heading.show_pointed)
@@ -366,7 +368,7 @@ class QuestionnaireWidget(QuestionsPage):
     def make_field(self, item: ItemView) -> QuestionField:
         return StatementField(item, self._page.labels, self._page.cannot_judge, self._words, self)
 
-    def missing_words(self, numbers: Sequence[int]) -> str:
+    def missing_message(self, numbers: Sequence[int]) -> str:
         return self._words.missing(numbers)
 
     @property
@@ -382,37 +384,35 @@ class QuestionnaireWidget(QuestionsPage):
         return [list(asked[first : first + per_page]) for first in range(0, len(asked), per_page)]
 
     def lead_height(self) -> int:
-        """Return the height above the statements [px]: few statements start at a third of the page's height."""
-        room, needed = (
-            self.room_height(tabs=False),
-            self._heading.height() + sum(it.minimumHeight() for it in self.fields),
-        )
-        few = len(self.parts) == 1 and 2 * needed <= room
-        return max(0, self.foot.height() + room - 2 * self.height() // 3) if few else 0
+        """Return the height above the statements [px]; a is_short statements start at a third of the page's height."""
+        room = self.room_height(tabs=False)
+        needed = self._heading.height() + sum(field.minimumHeight() for field in self.fields)
+        is_short = len(self.parts) == 1 and 2 * needed <= room
+        return max(0, self.foot.height() + room - 2 * self.height() // 3) if is_short else 0
 
-    def _row_shown(self) -> StatementField:
+    def _visible_row(self) -> StatementField:
         part = self.part
         return next((field for field in self.fields if field in part), self.fields[0])
 
     def _sizes(self) -> tuple[Grid, int]:
         """Return the sizes of the rows, and the number of rows per part."""
-        page, many = self._page, len(self.fields)
-        bare, label = QFontMetricsF(font("statement")), QFontMetricsF(font("label", weight=600))
-        off = () if page.cannot_judge is None else (page.cannot_judge,)
-        asked = Asked(
-            statement=max(bare.horizontalAdvance(field.view.text) for field in self.fields),
-            judge=_widest_word(label, page.cannot_judge or ""),
-            word=max(_widest_word(label, text) for text in page.labels),
+        page, count = self._page, len(self.fields)
+        metrics, label_metrics = QFontMetricsF(font("statement")), QFontMetricsF(font("label", weight=600))
+        judge_labels = () if page.cannot_judge is None else (page.cannot_judge,)
+        texts = TextWidths(
+            statement=max(metrics.horizontalAdvance(field.view.text) for field in self.fields),
+            judge=_widest_word(label_metrics, page.cannot_judge or ""),
+            word=max(_widest_word(label_metrics, text) for text in page.labels),
         )
-        across = grid(self.width(), self.height(), asked, self.margin, text_scale=self._text_scale)
-        text, scale, tight = across.text, across.scale, across.tight
-        named, judged = 2 * across.cell_pitch / text, across.judge_width / text
-        labels = max(_label_height(page.labels, named), _label_height(off, judged)) * text * 1.03
+        columns = grid(self.width(), self.height(), texts, self.margin, text_scale=self._text_scale)
+        text, scale, tight = columns.text, columns.scale, columns.tight
+        named, judged = 2 * columns.cell_pitch / text, columns.judge_width / text
+        labels = max(_label_height(page.labels, named), _label_height(judge_labels, judged)) * text * 1.03
         self._heading.setFixedHeight(round(labels + (2 if tight else 10) * scale))
         note = self._words.please_answer
-        for per_page in _part_sizes(many, self.width()):
-            room = self.room_height(tabs=per_page < many) - self._heading.height()
-            sizes = across.with_rows(room - (2 if tight else 8) * scale, per_page)
+        for per_page in _part_sizes(count, self.width()):
+            room = self.room_height(tabs=per_page < count) - self._heading.height()
+            sizes = columns.divide_rows(room - (2 if tight else 8) * scale, per_page)
             if sizes.can_be_hit and all(field.fits(sizes, note) for field in self.fields):
                 break
         return sizes, per_page

@@ -1,4 +1,4 @@
-"""The fields of a participant's form, one class for each kind of question."""
+"""The question fields of a form, one class for each kind of question."""
 
 from __future__ import annotations
 
@@ -40,13 +40,13 @@ from study_app.protocol.questions import (
 from study_app.protocol.source import UNPRINTABLE, characters
 from study_app.protocol.wording import Words
 
-_SHORT = 12  # letters of options of which three stand side by side
-_MEDIUM = 28  # of which two do
-_MOST_ACROSS = 4
+_SHORT = 12  # letters of an option up to which three are side by side
+_MEDIUM = 28  # up to which two are
+_MAX_COLUMNS = 4
 
 
 class _ChoiceField(OptionsField):
-    """Options in a grid; with several, a key or click adds or removes one."""
+    """A question with a grid of options; if several are possible, a key or click adds or removes one."""
 
     widget_id: ClassVar[str] = "choice"
 
@@ -59,10 +59,10 @@ class _ChoiceField(OptionsField):
         kind = CheckOption if view.several else RadioOption
         self.set_options([kind(text, text, view.text, self) for _, text in view.options])
         longest = max(len(text) for _, text in view.options)
-        self._across = min(len(self.options), 3 if longest <= _SHORT else 2 if longest <= _MEDIUM else 1)
+        self._columns = min(len(self.options), 3 if longest <= _SHORT else 2 if longest <= _MEDIUM else 1)
         area = QWidget(self)
         self._cells = grid(margins=0, parent=area)
-        self._arrange_options(self._across)
+        self._arrange_options(self._columns)
         self.put_answer_part(area)
 
     @property
@@ -76,8 +76,8 @@ class _ChoiceField(OptionsField):
 
     @property
     def chosen(self) -> tuple[int, ...]:
-        given = self.value if isinstance(self.value, tuple) else (self.value,)
-        return tuple(place for place, option in enumerate(self._ids) if option in given)
+        answers = self.value if isinstance(self.value, tuple) else (self.value,)
+        return tuple(place for place, option in enumerate(self._ids) if option in answers)
 
     def value_at(self, place: int) -> Value:
         return self._ids[place]
@@ -86,44 +86,46 @@ class _ChoiceField(OptionsField):
         return self._words.joined([self._texts[self._ids[place]] for place in self.chosen])
 
     def height_in(self, width: int, room: int) -> int:
-        """Return the height at a width [px], with more options side by side if there is too little room."""
-        for across in range(self._across, min(_MOST_ACROSS, len(self.options)) + 1):
-            self._arrange_options(across)
+        """Return the height at a width [px], with more options side by side if there is too little space."""
+        for columns in range(self._columns, min(_MAX_COLUMNS, len(self.options)) + 1):
+            self._arrange_options(columns)
             if (height := super().height_in(width, room)) <= room:
                 return height
         return height
 
-    def _arrange_options(self, across: int) -> None:
+    def _arrange_options(self, columns: int) -> None:
         for number, option in enumerate(self.options):
-            self._cells.addWidget(option, number // across, number % across)
-        for column in range(_MOST_ACROSS):
-            self._cells.setColumnStretch(column, 1 if column < across else 0)
+            self._cells.addWidget(option, number // columns, number % columns)
+        for column in range(_MAX_COLUMNS):
+            self._cells.setColumnStretch(column, 1 if column < columns else 0)
 
     def set_scale(self, scale: float) -> None:
         super().set_scale(scale)
         self._cells.setSpacing(round(8 * scale))
 
     def choose(self, place: int, *, by_key: bool) -> None:
-        """Answer with an option; with several possible, add or remove it."""
+        """Answer with an option; if several are possible, add or remove it."""
         if not self.several:
             super().choose(place, by_key=by_key)
             return
-        before = self.chosen
-        if now := tuple(option for number, option in enumerate(self._ids) if (number in before) != (number == place)):
-            self.give_answer(now)
+        chosen = self.chosen
+        if answer := tuple(
+            option for number, option in enumerate(self._ids) if (number in chosen) != (number == place)
+        ):
+            self.give_answer(answer)
         else:
             self.retract_answer()
         self._check()
         point_screen_reader_at(self.options[place])
 
 
-_ACROSS = 6
+_KEYS_PER_ROW = 6
 _WAIT_MS = 400
 _FIELD_WIDTH = 120.0
 
 
 class Entry(EntryKeys, QLineEdit):
-    """The entry field, without Qt's context menu, which would be in English."""
+    """A line edit without Qt's context menu, which would be in English."""
 
     def __init__(self, parent: QWidget) -> None:
         super().__init__(parent)
@@ -131,7 +133,7 @@ class Entry(EntryKeys, QLineEdit):
 
 
 class _NumberField(TypedField):
-    """A number with point or comma; any other entry is reported and not accepted."""
+    """A question with a number, with point or comma; other entries are rejected with a reason."""
 
     widget_id: ClassVar[str] = "number"
 
@@ -142,11 +144,11 @@ class _NumberField(TypedField):
         self.entry = Entry(self)
         self.entry.setAccessibleName(" ".join(filter(None, (view.text, view.unit))))
         self.entry.setMaxLength(20)
-        self.entry.textChanged.connect(self._note_edit)
+        self.entry.textChanged.connect(self._restart_wait)
         self._unit = PlainLabel(view.unit)
         self._unit.setStyleSheet(f"color: {PARTICIPANT.text2}; background: transparent;")
-        more = (*(() if view.whole else (wording.decimal_sign,)), *self._signs())
-        self._pad = DigitPad(self.entry, more, _ACROSS, wording.delete_digit, self)
+        more = (*(() if view.whole else (wording.decimal_sign,)), *self._sign_keys())
+        self._pad = DigitPad(self.entry, more, _KEYS_PER_ROW, wording.delete_digit, self)
         self._wrong = PlainLabel(wraps=True)
         self._wrong.setStyleSheet(f"color: {PARTICIPANT.warn}; background: transparent;")
         self._wrong.hide()
@@ -154,7 +156,7 @@ class _NumberField(TypedField):
         area = QWidget(self)
         vbox(self._row, self._wrong, margins=0, parent=area)
         self.put_answer_part(area)
-        self.give_keyboard_to(self.entry, _WAIT_MS, self._take_number)
+        self.set_entry(self.entry, _WAIT_MS, self._accept_number)
 
     @property
     def keys(self) -> list[QPushButton]:
@@ -166,7 +168,7 @@ class _NumberField(TypedField):
         return self._wrong.text()
 
     def show_answer(self, value: Value) -> None:
-        self.keep_answer(value)
+        self.set_answer(value)
         if isinstance(value, int | float):
             self._write_text(write_number(value, 9, self._words.decimal_sign))
 
@@ -186,7 +188,7 @@ class _NumberField(TypedField):
         self._pad.set_size(side, side, round(6 * scale), font("cell", scale=scale))
 
     def height_in(self, width: int, room: int) -> int:
-        """Return the height that the question needs with a reported problem [px]."""
+        """Return the height of the question with the longest problem [px]."""
         problem = self._wrong.text()
         unclear = self._words.unclear_number("888,888") or self._words.unclear_number("888.888")
         self._wrong.setText(problem or max(unclear, self._expected_sentence(), key=len))
@@ -216,20 +218,20 @@ class _NumberField(TypedField):
         self.give_answer(plain_number(number))
         return True
 
-    def _signs(self) -> tuple[str, ...]:
-        below = self._number.least is None or self._number.least < 0
-        return ("-",) if below else ()
+    def _sign_keys(self) -> tuple[str, ...]:
+        allows_negative = self._number.least is None or self._number.least < 0
+        return ("-",) if allows_negative else ()
 
     def _write_text(self, text: str) -> None:
         with QSignalBlocker(self.entry):
             self.entry.setText(text)
 
-    def _note_edit(self) -> None:
+    def _restart_wait(self) -> None:
         self._show_problem("")
         self._timer.start()
 
-    def _take_number(self) -> None:
-        """Accept the text typed so far if it is a number; nothing is reported while typing."""
+    def _accept_number(self) -> None:
+        """Accept the text typed so far if it is a valid number; no problem is shown while typing."""
         number = read_number(self.entry.text(), self._words.decimal_sign)
         if number is not None and self._number.permits(number):
             self.give_answer(plain_number(number))
@@ -259,12 +261,12 @@ class _NumberField(TypedField):
             announce(self.entry, problem)
 
 
-_JUDGE_SHARE = 2  # of the row, where every point has one
-_ALL_NAMED = 5  # points whose names stand side by side; of more the ends, the middle and the one pointed at
+_JUDGE_SHARE = 2  # stretch of "cannot judge"; each point has 1
+_ALL_NAMED = 5  # points up to which all have a label; otherwise the ends and the middle, or the one pointed at
 
 
 class _RatingField(ScaleField):
-    """Points with their labels above them."""
+    """A question with a rating scale, whose labels are above its points."""
 
     widget_id: ClassVar[str] = "rating"
 
@@ -279,16 +281,18 @@ class _RatingField(ScaleField):
         if self.judge is not None:
             self.row.addWidget(self.judge, _JUDGE_SHARE, Qt.AlignmentFlag.AlignBottom)
         self.put_answer_part(area)
-        self._names = [PlainLabel() for _ in self._name_columns()]
-        for (first, last), label, side in zip(self._name_columns(), self._names, self._name_alignments(), strict=True):
+        self._labels = [PlainLabel() for _ in self._label_columns()]
+        for (first, last), label, side in zip(
+            self._label_columns(), self._labels, self._label_alignments(), strict=True
+        ):
             label.setWordWrap(True)
             label.setAlignment(side | Qt.AlignmentFlag.AlignAbsolute | Qt.AlignmentFlag.AlignBottom)
             self.cells.addWidget(label, 0, first, 1, last - first + 1)
         for place, point in enumerate(self.points):
             self.cells.addWidget(point, 1, place)
             self.cells.setColumnStretch(place, 1)
-        self.pointed_at.connect(self._name_points)
-        self._name_points()
+        self.pointed_at.connect(self._show_labels)
+        self._show_labels()
 
     def set_scale(self, scale: float) -> None:
         super().set_scale(scale)
@@ -297,40 +301,40 @@ class _RatingField(ScaleField):
         widest = max(point.sizeHint().width() for point in self.points)
         for point in self.points:
             point.setMinimumWidth(widest)
-        for label in self._names:
+        for label in self._labels:
             label.setFont(font("label", scale=scale, weight=600))
 
-    def _name_columns(self) -> list[tuple[int, int]]:
-        """Return the first and last column below each name."""
+    def _label_columns(self) -> list[tuple[int, int]]:
+        """Return the first and last column of each label."""
         points = len(self.labels)
         if points <= _ALL_NAMED:
             return [(place, place) for place in range(points)]
         end = points // 3
         return [(0, end - 1), (end, points - end - 1), (points - end, points - 1)]
 
-    def _name_alignments(self) -> list[Qt.AlignmentFlag]:
+    def _label_alignments(self) -> list[Qt.AlignmentFlag]:
         centre = Qt.AlignmentFlag.AlignHCenter
         if len(self.labels) <= _ALL_NAMED:
             return [centre] * len(self.labels)
         return [Qt.AlignmentFlag.AlignLeft, centre, Qt.AlignmentFlag.AlignRight]
 
-    def _name_points(self, _place: int = -1) -> None:
-        """Show the labels: all of a short scale; for a long one the ends, and the pointed one in the middle."""
+    def _show_labels(self, _place: int = -1) -> None:
+        """Show all labels of a short scale, or the ends of a long one and the pointed label in the middle."""
         texts = list(self.labels)
         if len(texts) > _ALL_NAMED:
             middle = self.labels[len(texts) // 2] if len(texts) % 2 else ""
             if 0 < self.pointed < len(texts) - 1:
                 middle = f"{self.pointed + 1} {self.labels[self.pointed]}"
             texts = [self.labels[0], middle, self.labels[-1]]
-        for place, (label, text) in enumerate(zip(self._names, texts, strict=True)):
-            at = self.pointed == place if len(self.labels) <= _ALL_NAMED else place == 1 and self.pointed > 0
-            ink = PARTICIPANT.accent if at else PARTICIPANT.text2
+        for place, (label, text) in enumerate(zip(self._labels, texts, strict=True)):
+            is_pointed = self.pointed == place if len(self.labels) <= _ALL_NAMED else place == 1 and self.pointed > 0
+            ink = PARTICIPANT.accent if is_pointed else PARTICIPANT.text2
             label.setStyleSheet(f"color: {ink}; background: transparent;")
             label.setText(text)
 
 
 _ABSOLUTE = Qt.AlignmentFlag.AlignAbsolute
-_KNOB = 12.0  # radius
+_KNOB = 12.0  # radius of the handle
 _TRACK = 6.0
 _PAGE_STEPS = 10
 _STEP_KEYS = {
@@ -342,7 +346,7 @@ _STEP_KEYS = {
 
 
 class _Line(QSlider):
-    """The line and its handle; ``set_to(step)`` is emitted at a click, a key, and when the handle is released."""
+    """A slider; ``set_to(step)`` is emitted when a key or click moves the handle, and when the handle is released."""
 
     set_to = Signal(int)
 
@@ -355,7 +359,7 @@ class _Line(QSlider):
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setCursor(Qt.CursorShape.PointingHandCursor)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
-        self.valueChanged.connect(self._take_step)
+        self.valueChanged.connect(self._handle_step)
 
     def set_scale(self, scale: float) -> None:
         self._scale = scale
@@ -372,11 +376,11 @@ class _Line(QSlider):
         self.update()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Move by steps or to the ends; the first key puts the handle in the middle or at an end."""
+        """Move the handle by steps or to the ends; the first key puts it in the middle or at an end."""
         if event.key() in (Qt.Key.Key_Home, Qt.Key.Key_End):
-            self._move(self.minimum() if event.key() == Qt.Key.Key_Home else self.maximum())
+            self._move_to(self.minimum() if event.key() == Qt.Key.Key_Home else self.maximum())
         elif (by := _STEP_KEYS.get(Qt.Key(event.key()))) is not None:
-            self._move(self.value() + by if self.touched else self.maximum() // 2)
+            self._move_to(self.value() + by if self.touched else self.maximum() // 2)
         else:
             event.ignore()
 
@@ -390,7 +394,7 @@ class _Line(QSlider):
             self._drag(event.position().x())
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
-        """Release the handle: its position is the answer."""
+        """Release the handle, whose position is the answer."""
         if self.isSliderDown():
             self._drag(event.position().x())
             self.setSliderDown(False)
@@ -436,14 +440,14 @@ class _Line(QSlider):
         self.setValue(round(share * self.maximum()))
         self.update()
 
-    def _move(self, step: int) -> None:
+    def _move_to(self, step: int) -> None:
         self.touched = True
         with QSignalBlocker(self):
             self.setValue(step)
         self.update()
         self.set_to.emit(self.value())
 
-    def _take_step(self, step: int) -> None:
+    def _handle_step(self, step: int) -> None:
         if not self.isSliderDown():
             self.touched = True
             self.update()
@@ -455,7 +459,7 @@ class _Line(QSlider):
 
 
 class SliderField(QuestionField):
-    """A slider: arrows move one step, Page ten, Home and End to the ends; clicks and touch move it anywhere."""
+    """A question with a slider: arrows move it by one step, Page keys by ten, Home and End to the ends."""
 
     widget_id: ClassVar[str] = "slider"
 
@@ -477,22 +481,22 @@ class SliderField(QuestionField):
         vbox(self.line, names, spacing=0, margins=0, parent=area)
         self.put_answer_part(area)
         self.setFocusProxy(self.line)
-        self._tell_line()
+        self._update_line()
 
     def show_answer(self, value: Value) -> None:
-        self.keep_answer(value)
+        self.set_answer(value)
         if isinstance(value, int | float):
             self.line.show_step(round((value - self._slider.least) / self._slider.step))
-        self._tell_line()
+        self._update_line()
 
     def clear_answer(self) -> None:
         self.line.touched = False
         self.line.update()
-        self._tell_line()
+        self._update_line()
 
     def give_answer(self, value: Value) -> None:
         super().give_answer(value)
-        self._tell_line()
+        self._update_line()
 
     def set_scale(self, scale: float) -> None:
         super().set_scale(scale)
@@ -500,17 +504,17 @@ class SliderField(QuestionField):
         for end in self._ends:
             end.setFont(font("label", scale=scale, weight=600))
 
-    def _tell_line(self) -> None:
+    def _update_line(self) -> None:
         self._ends[1].setText("" if self.is_answered else self._words.no_answer_yet)
         self.line.setAccessibleDescription(f"{self._slider.low} – {self._slider.high}, {self.accessibleDescription()}")
 
 
 _TEXT_WAIT_MS = 600
-_FRAME = 20.0  # of a field around its lines
+_FRAME = 20.0  # height of a field in addition to its lines [px at scale 1]
 
 
 class _TextEntry(EntryKeys, QPlainTextEdit):
-    """The text field, without a menu; Tab leaves it, and in a single line Enter is handled by the page."""
+    """A text edit without a menu; Tab leaves it, and with a single line the page handles Enter."""
 
     def __init__(self, lines: int, parent: QWidget) -> None:
         super().__init__(parent)
@@ -522,15 +526,15 @@ class _TextEntry(EntryKeys, QPlainTextEdit):
             self.setLineWrapMode(QPlainTextEdit.LineWrapMode.NoWrap)
             self.setVerticalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
 
-    def leaves_to_page(self, event: QKeyEvent) -> bool:
-        """Return whether the page handles a key; with several lines only Ctrl+Enter."""
+    def is_left_to_page(self, event: QKeyEvent) -> bool:
+        """Return whether the page handles a key; with several lines, only Ctrl+Enter."""
         if self._lines == 1:
-            return super().leaves_to_page(event)
+            return super().is_left_to_page(event)
         return event.key() in ENTER and bool(event.modifiers() & Qt.KeyboardModifier.ControlModifier)
 
 
 class TextField(TypedField):
-    """A free text with one or several lines."""
+    """A question with a text of one or several lines."""
 
     widget_id: ClassVar[str] = "text"
 
@@ -540,16 +544,16 @@ class TextField(TypedField):
         super().__init__(view, wording, parent)
         self.entry = _TextEntry(view.lines, self)
         self.entry.setAccessibleName(view.text)
-        self.entry.textChanged.connect(self._edit)
+        self.entry.textChanged.connect(self._clean_text)
         self.put_answer_part(self.entry)
-        self.give_keyboard_to(self.entry, _TEXT_WAIT_MS, self.finish)
+        self.set_entry(self.entry, _TEXT_WAIT_MS, self.finish)
 
     @property
     def answer_keys(self) -> str:
         return self._words.letter_keys
 
     def show_answer(self, value: Value) -> None:
-        self.keep_answer(value)
+        self.set_answer(value)
         with QSignalBlocker(self.entry):
             self.entry.setPlainText(str(value))
 
@@ -566,7 +570,7 @@ class TextField(TypedField):
         self.entry.setFixedHeight(round(max(target_px(scale), height)))
 
     def finish(self) -> bool:
-        """Accept the text; an empty one is no answer."""
+        """Accept the text; an empty text retracts the answer."""
         self._timer.stop()
         text = self.entry.toPlainText().strip()
         if text:
@@ -578,34 +582,34 @@ class TextField(TypedField):
     def typed_text(self) -> str:
         return self.entry.toPlainText()
 
-    def _edit(self) -> None:
-        """Keep the text within its length and free of unprintable characters."""
+    def _clean_text(self) -> None:
+        """Remove unprintable characters, and text beyond the maximum length."""
         text, cursor = self.entry.toPlainText(), self.entry.textCursor()
-        kept = "".join(characters(self._printable(text))[: self._shown.longest])
-        if kept != text:
-            before = _utf16(text)[: 2 * cursor.position()].decode("utf-16-le", "surrogatepass")
-            place = min(len(_utf16(self._printable(before))), len(_utf16(kept))) // 2
+        clean = "".join(characters(self._printable(text))[: self._shown.longest])
+        if clean != text:
+            before_cursor = _utf16(text)[: 2 * cursor.position()].decode("utf-16-le", "surrogatepass")
+            position = min(len(_utf16(self._printable(before_cursor))), len(_utf16(clean))) // 2
             with QSignalBlocker(self.entry):
-                self.entry.setPlainText(kept)
+                self.entry.setPlainText(clean)
             cursor = self.entry.textCursor()
-            cursor.setPosition(place)
+            cursor.setPosition(position)
             self.entry.setTextCursor(cursor)
         self._timer.start()
 
     def _printable(self, text: str) -> str:
         """Return a text without unprintable characters; a field of one line has no line breaks."""
-        kept = "".join(
+        printable = "".join(
             character for character in text if character == "\n" or unicodedata.category(character) not in UNPRINTABLE
         )
-        return kept.replace("\n", " ") if self._shown.lines == 1 else kept
+        return printable.replace("\n", " ") if self._shown.lines == 1 else printable
 
 
 def _utf16(text: str) -> bytes:
-    """Return a text in UTF-16, Qt's units for positions, with two bytes each."""
+    """Return a text in UTF-16, since Qt counts positions in units of two bytes."""
     return text.encode("utf-16-le", "surrogatepass")
 
 
 FIELDS: Final[dict[str, type[QuestionField]]] = {
     kind.widget_id: kind for kind in (_ChoiceField, _NumberField, _RatingField, SliderField, TextField)
 }
-"""Every widget by the id that a question names it by."""
+"""The question fields by their widget ID, which questions name."""

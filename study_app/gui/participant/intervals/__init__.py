@@ -1,1 +1,1 @@
-"""Pages of trials of intervals: where in the trial one is, the one question, and feedback."""
+"""The pages of trials with several intervals: the current interval, the question and the feedback."""

@@ -1,4 +1,4 @@
-"""What the pages of one question have in common: the question in the middle, and one answer, given once."""
+"""Pages with a single question, the feedback page, and the controls of an adjustment."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ from study_app.session.pages import ChoicePage, DesignPage, FeedbackPage, Interv
 from study_app.session.transitions.events import STEP_S, Chosen, ItemShown, Stepped, Submitted
 
 _QUESTION_PX = 26
-_ASKING = 0.8  # share of the present trial's bar that is full
+_ASKING = 0.8  # filled fraction of the current trial's bar
 
 
 class _AnswerPage(PageWidget):
-    """The progress, a question and room for its answer; ``answer`` answers and continues, only once."""
+    """A page with the progress, a question and space for its answer, which can be given only once."""
 
     def __init__(self, page: DesignPage, context: PageContext) -> None:
         super().__init__(context)
@@ -48,14 +48,14 @@ class _AnswerPage(PageWidget):
         margin = round((40 if self.width() >= 1100 else 24) * scale)
         self._column.setContentsMargins(margin, round(20 * scale), margin, margin)
         self._progress.set_scale(self.font_scale)
-        self.question.setFont(_font_of_height(_QUESTION_PX * self.font_scale))
+        self.question.setFont(_body_font(_QUESTION_PX * self.font_scale))
 
     def showEvent(self, event: QShowEvent) -> None:
         super().showEvent(event)
         self.event_made.emit(ItemShown(self._clock(), self.page.item.id))
 
     def answer(self, value: Value) -> None:
-        """Answer and continue; later presses are ignored."""
+        """Answer and continue; later answers are ignored."""
         if self._answered:
             return
         self._answered = True
@@ -63,11 +63,11 @@ class _AnswerPage(PageWidget):
         self.event_made.emit(Submitted(self._clock()))
 
 
-def _font_of_height(pixels: float) -> QFont:
-    """Return the font of a text height [logical px]."""
-    made = font("body")
-    made.setPixelSize(round(pixels))
-    return made
+def _body_font(pixels: float) -> QFont:
+    """Return the body font with a size in logical px."""
+    body_font = font("body")
+    body_font.setPixelSize(round(pixels))
+    return body_font
 
 
 _CHOICE_BUTTON_PX = (160, 96)
@@ -77,10 +77,10 @@ _ARROWS = {Qt.Key.Key_Left: -1, Qt.Key.Key_Right: 1}
 
 
 class ChoiceWidget(_AnswerPage):
-    """The answers in temporal order; digits choose by number, the arrows by position on the screen.
+    """A page with a button for each answer, in temporal order; digits choose by number, arrows by position.
 
-    Nothing is preselected. With two answers ← chooses the left one and → the right; with more, the arrows focus a
-    button, which Enter presses.
+    No answer is preselected. With two answers, ← chooses the left one and → the right one; with more, the arrows focus
+    a button, which Enter presses.
     """
 
     def __init__(self, page: ChoicePage, context: PageContext) -> None:
@@ -103,7 +103,7 @@ class ChoiceWidget(_AnswerPage):
         super().lay_out(scale)
         for button in self.buttons:
             button.setMinimumSize(*(round(side * scale) for side in _CHOICE_BUTTON_PX))
-            button.setFont(_font_of_height(_CHOICE_TEXT_PX * self.font_scale))
+            button.setFont(_body_font(_CHOICE_TEXT_PX * self.font_scale))
         self._cap.show_key(self.page.item.keys, self.font_scale)
         self._hint.setFont(font("body", scale=self.font_scale))
 
@@ -119,13 +119,13 @@ class ChoiceWidget(_AnswerPage):
     def _handle_key(self, event: QKeyEvent) -> bool:
         """Handle a key of the page; a repeated arrow does nothing."""
         number = digit_of(event)
-        away = _ARROWS.get(Qt.Key(event.key()))
+        direction = _ARROWS.get(Qt.Key(event.key()))
         if event.isAutoRepeat():
             return True
         if number is not None and 1 <= number <= len(self.buttons):
             self.answer(self._values[number - 1])
-        elif away is not None:
-            self._move_choice(-away if self.mirrored else away)
+        elif direction is not None:
+            self._move_choice(-direction if self.mirrored else direction)
         elif event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter}:
             focused = [button for button in self.buttons if button.hasFocus()]
             if focused:
@@ -135,12 +135,12 @@ class ChoiceWidget(_AnswerPage):
         return True
 
     def _move_choice(self, step: int) -> None:
-        """Choose the first or last of two answers; with more, focus the next button."""
+        """Choose the first or last of two answers; if there are more, focus the next button."""
         if len(self.buttons) == 2:
             self.answer(self._values[0 if step < 0 else 1])
             return
-        at = next((place for place, button in enumerate(self.buttons) if button.hasFocus()), -1 if step > 0 else 0)
-        self.buttons[(at + step) % len(self.buttons)].setFocus()
+        focused = next((i for i, button in enumerate(self.buttons) if button.hasFocus()), -1 if step > 0 else 0)
+        self.buttons[(focused + step) % len(self.buttons)].setFocus()
 
 
 _BADGE_SCALE = 1.6
@@ -148,7 +148,7 @@ _CENTRED = Qt.AlignmentFlag.AlignHCenter
 
 
 class FeedbackWidget(PageWidget):
-    """A check mark and "Right", or a dash and "Not right"."""
+    """A page with a check mark and "Right", or a dash and "Not right"."""
 
     def __init__(self, page: FeedbackPage, context: PageContext) -> None:
         super().__init__(context)
@@ -175,11 +175,11 @@ _GAP = 10.0
 
 
 def interval_width(interval: Interval, wording: Words, scale: float) -> float:
-    """Return the width of text and squares [px]."""
-    return _words_width(interval, wording, scale) + _GAP * scale + interval.of * (_SQUARE + _GAP) * scale
+    """Return the width of the interval's text and squares [px]."""
+    return _text_width(interval, wording, scale) + _GAP * scale + interval.of * (_SQUARE + _GAP) * scale
 
 
-def _words_width(interval: Interval, wording: Words, scale: float) -> float:
+def _text_width(interval: Interval, wording: Words, scale: float) -> float:
     text = wording.reached.format(reached=interval.number, of=interval.of)
     return QFontMetricsF(font("statement", scale=scale, weight=600)).horizontalAdvance(text) + 4
 
@@ -187,24 +187,24 @@ def _words_width(interval: Interval, wording: Words, scale: float) -> float:
 def draw_interval(
     painter: QPainter, width: float, middle: float, interval: Interval, wording: Words, scale: float
 ) -> None:
-    """Draw text and squares, centred in a page of ``width`` around the height ``middle`` [px].
+    """Draw the number of an interval as text and squares, centred in a page of ``width`` at the height ``middle`` [px].
 
-    In a rest no square is filled; in a right-to-left language the first is at the right.
+    In a rest, no square is filled. In a right-to-left language, the first square is at the right.
     """
     text = wording.reached.format(reached=interval.number, of=interval.of)
     side, gap = _SQUARE * scale, _GAP * scale
     painter.save()
     painter.setFont(font("statement", scale=scale, weight=600))
-    wide = _words_width(interval, wording, scale)
+    text_width = _text_width(interval, wording, scale)
     x = (width - interval_width(interval, wording, scale)) / 2
     painter.setPen(QColor(PARTICIPANT.text))
-    words_at = QRectF(x, middle - 20 * scale, wide, 40 * scale)
+    text_area = QRectF(x, middle - 20 * scale, text_width, 40 * scale)
     if wording.right_to_left:
-        words_at.moveRight(width - x)
-    painter.drawText(words_at, int(Qt.AlignmentFlag.AlignCenter), text)
+        text_area.moveRight(width - x)
+    painter.drawText(text_area, int(Qt.AlignmentFlag.AlignCenter), text)
     painter.setPen(QPen(QColor(PARTICIPANT.text), 2 * scale))
     for number in range(1, interval.of + 1):
-        place = QRectF(x + wide + gap + (number - 1) * (side + gap), middle - side / 2, side, side)
+        place = QRectF(x + text_width + gap + (number - 1) * (side + gap), middle - side / 2, side, side)
         if wording.right_to_left:
             place.moveRight(width - place.left())
         filled = number == interval.number and not interval.resting
@@ -216,40 +216,40 @@ def draw_interval(
 _FIELD_PX = (400, 96)
 _KEY_PX = (60, 52)
 _KEY_GAP_PX = 8
-_ACROSS = 6
+_KEYS_PER_ROW = 6
 _NUMBER_TEXT_PX = 40
 _LONGEST = 12
 
 
 class NumberWidget(_AnswerPage):
-    """A field for a number, with point or comma; anything but one number above 0 is reported and not accepted."""
+    """A page with a field for a number, with point or comma; a text that is not one permitted number is rejected."""
 
     def __init__(self, page: NumberPage, context: PageContext) -> None:
         super().__init__(page, context)
         self._permits = page.item.permits
         self.field = QLineEdit(self, maxLength=_LONGEST, alignment=Qt.AlignmentFlag.AlignCenter)
-        self.field.setContextMenuPolicy(Qt.ContextMenuPolicy.NoContextMenu)  # Qt's is in English
+        self.field.setContextMenuPolicy(Qt.ContextMenuPolicy.NoContextMenu)  # Qt's menu is in English
         self.field.setAccessibleName(page.item.text)
         self.field.setAccessibleDescription(self._words.number_wanted)
         self.wrong = PlainLabel("", self)
         self.wrong.setStyleSheet(f"color: {PARTICIPANT.warn}; background: transparent;")
         self.field.textChanged.connect(lambda _text: self.wrong.clear())
-        self._pad = DigitPad(self.field, (self._words.decimal_sign,), _ACROSS, self._words.delete_digit, self)
+        self._pad = DigitPad(self.field, (self._words.decimal_sign,), _KEYS_PER_ROW, self._words.delete_digit, self)
         self.keys = self._pad.keys
         self.button = GoButton(self._words.continue_, self._words.enter_key, self)
         self.button.clicked.connect(self._confirm)
-        above = ((widget, 0, _CENTRED) for widget in (self.field, self.wrong, self._pad))
-        add_parts(self._column, *above, 24, (self.button, 0, _CENTRED), (STRETCH, 3))
+        centred = ((widget, 0, _CENTRED) for widget in (self.field, self.wrong, self._pad))
+        add_parts(self._column, *centred, 24, (self.button, 0, _CENTRED), (STRETCH, 3))
 
     def lay_out(self, scale: float) -> None:
         super().lay_out(scale)
         font_scale = self.font_scale
         self.field.setFixedSize(*(round(side * scale) for side in _FIELD_PX))
-        self.field.setFont(_font_of_height(_NUMBER_TEXT_PX * scale))
-        self.wrong.setFont(_font_of_height(18 * font_scale))
+        self.field.setFont(_body_font(_NUMBER_TEXT_PX * scale))
+        self.wrong.setFont(_body_font(18 * font_scale))
         self.button.set_scale(font_scale)
         width, height = (round(side * scale) for side in _KEY_PX)
-        self._pad.set_size(width, height, round(_KEY_GAP_PX * scale), _font_of_height(20 * scale))
+        self._pad.set_size(width, height, round(_KEY_GAP_PX * scale), _body_font(20 * scale))
 
     def focus_first(self) -> None:
         self.field.setFocus()
@@ -275,7 +275,7 @@ class NumberWidget(_AnswerPage):
 
 
 _STEP_MS: Final = round(1000 * STEP_S)
-_NOTCH: Final = 120  # of a wheel [eighths of a degree]
+_NOTCH: Final = 120  # turn of a wheel per notch [eighths of a degree]
 _BUTTON_PX: Final = (120, 48)
 _GAP_PX: Final = 16
 _LEAST_PX: Final = 44
@@ -287,8 +287,8 @@ class SettingControls(QWidget):
     """Controls with which the participant adjusts and confirms the level; shown only while it can be adjusted.
 
     The left key and button mean less in every language. A held key or button makes a step every `_STEP_MS`.
-    ``event_made`` carries the session's events. Without ``buttons``, if no pointer is shown, only keys and wheel are
-    used.
+    ``event_made`` carries the session's events. Without ``buttons``, if no pointer is shown, only keys and the wheel
+    work.
     """
 
     event_made = Signal(object)
@@ -310,29 +310,29 @@ class SettingControls(QWidget):
         self.less, self.more = (QPushButton(text, self) for text in (f"← {wording.less}", f"{wording.more} →"))
         self.done = GoButton(wording.done, wording.enter_key, self)
         hbox(self.less, self.more, self.done, spacing=_GAP_PX, margins=0, parent=self)
-        for button, name, way in ((self.less, wording.less, -1), (self.more, wording.more, 1)):
+        for button, name, direction in ((self.less, wording.less, -1), (self.more, wording.more, 1)):
             button.setAccessibleName(name)
             button.setAccessibleDescription(page.question)
             button.setAutoRepeat(True)
             button.setAutoRepeatDelay(_STEP_MS)
             button.setAutoRepeatInterval(_STEP_MS)
-            button.clicked.connect(lambda _=False, way=way: self._emit_steps(way))
+            button.clicked.connect(lambda _=False, direction=direction: self._emit_steps(direction))
         self.done.clicked.connect(self._confirm)
         for control in (self.less, self.more, self.done):
             control.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self.setVisible(self._adjusts and buttons)
 
     def show_interval(self, page: TaskPage) -> None:
-        """Show the controls in intervals whose level is set."""
+        """Show the controls if the level of the interval can be adjusted."""
         self._adjusts = page.adjusts
         self.stop_stepping()
         self.setVisible(self._adjusts and self._buttons)
 
-    def place_at_foot(self, scale: float, middle: float) -> None:
+    def lay_out_controls(self, scale: float, middle: float) -> None:
         """Place the controls at the tank's foot, above the pause hint if both do not fit side by side."""
         width, height = (round(side * scale) for side in _BUTTON_PX)
         for button in (self.less, self.more):
-            button.setFont(_font_of_height(_TEXT_PX * scale))
+            button.setFont(_body_font(_TEXT_PX * scale))
             button.setStyleSheet("padding: 0 12px; min-height: 0;")
             button.setFixedHeight(max(height, _LEAST_PX))
             button.setMinimumWidth(width)
@@ -344,13 +344,13 @@ class SettingControls(QWidget):
 
     def press_key(self, event: QKeyEvent) -> bool:
         """Handle a key press; return whether the key belongs to these controls."""
-        way = _KEYS.get(Qt.Key(event.key()), 0)
-        if not self._adjusts or (not way and event.key() not in (Qt.Key.Key_Return, Qt.Key.Key_Enter)):
+        direction = _KEYS.get(Qt.Key(event.key()), 0)
+        if not self._adjusts or (not direction and event.key() not in (Qt.Key.Key_Return, Qt.Key.Key_Enter)):
             return False
         if not event.isAutoRepeat():
-            if way:
-                self._held = way
-                self._emit_steps(way)
+            if direction:
+                self._held = direction
+                self._emit_steps(direction)
                 self._timer.start()
             else:
                 self._confirm()
@@ -361,14 +361,14 @@ class SettingControls(QWidget):
             self.stop_stepping()
 
     def turn_wheel(self, event: QWheelEvent) -> None:
-        """Make a step for each notch of the wheel; forwards increases."""
+        """Make a step for each notch of the wheel; forwards increases the level."""
         self._turned += event.angleDelta().y()
         steps = int(self._turned / _NOTCH)
         self._turned -= steps * _NOTCH
         self._emit_steps(steps)
 
     def stop_stepping(self) -> None:
-        """Stop stepping, because a deactivated window never receives the key's release."""
+        """Stop stepping, also for a deactivated window, which never receives the release of the key."""
         self._held = self._turned = 0
         self._timer.stop()
 

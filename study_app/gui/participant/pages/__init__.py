@@ -1,1 +1,1 @@
-"""The participant's pages: what they share, and pages of text."""
+"""The base of the participant's pages, and the pages of text."""

@@ -1,4 +1,4 @@
-"""What the participant's pages have in common: how large they are drawn, and in which direction they are read."""
+"""The base of the participant's pages: scale, reading direction, and shared widgets."""
 
 from __future__ import annotations
 
@@ -67,8 +67,8 @@ def line_start(widget: QWidget) -> Qt.AlignmentFlag:
     return Qt.AlignmentFlag.AlignAbsolute | (Qt.AlignmentFlag.AlignRight if right else Qt.AlignmentFlag.AlignLeft)
 
 
-def mirrored(place: QRectF, width: float) -> QRectF:
-    """Return a rectangle mirrored about the middle of ``width``."""
+def mirror_rectangle(place: QRectF, width: float) -> QRectF:
+    """Return ``place`` mirrored about the middle of a page of ``width``."""
     return QRectF(width - place.right(), place.top(), place.width(), place.height())
 
 
@@ -123,7 +123,7 @@ class PageWidget(QWidget):
         return font_scale(self.width(), self.height(), self._text_scale)
 
     def lay_out(self, scale: float) -> None:
-        """Lay out all parts at the current size."""
+        """Lay out all parts for the current size; overridden by pages."""
 
     def focus_first(self) -> None:
         self.setFocus()
@@ -138,17 +138,17 @@ class PageWidget(QWidget):
         painter.end()
 
 
-BEGINNING = int(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)  # Qt mirrors it with the painter
+BEGINNING = int(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)  # mirrored by the painter
 _BAR = (40.0, 6.0, 8.0)  # width, height, gap [logical px at scale 1]
 
 
 def _progress_texts(progress: Progress, wording: Words) -> tuple[str, str]:
-    """Return "Part 2 of 2" and "Delay setting 3 of 7"; a single part or setting is not counted."""
-    counted = progress.part is not None and progress.parts > 1
-    part = wording.part.format(part=progress.part, parts=progress.parts) if counted else ""
-    named = progress.label and progress.of > 1
+    """Return the texts "Part 2 of 2" and "Delay setting 3 of 7"; a single part or setting has no number."""
+    has_parts = progress.part is not None and progress.parts > 1
+    part = wording.part.format(part=progress.part, parts=progress.parts) if has_parts else ""
+    has_settings = progress.label and progress.of > 1
     template = wording.setting_at_most if progress.at_most else wording.setting
-    setting = template.format(label=progress.label, of=progress.of) if named else progress.label
+    setting = template.format(label=progress.label, of=progress.of) if has_settings else progress.label
     return part, setting
 
 
@@ -192,7 +192,7 @@ def draw_progress(
 def _draw_bars(
     painter: QPainter, room: QRectF, x: float, progress: Progress, *, scale: float, share: float, flip: bool
 ) -> float:
-    """Draw a bar for each setting from ``x`` on; return their end [px from the start]."""
+    """Draw a bar for each setting, starting at ``x``; return their end [px from the start of the line]."""
     width, height, gap = (size * scale for size in _BAR)
     painter.setPen(Qt.PenStyle.NoPen)
     for index in range(1, progress.of + 1):
@@ -201,8 +201,8 @@ def _draw_bars(
         painter.drawRoundedRect(bar, height / 2, height / 2)
         if index == progress.index and share > 0:
             painter.setBrush(QColor(PARTICIPANT.accent))
-            full = _rectangle_from_start(room, x, max(height, width * share), height, flip=flip)
-            painter.drawRoundedRect(full, height / 2, height / 2)
+            filled = _rectangle_from_start(room, x, max(height, width * share), height, flip=flip)
+            painter.drawRoundedRect(filled, height / 2, height / 2)
         x += width + gap
     return x - gap
 
@@ -213,13 +213,13 @@ def _bars_width(count: int, scale: float) -> float:
 
 
 def _rectangle_from_start(room: QRectF, x: float, width: float, height: float, *, flip: bool) -> QRectF:
-    """Return a rectangle at ``x`` from the start of the line, centred vertically."""
+    """Return a vertically centred rectangle, ``x`` px from the start of the line."""
     left = room.right() - x - width if flip else room.left() + x
     return QRectF(left, room.center().y() - height / 2, width, height)
 
 
 class ProgressLine(QWidget):
-    """The progress at the top of a page; if there is none, an empty line of the same height."""
+    """The progress at the top of a page, or an empty line of the same height."""
 
     def __init__(self, progress: Progress | None, wording: Words, share: float, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -247,8 +247,12 @@ class ProgressLine(QWidget):
 
 _CENTRE = int(Qt.AlignmentFlag.AlignCenter)
 _ARROWS = (Qt.Key.Key_Up, Qt.Key.Key_Down, Qt.Key.Key_Left, Qt.Key.Key_Right)
-_RING = 4  # room around a button for its focus ring [logical px]
-_KEYBOARD = (Qt.FocusReason.TabFocusReason, Qt.FocusReason.BacktabFocusReason, Qt.FocusReason.ShortcutFocusReason)
+_RING = 4  # space around a button for its focus ring [logical px]
+_KEYBOARD_REASONS = (
+    Qt.FocusReason.TabFocusReason,
+    Qt.FocusReason.BacktabFocusReason,
+    Qt.FocusReason.ShortcutFocusReason,
+)
 
 
 def key_size(text: str, scale: float = 1.0) -> tuple[float, float]:
@@ -279,15 +283,15 @@ def draw_key(
     painter.drawRoundedRect(cap, 4 * scale, 4 * scale)
     painter.setFont(font("key", scale=scale))
     painter.setPen(QColor(ink))
-    way = painter.layoutDirection()
-    painter.setLayoutDirection(Qt.LayoutDirection.LeftToRight)  # "1–7" is so on every keyboard
+    direction = painter.layoutDirection()
+    painter.setLayoutDirection(Qt.LayoutDirection.LeftToRight)  # "1–7" is not mirrored
     painter.drawText(cap, _CENTRE, text)
-    painter.setLayoutDirection(way)
+    painter.setLayoutDirection(direction)
     return width
 
 
 class KeyCap(QWidget):
-    """A key cap as a widget, in a language's direction."""
+    """A key cap as a widget."""
 
     def __init__(self, parent: QWidget) -> None:
         super().__init__(parent)
@@ -308,13 +312,13 @@ class KeyCap(QWidget):
 
 
 class _LitButton(Button):
-    """A button that lights up under the pointer, and has a focus ring after keyboard navigation."""
+    """A button that lights up under the pointer and has a focus ring if the keyboard has focused it."""
 
     ringed = False
 
     def focusInEvent(self, event: QFocusEvent) -> None:
-        """Show the focus ring after keyboard navigation; on a page that starts here, the key cap suffices."""
-        self.ringed = event.reason() in _KEYBOARD
+        """Show the focus ring only after keyboard navigation; on a new page, the key cap is sufficient."""
+        self.ringed = event.reason() in _KEYBOARD_REASONS
         super().focusInEvent(event)
 
     def enterEvent(self, event: QEnterEvent) -> None:
@@ -367,12 +371,12 @@ class GoButton(_LitButton, QPushButton):
         label = QFontMetricsF(self.font()).horizontalAdvance(self._label)
         cap, _ = key_size(self._key, scale)
         start = body.center().x() - (label + 12 * scale + cap) / 2
-        words_at, cap_at = (start + cap + 12 * scale, start) if flip else (start, start + label + 12 * scale)
+        text_x, cap_x = (start + cap + 12 * scale, start) if flip else (start, start + label + 12 * scale)
         painter.setFont(self.font())
         painter.setPen(QColor(theme.on_accent))
-        painter.drawText(QRectF(words_at - 1, body.top(), label + 2, body.height()), _CENTRE, self._label)
+        painter.drawText(QRectF(text_x - 1, body.top(), label + 2, body.height()), _CENTRE, self._label)
         ink = theme.on_accent
-        draw_key(painter, cap_at, body.center().y(), self._key, scale, ink=ink, edge=ink, strength=0.5)
+        draw_key(painter, cap_x, body.center().y(), self._key, scale, ink=ink, edge=ink, strength=0.5)
         painter.end()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
@@ -387,7 +391,7 @@ _LEAST_HEIGHT = 44
 
 
 class LanguageButton(_LitButton, QRadioButton):
-    """One language: an outline, and a check mark if it is the page's. Enter and Space choose it."""
+    """The button of a language, with a check mark if the page is in it; Enter and Space choose it."""
 
     def __init__(self, language: str, parent: QWidget) -> None:
         super().__init__(words(language).name, parent)
@@ -443,22 +447,22 @@ class LanguageButton(_LitButton, QRadioButton):
 
 
 class LanguageSwitch(QGroupBox):
-    """The languages in one line: Tab focuses the page's own, arrows choose a neighbour.
+    """A line of buttons for the languages: Tab focuses that of the page, arrows choose a neighbour.
 
     ``chosen`` carries the code of a language other than the page's.
     """
 
     chosen = Signal(str)
 
-    def __init__(self, languages: tuple[str, ...], present: str, name: str, parent: QWidget) -> None:
+    def __init__(self, languages: tuple[str, ...], current: str, name: str, parent: QWidget) -> None:
         super().__init__(parent)
         self.setAccessibleName(name)
         self.buttons = tuple(LanguageButton(language, self) for language in languages)
         for button in self.buttons:
-            button.setChecked(button.language == present)
+            button.setChecked(button.language == current)
             policy = Qt.FocusPolicy.StrongFocus if button.isChecked() else Qt.FocusPolicy.ClickFocus
-            button.setFocusPolicy(policy)  # Qt does this itself, but not for a button that is checked this early
-            button.clicked.connect(lambda _=False, code=button.language: self._choose(code, present))
+            button.setFocusPolicy(policy)  # Qt does this only for buttons checked later
+            button.clicked.connect(lambda _=False, code=button.language: self._choose(code, current))
 
     def set_scale(self, scale: float) -> None:
         x = 0
@@ -470,10 +474,10 @@ class LanguageSwitch(QGroupBox):
         self.resize(x - round(4 * scale), self.buttons[0].height())
 
     def paintEvent(self, _event: QPaintEvent) -> None:
-        """Draw nothing: the buttons paint themselves."""
+        """Paint nothing, since the buttons paint themselves."""
 
-    def _choose(self, code: str, present: str) -> None:
-        if code != present:
+    def _choose(self, code: str, current: str) -> None:
+        if code != current:
             self.chosen.emit(code)
 
 
@@ -482,7 +486,7 @@ _DELETE = "⌫"
 
 
 class DigitPad(QWidget):
-    """Keys in rows of ``across``, in the same order in every language, followed by ``more``.
+    """Keys for digits, then for ``more`` characters, in rows of ``across``, in the same order in every language.
 
     The keyboard's digit row types digits into ``field`` in every layout; a minus is typed if ``more`` has it.
     """
@@ -490,16 +494,16 @@ class DigitPad(QWidget):
     def __init__(self, field: QLineEdit, more: tuple[str, ...], across: int, delete_name: str, parent: QWidget) -> None:
         super().__init__(parent)
         self._field = field
-        self._typed = (*_DIGITS, *more)
+        self._characters = (*_DIGITS, *more)
         field.installEventFilter(self)
         self.setLayoutDirection(Qt.LayoutDirection.LeftToRight)
         self._grid = grid(margins=0, parent=self)
-        self.keys = [QPushButton(text, self) for text in (*self._typed, _DELETE)]
-        for place, key in enumerate(self.keys):
+        self.keys = [QPushButton(text, self) for text in (*self._characters, _DELETE)]
+        for index, key in enumerate(self.keys):
             key.setFocusPolicy(Qt.FocusPolicy.NoFocus)
             key.setAccessibleName(delete_name if key.text() == _DELETE else key.text())
-            key.clicked.connect(lambda _=False, key=key: self._type_digit(key.text()))
-            self._grid.addWidget(key, place // across, place % across)
+            key.clicked.connect(lambda _=False, key=key: self._press_key(key.text()))
+            self._grid.addWidget(key, index // across, index % across)
 
     def set_size(self, width: int, height: int, gap: int, face: QFont) -> None:
         """Set the size of the keys [px]."""
@@ -512,12 +516,12 @@ class DigitPad(QWidget):
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         if isinstance(event, QKeyEvent) and event.type() == QEvent.Type.KeyPress:
             digit = digit_of(event)
-            if digit is not None and event.text() not in self._typed:
+            if digit is not None and event.text() not in self._characters:
                 self._field.insert(str(digit))
                 return True
         return super().eventFilter(watched, event)
 
-    def _type_digit(self, text: str) -> None:
+    def _press_key(self, text: str) -> None:
         self._field.setFocus(Qt.FocusReason.MouseFocusReason)
         if text == _DELETE:
             self._field.backspace()
@@ -526,6 +530,6 @@ class DigitPad(QWidget):
 
 
 def point_screen_reader_at(widget: QWidget) -> None:
-    """Let screen readers announce ``widget``, which lacks keyboard focus: its name and whether it is checked."""
+    """Make screen readers announce ``widget``, its name and whether it is checked, although it has no focus."""
     if QAccessible.isActive():
         QAccessible.updateAccessibility(QAccessibleEvent(widget, QAccessible.Event.Focus))

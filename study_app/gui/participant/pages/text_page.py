@@ -1,4 +1,4 @@
-"""Pages that a study writes: consent, instructions, breaks, the debrief."""
+"""Pages of text: consent, instructions, breaks and the debrief of a study, pauses and notices."""
 
 from __future__ import annotations
 
@@ -25,12 +25,13 @@ from study_app.gui.widgets.boxes import STRETCH, vbox
 from study_app.session.pages import EndPage, PausePage, TextPage, TroublePage
 from study_app.session.transitions.events import Continue, EndRequested, LanguageChosen, ResumeRequested
 
-_COLUMN = 700.0  # a line that reads well [logical px at scale 1]
+_COLUMN = 700.0  # readable width of lines [logical px at scale 1]
 _LINE_PERCENT = 140
 _SCROLLBAR = 16
 _LINE_STEP = 48
-_GIVING_WAY = ((1.0, True), (0.94, True), (0.89, True), (0.89, False))  # size of the text, whether with a badge
-_MUST_BE_READ = ((1.0, True), (1.0, False))  # where text has its minimum size
+# Sizes of the text, with or without a badge, that are tried until the page fits; the latter if text must not shrink.
+_SHRINKING = ((1.0, True), (0.94, True), (0.89, True), (0.89, False))
+_CONSTANT = ((1.0, True), (1.0, False))
 _LINE_KEYS = {Qt.Key.Key_Up: -1, Qt.Key.Key_Down: 1}
 _PAGE_KEYS = {Qt.Key.Key_PageUp: -1, Qt.Key.Key_PageDown: 1}
 
@@ -67,7 +68,7 @@ class Badge(QWidget):
 
 
 class Column(QWidget):
-    """Badge, title and paragraphs below each other; it scrolls only if a small window cannot show them all."""
+    """A column of badge, title and paragraphs."""
 
     def __init__(
         self, icon: str, title: str, paragraphs: tuple[str, ...], colour: str = PARTICIPANT.accent, *, parent: QWidget
@@ -101,7 +102,7 @@ class Column(QWidget):
 
 
 class ReadingPage(PageWidget):
-    """A progress line, a column of text in the middle, and at most one button."""
+    """A page with a progress line, a column of text, which scrolls in small windows, and at most one button."""
 
     def __init__(
         self,
@@ -134,7 +135,7 @@ class ReadingPage(PageWidget):
             self.button.clicked.connect(self.go_on)
 
     def go_on(self) -> None:
-        """Do the action of the page's button."""
+        """Perform the action of the page's button; overridden by pages with a button."""
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         bar = self._scroll.verticalScrollBar()
@@ -146,8 +147,8 @@ class ReadingPage(PageWidget):
             super().keyPressEvent(event)
 
     def lay_out(self, scale: float) -> None:
-        """Centre the column, slightly above the middle; the button is at the start of its lines."""
-        least = self.font_scale > scale
+        """Place the column slightly above the middle, and the button below the start of its lines."""
+        is_enlarged = self.font_scale > scale
         scale = self.font_scale
         margin = round((40 if self.width() >= 1100 else 24) * scale)
         top = round(20 * scale)
@@ -161,16 +162,16 @@ class ReadingPage(PageWidget):
         if self.button is not None:
             self.button.set_scale(scale)
             below = self._below_button(width)
-            foot = self.button.height() + below + round((16 if least else 28) * scale)
-        room = self.height() - top - round((28 if least else 48) * scale) - foot
-        for text, badge in _MUST_BE_READ if least else _GIVING_WAY:
+            foot = self.button.height() + below + round((16 if is_enlarged else 28) * scale)
+        room = self.height() - top - round((28 if is_enlarged else 48) * scale) - foot
+        for text, badge in _CONSTANT if is_enlarged else _SHRINKING:
             self._column.set_scale(scale, text=text, badge=badge)
             needed = self._column.needed_height(width)
             if needed <= room:
                 break
         height = min(needed, room)
         self._column.setFixedSize(width, needed)
-        y = top + round((12 if least else 24) * scale) + round((room - height) * 0.42)
+        y = top + round((12 if is_enlarged else 24) * scale) + round((room - height) * 0.42)
         x = (self.width() - width) // 2
         bar = _SCROLLBAR if needed > height else 0
         self._scroll.setGeometry(x - (bar if self.mirrored else 0), y, width + bar, height)
@@ -188,7 +189,7 @@ class ReadingPage(PageWidget):
         return 0
 
     def _lay_out_head(self, _scale: float, _margin: int, top: int) -> int:
-        """Lay out the head from ``top``; return the top of the column's room [px]."""
+        """Lay out the head, starting at ``top``; return the top of the space for the column [px]."""
         return top
 
 
@@ -210,7 +211,7 @@ class _DeclineButton(QPushButton):
         self.setFixedSize(round(metrics.horizontalAdvance(self.text()) + 44 * scale), round(48 * scale))
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Decline with Enter, too, if the button has the focus, since Enter must not agree."""
+        """Decline if Enter is pressed while the button has the focus, since Enter would otherwise agree."""
         if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
             self.click()
         else:
@@ -218,10 +219,10 @@ class _DeclineButton(QPushButton):
 
 
 class TextWidget(ReadingPage):
-    """Consent, instructions, a break or the debrief.
+    """A page with consent, instructions, a break or the debrief.
 
-    Space or Enter continues; a consent requires its button, or Enter; another button declines. A break with a least
-    time shows a countdown in place of its button. Before the consent another language can be chosen.
+    Space or Enter continues, but a consent requires Enter or its button, and has a second button that declines. A break
+    with a minimum duration shows a countdown in place of its button. Another language can be chosen up to the consent.
     """
 
     def __init__(self, page: TextPage, context: PageContext) -> None:
@@ -240,11 +241,11 @@ class TextWidget(ReadingPage):
         self.languages: LanguageSwitch | None = None
         if page.languages:
             self.languages = LanguageSwitch(page.languages, page.language, wording.choose_language, self)
-            later = Qt.ConnectionType.QueuedConnection  # the page must not close while its button handles a key
-            self.languages.chosen.connect(self._choose_language, later)
+            # Queued, since the page must not close while its button handles a key.
+            self.languages.chosen.connect(self._choose_language, Qt.ConnectionType.QueuedConnection)
             for language in self.languages.buttons:
-                assert self.button is not None  # noqa: S101  # these pages have one
-                QWidget.setTabOrder(language, self.button)  # above the text, so before its button in the focus order
+                assert self.button is not None  # noqa: S101  # text pages have a button
+                QWidget.setTabOrder(language, self.button)  # above the button, so before it in the focus order
         self.decline = _DeclineButton(wording.decline, self) if self._consent else None
         if self.decline is not None:
             self.decline.clicked.connect(self._decline)
@@ -265,7 +266,7 @@ class TextWidget(ReadingPage):
 
     def tick(self) -> None:
         """Count down; at the end, show the button instead of the count."""
-        assert self.button is not None  # noqa: S101  # these pages have one
+        assert self.button is not None  # noqa: S101  # text pages have a button
         left = self.seconds_left
         self.count_label.setText(self._words.continue_in.format(seconds=left) if left else "")
         self.count_label.adjustSize()
@@ -282,7 +283,7 @@ class TextWidget(ReadingPage):
                 announce(self.button, self.button.text())
 
     def focus_first(self) -> None:
-        """Do not focus the consent's button, because Space must not agree."""
+        """Focus the button, except that of a consent, because Space must not agree."""
         if self._consent or self.button is None or self.button.isHidden():
             self.setFocus()
         else:
@@ -293,11 +294,10 @@ class TextWidget(ReadingPage):
         self.count_label.setFont(font("card", scale=self.font_scale * 1.125, weight=500, tabular=True))
         self.count_label.adjustSize()
         self._place_count()
-
         self._place_decline()
 
     def _below_button(self, width: int) -> int:
-        """Return the room for the decline button if both do not fit in one line."""
+        """Return the height of the decline button if it does not fit beside the other one."""
         if self.decline is None or self.button is None:
             return 0
         self.decline.set_scale(self.font_scale)
@@ -324,7 +324,7 @@ class TextWidget(ReadingPage):
         self.event_made.emit(EndRequested(self._clock(), "withdrawn", "no consent"))
 
     def _place_count(self) -> None:
-        assert self.button is not None  # noqa: S101  # these pages have one
+        assert self.button is not None  # noqa: S101  # text pages have a button
         place, size = self.button.geometry(), self.count_label.size()
         left = place.right() - size.width() - 3 if self.mirrored else place.left() + 4
         self.count_label.move(left, place.center().y() - size.height() // 2)
@@ -332,14 +332,14 @@ class TextWidget(ReadingPage):
     def _lay_out_head(self, scale: float, margin: int, top: int) -> int:
         if self.languages is None:
             return top
-        self.languages.set_scale(min(scale, self._room_for_languages(margin)))
+        self.languages.set_scale(min(scale, self._max_language_scale(margin)))
         width, height = self.languages.width(), self.languages.height()
         self.languages.move(margin if self.mirrored else self.width() - margin - width, top - 4)
         return top + height - 8
 
-    def _room_for_languages(self, margin: int) -> float:
+    def _max_language_scale(self, margin: int) -> float:
         """Return the largest scale at which the languages fit in one line."""
-        assert self.languages is not None  # noqa: S101  # asked only where there are some
+        assert self.languages is not None  # noqa: S101  # called only with languages
         self.languages.set_scale(1.0)
         return max(1.0, (self.width() - 2 * margin) / self.languages.width())
 
@@ -355,18 +355,18 @@ class TextWidget(ReadingPage):
             super().keyPressEvent(event)
 
     def go_on(self) -> None:
-        """Emit that the participant continues, once the page may be left."""
+        """Emit that the participant continues, if the page may be left."""
         if not self.seconds_left:
             self.event_made.emit(Continue(self._clock()))
 
 
-_VEIL = 0.80  # opacity of the pause above the page
+_VEIL = 0.80  # opacity of the pause page over the interrupted page
 
 
 class PauseWidget(ReadingPage):
-    """The pause page, shown over the interrupted page; after a force stop it says that the force is off.
+    """The pause page over a picture of the interrupted page; after a force stop it says that the force is off.
 
-    If only the operator can resume, it has no button. With a mouse, which has no force, it does not mention force.
+    It has no button if only the operator can resume. With a mouse, which has no force, it does not mention force.
     """
 
     def __init__(self, page: PausePage, context: PageContext, under: QPixmap | None = None) -> None:
@@ -383,7 +383,7 @@ class PauseWidget(ReadingPage):
         super().__init__(column, context, button)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Continue with Enter; Space could still be meant for the previous page."""
+        """Continue with Enter, but not with Space, which may be meant for the previous page."""
         if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
             self.go_on()
         else:
@@ -409,16 +409,16 @@ class PauseWidget(ReadingPage):
 
 
 class NoticeWidget(ReadingPage):
-    """The page after a failure or the end of the session: a calm sentence; the last page can be closed.
+    """The page after a failure or at the end of the session, with one sentence; the last page can be closed.
 
-    With a mouse as the device, the last page does not ask to let go of it.
+    The last page asks to let go of the device, unless it is a mouse.
     """
 
     def __init__(self, page: TroublePage | EndPage, context: PageContext) -> None:
         ended, wording = isinstance(page, EndPage), context.words
         icon, colour = ("check", PARTICIPANT.ok) if ended else ("info", PARTICIPANT.warn)
-        said = f"{page.paragraph} {wording.let_go}" if ended and not context.by_mouse else page.paragraph
-        column = (icon, page.title, (said,), colour)
+        paragraph = f"{page.paragraph} {wording.let_go}" if ended and not context.by_mouse else page.paragraph
+        column = (icon, page.title, (paragraph,), colour)
         button = (wording.close, wording.space_key) if ended else None
         super().__init__(column, context, button)
 

@@ -1,4 +1,4 @@
-"""The tank that the participant looks into: its camera, its glass and water, and what moves in it.
+"""The tank on the participant's screen: camera, glass and water, and the moving parts.
 
 Reading order: sprites; frame; arrows, captions, glass; layers.
 """

@@ -1,7 +1,7 @@
-"""One frame of the tank as values: what is drawn where, and which places differ from the frame before.
+"""A frame of the tank as values, and the region in which it differs from the previous frame.
 
-A frame is a table from the name of a thing to (state, place). Two frames with equal states look equal there, so that
-only the places of things whose state changed are painted anew.
+A frame maps the name of each part to its state and place. A part with the same state looks the same, so that only the
+places of parts whose state has changed are repainted.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ Point: TypeAlias = tuple[float, float, float]
 _Pixel: TypeAlias = tuple[float, float]
 
 _PITCH = math.radians(14.4)
-_DISTANCE = 3.3  # from the eye to the middle of the glass, in heights of the water beyond half the depth
-_LEAST_WIDTH = 2.05  # of the water, in its heights: a tank looks like a tank
-_LEAST_DEPTH = 1.2
-_GLASS_ABOVE = 0.13  # of the water's height
-_MARGIN_M = 0.0025  # between ball and glass
+_DISTANCE = 3.3  # from the eye to the front of the tank, in heights of the water
+_LEAST_WIDTH = 2.05  # of the water, in heights of the water
+_LEAST_DEPTH = 1.2  # likewise
+_GLASS_ABOVE = 0.13  # height of the glass above the water, in heights of the water
+_MARGIN_M = 0.0025  # least distance between ball and glass
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -75,8 +75,8 @@ class Camera:
         distance = _DISTANCE * (box.water - box.floor) + box.z
         eye_y = middle + math.sin(pitch) * distance
         eye_z = math.cos(pitch) * distance
-        bare = cls(eye_y=eye_y, eye_z=eye_z, focal=1.0, centre_x=0.0, centre_y=0.0, pitch=pitch)
-        pixels = [bare.point(corner) for corner in box.corners()]
+        unit_camera = cls(eye_y=eye_y, eye_z=eye_z, focal=1.0, centre_x=0.0, centre_y=0.0, pitch=pitch)
+        pixels = [unit_camera.point(corner) for corner in box.corners()]
         xs, ys = [x for x, _ in pixels], [y for _, y in pixels]
         focal = min(width / (max(xs) - min(xs)), height / (max(ys) - min(ys)))
         return cls(
@@ -105,12 +105,12 @@ class Camera:
 
 
 DEPTH_STEPS = 64
-_MARK = 0.8  # a target's mark on the floor, in radii of the target
+_MARK = 0.8  # size of a target's mark on the floor, in radii of the target
 _PLUMB_HALF_PX = 3.0
 
 
 class TaskShown(Protocol):
-    """The drawn properties of a task (see ``session.tasks.TaskView``)."""
+    """The properties of a task that are drawn (see ``session.tasks.TaskView``)."""
 
     @property
     def lit(self) -> int | None: ...
@@ -127,32 +127,32 @@ class TaskShown(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Placed:
-    """A drawn part whose appearance follows from ``state``, within ``place`` [px]."""
+class DrawnPart:
+    """A part of a frame, whose appearance depends only on ``state``, and the rectangle ``place`` around it [px]."""
 
     state: object
     place: QRectF
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class BallPlace:
-    """The drawn place of the proxy: centre, radius by depth step, haze, and the floor below it [px]."""
+class DrawnBall:
+    """The proxy as drawn: its centre, radius (by depth step) and haze, and the floor below it [px]."""
 
     middle: QPointF
     radius: float
     haze: float
     depth_m: float
     floor: QPointF
-    floor_radius: float  # by depth step
+    floor_radius: float  # of the shadow, by depth step
     floor_flat: float
-    spread: float  # of the shadow: wider and fainter the higher the ball
+    spread: float  # of the shadow, which is wider and fainter if the ball is higher
     shade: float
     feet: tuple[QPointF, ...]  # dots of the plumb line, from the floor up
 
 
 @dataclass(frozen=True, slots=True)
-class TargetPlace:
-    """The drawn place of a target: centre, radius, its marks on the floor (circle, diamond) and below it [px]."""
+class DrawnTarget:
+    """A target as drawn: its centre, radius, marks on the floor (circle, diamond) and plumb line [px]."""
 
     middle: QPointF
     radius: float
@@ -163,19 +163,19 @@ class TargetPlace:
 
     @property
     def place(self) -> QRectF:
-        """Return the square around ring, ticks and light."""
+        """The square around ring, ticks and light."""
         reach = self.radius * sprites.GLOW + 4
         return QRectF(self.middle.x() - reach, self.middle.y() - reach, 2 * reach, 2 * reach)
 
     @property
     def marks(self) -> QRectF:
-        """Return the rectangle around the marks on the floor and the line above them."""
+        """The rectangle around the marks on the floor and the line above them."""
         above = QRectF(self.middle, self.circle.boundingRect().center()).normalized().adjusted(-4, 0, 4, 0)
         return self.circle.boundingRect().united(self.diamond.boundingRect()).united(above).adjusted(-3, -3, 3, 3)
 
 
-def target_place(camera: Camera, box: Box, centre: Point, radius_m: float) -> TargetPlace:
-    """Return the drawn place of a target of ``radius_m`` around ``centre`` [m, hand]."""
+def drawn_target(camera: Camera, box: Box, centre: Point, radius_m: float) -> DrawnTarget:
+    """Return how a target of ``radius_m`` around ``centre`` [m, hand] is drawn."""
     x, _, z = centre
     reach = _MARK * radius_m
     circle = [
@@ -190,7 +190,7 @@ def target_place(camera: Camera, box: Box, centre: Point, radius_m: float) -> Ta
     ]
     middle = QPointF(*camera.point(centre))
     radius = radius_m * camera.scale(centre)
-    return TargetPlace(
+    return DrawnTarget(
         middle=middle,
         radius=radius,
         depth_m=camera.distance(centre),
@@ -201,7 +201,7 @@ def target_place(camera: Camera, box: Box, centre: Point, radius_m: float) -> Ta
 
 
 class BallPlacer:
-    """Computes the ball's drawn place; its size changes in depth steps, one sprite each."""
+    """Computes how the ball is drawn; its size changes in depth steps, each of which has a sprite."""
 
     def __init__(self, camera: Camera, box: Box, radius_m: float) -> None:
         self._camera, self._box, self._radius_m = camera, box, radius_m
@@ -210,7 +210,7 @@ class BallPlacer:
         self._nearest, self._step = nearest, (farthest - nearest) / (DEPTH_STEPS - 1)
 
     def size(self, step: int) -> tuple[float, float]:
-        """Return radius [px] and haze of a depth step, 0 the nearest."""
+        """Return the radius [px] and haze of a depth step; step 0 is the nearest."""
         distance = self._nearest + step * self._step
         return self._radius_m * self._camera.focal / distance, step / (DEPTH_STEPS - 1)
 
@@ -218,8 +218,8 @@ class BallPlacer:
         nearness = (self._camera.distance(point) - self._nearest) / self._step
         return min(max(round(nearness), 0), DEPTH_STEPS - 1)
 
-    def place(self, position_m: Point) -> BallPlace:
-        """Return the drawn place of a ball at ``position_m`` [m, hand]; it stays inside the glass."""
+    def place(self, position_m: Point) -> DrawnBall:
+        """Return how a ball at ``position_m`` [m, hand] is drawn; it stays inside the glass."""
         box, spare = self._box, self._radius_m
         x, y, z = position_m
         x = min(max(x, -box.x + spare), box.x - spare)
@@ -233,7 +233,7 @@ class BallPlacer:
         step = self.step((x, box.floor, z))
         floor_radius, _ = self.size(step)
         height = (y - box.floor) / (box.water - box.floor)
-        return BallPlace(
+        return DrawnBall(
             middle=middle,
             radius=radius,
             haze=haze,
@@ -248,45 +248,45 @@ class BallPlacer:
 
 
 def _plumb_dots(floor: QPointF, end: QPointF, pitch: float) -> tuple[QPointF, ...]:
-    """Return dots from the floor up to ``end``, ``pitch`` px apart, whose positions do not depend on the ball."""
-    along = end - floor
-    length = math.hypot(along.x(), along.y())
+    """Return dots from the floor up to ``end``, ``pitch`` px apart; they do not move when ``end`` moves up or down."""
+    line = end - floor
+    length = math.hypot(line.x(), line.y())
     return (
-        tuple(floor + along * (pitch * step / length) for step in range(int((length - 4) / pitch) + 1))
-        if length
-        else ()
+        tuple(floor + line * (pitch * step / length) for step in range(int((length - 4) / pitch) + 1)) if length else ()
     )
 
 
-def ball_parts(ball: BallPlace) -> dict[str, Placed]:
+def ball_parts(ball: DrawnBall) -> dict[str, DrawnPart]:
     """Return ball, shadow and plumb line as parts of a frame."""
     state = (ball.middle.x(), ball.middle.y(), ball.radius, ball.floor.x(), ball.floor.y())
-    around = ball.radius + 3
-    wide = ball.spread * ball.floor_radius * sprites.SOFT + 3
-    high = wide * ball.floor_flat + 3
+    radius = ball.radius + 3
+    half_width = ball.spread * ball.floor_radius * sprites.SOFT + 3
+    half_height = half_width * ball.floor_flat + 3
     line = QRectF(ball.floor, ball.middle).normalized()
     return {
-        "ball": Placed(state, QRectF(ball.middle.x() - around, ball.middle.y() - around, 2 * around, 2 * around)),
-        "shadow": Placed(state, QRectF(ball.floor.x() - wide, ball.floor.y() - high, 2 * wide, 2 * high)),
-        "plumb": Placed(state, line.adjusted(-_PLUMB_HALF_PX, 0, _PLUMB_HALF_PX, _PLUMB_HALF_PX)),
+        "ball": DrawnPart(state, QRectF(ball.middle.x() - radius, ball.middle.y() - radius, 2 * radius, 2 * radius)),
+        "shadow": DrawnPart(
+            state, QRectF(ball.floor.x() - half_width, ball.floor.y() - half_height, 2 * half_width, 2 * half_height)
+        ),
+        "plumb": DrawnPart(state, line.adjusted(-_PLUMB_HALF_PX, 0, _PLUMB_HALF_PX, _PLUMB_HALF_PX)),
     }
 
 
-def changed_region(before: dict[str, Placed], after: dict[str, Placed]) -> QRegion:
+def changed_region(before: dict[str, DrawnPart], after: dict[str, DrawnPart]) -> QRegion:
     """Return the region that differs between two frames [whole logical px]."""
     region = QRegion()
     for name in before.keys() | after.keys():
         old, new = before.get(name), after.get(name)
         if old is not None and new is not None and old.state == new.state:
             continue
-        for thing in (old, new):
-            if thing is not None:
-                region += thing.place.toAlignedRect()
+        for part in (old, new):
+            if part is not None:
+                region += part.place.toAlignedRect()
     return region
 
 
-def paint_marks(painter: QPainter, target: TargetPlace, stroke: float, *, is_lit: bool) -> None:
-    """Paint the marks with line widths relative to ``stroke`` [px]."""
+def paint_marks(painter: QPainter, target: DrawnTarget, stroke: float, *, is_lit: bool) -> None:
+    """Paint a target's marks on the floor with line widths relative to ``stroke`` [px]."""
     painter.setBrush(Qt.BrushStyle.NoBrush)
     ink = QColor(TANK.lit if is_lit else TANK.dim)
     ink.setAlphaF(0.62 if is_lit else 0.55)

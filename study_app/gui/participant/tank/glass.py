@@ -1,4 +1,4 @@
-"""How glass, water, light and floor of the tank are painted; used once for each size by ``paint_backdrop``."""
+"""Paint glass, water, light and floor of the tank; ``paint_backdrop`` does so once for each size."""
 
 import math
 from functools import cache
@@ -23,7 +23,7 @@ from study_app.gui.participant.tank.frame import Box, Camera, Point
 from study_app.gui.theme.theme import TANK
 
 COLUMNS, ROWS = 512, 320
-_RAYS = 2  # per cell and axis
+_RAYS = 2  # rays per cell and axis
 _BEND = 0.075  # largest shift of a ray, in widths of the floor
 _WAVES = 12
 SEED = 7
@@ -95,9 +95,9 @@ def _polygon(camera: Camera, points: list[Point]) -> QPolygonF:
 
 def ink(colour: str, alpha: int = 255) -> QColor:
     """Return a colour with an opacity from 0 to 255."""
-    made = QColor(colour)
-    made.setAlpha(alpha)
-    return made
+    tinted = QColor(colour)
+    tinted.setAlpha(alpha)
+    return tinted
 
 
 def _pen(colour: str, alpha: int, width: float) -> QPen:
@@ -107,8 +107,8 @@ def _pen(colour: str, alpha: int, width: float) -> QPen:
 
 def shade(gradient: QGradient, *stops: tuple[float, str, int]) -> QBrush:
     """Return a gradient brush with stops of position, colour and opacity."""
-    for place, colour, alpha in stops:
-        gradient.setColorAt(place, ink(colour, alpha))
+    for position, colour, alpha in stops:
+        gradient.setColorAt(position, ink(colour, alpha))
     return QBrush(gradient)
 
 
@@ -193,10 +193,10 @@ def paint_light(painter: QPainter, box: Box, camera: Camera) -> None:
     """Paint three shafts of light that fall from the surface at the back of the tank."""
     painter.save()
     painter.setCompositionMode(QPainter.CompositionMode.CompositionMode_Screen)
-    for place, wide, strength in ((-0.54, 0.10, 74), (0.0, 0.16, 96), (0.46, 0.12, 66)):
-        top = point_on_screen(camera, (place * box.x, box.water, -0.75 * box.z))
-        foot = point_on_screen(camera, (place * box.x * 1.04, box.floor, -0.6 * box.z))
-        half = (point_on_screen(camera, (wide * box.x, box.water, 0)) - point_on_screen(camera, (0, box.water, 0))).x()
+    for position, width, strength in ((-0.54, 0.10, 74), (0.0, 0.16, 96), (0.46, 0.12, 66)):
+        top = point_on_screen(camera, (position * box.x, box.water, -0.75 * box.z))
+        foot = point_on_screen(camera, (position * box.x * 1.04, box.floor, -0.6 * box.z))
+        half = (point_on_screen(camera, (width * box.x, box.water, 0)) - point_on_screen(camera, (0, box.water, 0))).x()
         painter.save()
         painter.translate(top)
         painter.shear((foot.x() - top.x()) / (foot.y() - top.y()), 0)

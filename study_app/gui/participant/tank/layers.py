@@ -1,4 +1,4 @@
-"""Still images of the tank: its backdrop, and the layers that are painted over each other."""
+"""The static images of the tank, and the layers that are painted over them."""
 
 import math
 import threading
@@ -14,7 +14,7 @@ from PySide6.QtWidgets import QWidget
 
 from study_app.gui.participant.pages.page_widget import page_painter
 from study_app.gui.participant.tank import glass
-from study_app.gui.participant.tank.frame import Box, Camera, Placed
+from study_app.gui.participant.tank.frame import Box, Camera, DrawnPart
 from study_app.gui.theme.theme import PARTICIPANT
 from study_app.video.frames import VideoFrame
 
@@ -35,7 +35,7 @@ class Backdrop:
 def paint_backdrop(size: tuple[int, int], ratio: float, box: Box, camera: Camera) -> Backdrop:
     """Return both images of a tank for a widget of ``size`` [logical px] on a screen with pixel ratio ``ratio``.
 
-    The last two are cached. It may be called in another thread in advance; a second caller waits for that result.
+    The last two results are cached. Another thread may call this in advance; a second caller waits for that result.
     """
     with _PAINTING:
         return _paint_backdrop(size, ratio, box, camera)
@@ -77,7 +77,7 @@ def _image_painter(image: QImage) -> QPainter:
 
 
 def _paint_room(painter: QPainter, area: QRectF, box: Box, camera: Camera) -> None:
-    """Paint the dark room, faint light around the tank, and its reflection on the table."""
+    """Paint the dark room, the faint light around the tank, and the tank's reflection on the table."""
     top, middle, bottom = ROOM
     painter.fillRect(
         area, glass.shade(QLinearGradient(0, 0, 0, area.height()), (0, top, 255), (0.6, middle, 255), (1, bottom, 255))
@@ -109,12 +109,12 @@ def _dither_image(image: QImage) -> QImage:
     random = np.random.Generator(np.random.PCG64(SEED))
     noise = random.integers(0, 257, (height, width, 1), np.uint16)
     flat = np.empty((height, width, 4), np.uint8)
-    for channel, place in ((0, 2), (1, 1), (2, 0)):
-        flat[..., place] = (np.minimum(deep[..., channel : channel + 1], 65278) + noise)[..., 0] // 257
+    for channel, byte in ((0, 2), (1, 1), (2, 0)):
+        flat[..., byte] = (np.minimum(deep[..., channel : channel + 1], 65278) + noise)[..., 0] // 257
     flat[..., 3] = 255
-    made = QImage(flat.data, width, height, 4 * width, QImage.Format.Format_RGB32).copy()
-    made.setDevicePixelRatio(ratio)
-    return made
+    dithered = QImage(flat.data, width, height, 4 * width, QImage.Format.Format_RGB32).copy()
+    dithered.setDevicePixelRatio(ratio)
+    return dithered
 
 
 _MOVING_MPS = 0.020
@@ -158,17 +158,17 @@ class OnsetPatch:
         return self.lit
 
 
-_PATCH = (88.0, 72.0)  # black square, white square in its corner [logical px]
+_PATCH = (88.0, 72.0)  # sides of the black square and of the white square in its corner [logical px]
 
 
-def patch_place(width: float, height: float) -> QRectF:
-    """Return the patch's place in a window of this size [logical px]."""
+def patch_rectangle(width: float, height: float) -> QRectF:
+    """Return the rectangle of the patch in a window of this size [logical px]."""
     black, _ = _PATCH
     return QRectF(width - black, height - black, black, black)
 
 
 def paint_patch(painter: QPainter, place: QRectF, *, lit: bool) -> None:
-    """Paint the patch into its place."""
+    """Paint the patch into ``place``; if ``lit``, with the white square."""
     black, white = _PATCH
     painter.fillRect(place, QColor(Qt.GlobalColor.black))
     if lit:
@@ -176,20 +176,20 @@ def paint_patch(painter: QPainter, place: QRectF, *, lit: bool) -> None:
 
 
 class Pane(QOpenGLWidget):
-    """A surface that fills its parent and is painted by ``paint`` whenever it is updated.
+    """A surface of the graphics card that is painted by ``paint`` whenever it is updated.
 
-    ``swapped`` is emitted after each buffer swap, when the frame is on its way to the screen; swaps are synchronised to
-    the refresh.
+    ``swapped`` is emitted after each buffer swap, which sends the frame to the screen; swaps are synchronised to the
+    refresh.
     """
 
     swapped = Signal()
 
     def __init__(self, parent: QWidget, paint: Callable[[QPainter, QRegion], None]) -> None:
         super().__init__(parent)
-        wanted = QSurfaceFormat()
-        wanted.setSwapInterval(1)
-        wanted.setSamples(4)  # thin strokes are smoothed by the card
-        self.setFormat(wanted)
+        surface_format = QSurfaceFormat()
+        surface_format.setSwapInterval(1)
+        surface_format.setSamples(4)  # thin strokes are smoothed by the card
+        self.setFormat(surface_format)
         self._paint = paint
         self.frameSwapped.connect(self.swapped)
 
@@ -200,8 +200,8 @@ class Pane(QOpenGLWidget):
         painter.end()
 
 
-def video_place(camera: Camera, box: Box) -> QRectF:
-    """Return the place of a video, which is that of the tank [px]."""
+def video_area(camera: Camera, box: Box) -> QRectF:
+    """Return the rectangle of a video, which is that of the tank [px]."""
     xs, ys = zip(*map(camera.point, box.corners()), strict=True)
     return QRectF(QPointF(min(xs), min(ys)), QPointF(max(xs), max(ys))).toAlignedRect().toRectF()
 
@@ -221,15 +221,15 @@ class VideoLayer:
         self._frame = frame
 
     @property
-    def placed_frame(self) -> Placed:
-        return Placed(None if self._frame is None else self._frame.number, self.place)
+    def placed_frame(self) -> DrawnPart:
+        return DrawnPart(None if self._frame is None else self._frame.number, self.place)
 
     def size(self, ratio: float) -> tuple[int, int]:
         return max(2, int(self.place.width() * ratio)), max(2, int(self.place.height() * ratio))
 
     def paint(self, painter: QPainter, region: QRegion) -> None:
-        around = region.boundingRect()
-        painter.fillRect(around, QColor(PARTICIPANT.window))
+        area = region.boundingRect()
+        painter.fillRect(area, QColor(PARTICIPANT.window))
         if self._frame is not None and region.intersects(self.place.toAlignedRect()):
             painter.drawImage(self.frame_place(self._frame), self._image)
 

@@ -1,4 +1,4 @@
-"""Sprites of the tank: an image and its middle, drawn at sub-pixel places, so that slow motion does not step."""
+"""Sprites of the tank, drawn at sub-pixel positions so that slow motion is smooth."""
 
 import math
 from dataclasses import dataclass
@@ -10,35 +10,35 @@ from PySide6.QtGui import QColor, QImage, QLinearGradient, QPainter, QPainterPat
 from study_app.gui.theme.theme import TANK
 
 GLOW = 1.55  # reach of the lit ring's light, in radii
-_TICK = (1.18, 1.32)
+_TICK = (1.18, 1.32)  # inner and outer end of a ring's tick, in radii
 SOFT = 1.5  # reach of a shadow, in radii of the ball
 
 
 @dataclass(frozen=True, slots=True)
 class Sprite:
-    """An image and the half extents of its place around a centre [logical px]."""
+    """An image and the half extents of its rectangle around a centre [logical px]."""
 
     image: QImage
     half_width: float
     half_height: float
 
-    def place(self, middle: QPointF, grown: float = 1.0) -> QRectF:
+    def place(self, middle: QPointF, scale: float = 1.0) -> QRectF:
         """Return the sprite's rectangle around ``middle``."""
-        wide, high = grown * self.half_width, grown * self.half_height
-        return QRectF(middle.x() - wide, middle.y() - high, 2 * wide, 2 * high)
+        width, height = scale * self.half_width, scale * self.half_height
+        return QRectF(middle.x() - width, middle.y() - height, 2 * width, 2 * height)
 
 
 def _empty_sprite(half_width: float, half_height: float, ratio: float) -> tuple[Sprite, QPainter]:
     """Return an empty sprite with a margin for its edge, and a painter with the origin at its centre."""
-    wide, high = math.ceil(half_width * ratio) + 1, math.ceil(half_height * ratio) + 1
-    image = QImage(2 * wide, 2 * high, QImage.Format.Format_ARGB32_Premultiplied)
+    half_columns, half_rows = math.ceil(half_width * ratio) + 1, math.ceil(half_height * ratio) + 1
+    image = QImage(2 * half_columns, 2 * half_rows, QImage.Format.Format_ARGB32_Premultiplied)
     image.fill(Qt.GlobalColor.transparent)
     painter = QPainter(image)
     painter.setRenderHint(QPainter.RenderHint.Antialiasing)
     painter.setPen(Qt.PenStyle.NoPen)
-    painter.translate(wide, high)
+    painter.translate(half_columns, half_rows)
     painter.scale(ratio, ratio)
-    return Sprite(image, wide / ratio, high / ratio), painter
+    return Sprite(image, half_columns / ratio, half_rows / ratio), painter
 
 
 def _ink(colour: str, alpha: float = 1.0) -> QColor:
@@ -138,7 +138,7 @@ def ring_sprite(radius: float, ratio: float, stroke: float) -> Sprite:
 
 @lru_cache(maxsize=32)
 def diamond_sprite(radius: float, ratio: float, stroke: float) -> Sprite:
-    """Return a dim target: a dashed diamond of half diagonal ``radius`` [logical px]."""
+    """Return a target that is not lit: a dashed diamond with half diagonal ``radius`` [logical px]."""
     reach = radius + 2 * stroke
     sprite, painter = _empty_sprite(reach, reach, ratio)
     corners = [QPointF(0, -radius), QPointF(radius, 0), QPointF(0, radius), QPointF(-radius, 0)]
@@ -161,9 +161,9 @@ def dashed_pen(ink: QColor, stroke: float, side: float, count: int) -> QPen:
 
 
 def draw_sprite(
-    painter: QPainter, sprite: Sprite, middle: QPointF, *, opacity: float = 1.0, grown: float = 1.0
+    painter: QPainter, sprite: Sprite, middle: QPointF, *, opacity: float = 1.0, scale: float = 1.0
 ) -> None:
-    """Draw a sprite around a sub-pixel position, ``grown`` times its size."""
+    """Draw a sprite around ``middle``, which may be between pixels, at ``scale`` times its size."""
     painter.setOpacity(opacity)
-    painter.drawImage(sprite.place(middle, grown), sprite.image)
+    painter.drawImage(sprite.place(middle, scale), sprite.image)
     painter.setOpacity(1.0)
