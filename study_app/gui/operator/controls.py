@@ -1,4 +1,4 @@
-"""What the operator can do: stop the force, pause, repeat, end, write a note, have the device examined."""
+"""The operator's controls: stop the force, pause, repeat, end the session, write notes, diagnose the device."""
 
 from PySide6.QtCore import QRectF, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QKeyEvent, QPainter, QPaintEvent
@@ -26,7 +26,7 @@ from study_app.number_text import clock_text
 
 
 class Actions(Card):
-    """The bar of buttons at the bottom."""
+    """The bar of buttons at the bottom of the window."""
 
     def __init__(self) -> None:
         super().__init__(padding=14)
@@ -36,23 +36,23 @@ class Actions(Card):
         self.end = ActionButton("cross", "End session …", role="danger")
         self.close_session = ActionButton("check", "Close session", role="primary")
         self._resumes = False
-        self._signs = True
+        self._shows_icons = True
         row = hbox(self.pause, self.repeat, STRETCH, self.end, self.close_session, spacing=10)
-        for button in (self.pause, self.repeat, self.end, self.close_session):
-            button.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)  # its padding shrinks
+        for button in (self.pause, self.repeat, self.end, self.close_session):  # whose padding can shrink
+            button.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
         self.close_session.hide()
         add_parts(self.column, row, self.hint)
 
-    def set_narrow(self, yes: bool) -> None:
-        """Hide the buttons' icons if there is no room for them."""
-        self._signs = not yes
-        for button, sign in ((self.repeat, "repeat"), (self.end, "cross")):
-            button.show_action("" if yes else sign, button.text())
+    def set_narrow(self, narrow: bool) -> None:
+        """Hide the buttons' icons if the bar is narrow."""
+        self._shows_icons = not narrow
+        for button, icon in ((self.repeat, "repeat"), (self.end, "cross")):
+            button.show_action("" if narrow else icon, button.text())
         self._show_pause()
 
     def _show_pause(self) -> None:
-        sign, text = ("play", "Resume") if self._resumes else ("pause", "Pause")
-        self.pause.show_action(sign if self._signs else "", text)
+        icon, text = ("play", "Resume") if self._resumes else ("pause", "Pause")
+        self.pause.show_action(icon if self._shows_icons else "", text)
 
     def show_view(self, view: OperatorView) -> None:
         self._resumes = view.may_resume
@@ -68,7 +68,7 @@ class Actions(Card):
 
     @property
     def pause_request(self) -> str:
-        """The request of the first button."""
+        """The request that the pause button makes now: "pause" or "resume"."""
         return "resume" if self._resumes else "pause"
 
 
@@ -103,8 +103,8 @@ class _NoteField(QPlainTextEdit):
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Store the note on Enter; leave Esc to the window."""
-        plain = not event.modifiers() & Qt.KeyboardModifier.ShiftModifier
-        if event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter} and plain:
+        is_unshifted = not event.modifiers() & Qt.KeyboardModifier.ShiftModifier
+        if event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter} and is_unshifted:
             self.entered.emit()
         elif event.key() == Qt.Key.Key_Escape:
             self.clearFocus()
@@ -114,7 +114,7 @@ class _NoteField(QPlainTextEdit):
 
 
 class NotesCard(Card):
-    """The last notes and marks, a field for the next, and two buttons."""
+    """The last notes and marks, a field for a new note, and buttons to add a note or a mark."""
 
     note_written = Signal(str)
 
@@ -135,7 +135,7 @@ class NotesCard(Card):
         self.mark = ActionButton("flag", "Mark", key="M")
         buttons = hbox((self.add, 1), (self.mark, 1), spacing=12)
         add_parts(self.column, self._head, self._list, (self.field, 1), self.hint, buttons)
-        self.field.entered.connect(self._keep_note)
+        self.field.entered.connect(self._submit_note)
         self.add.clicked.connect(self._add_note)
 
     def set_note_count(self, count: int) -> None:
@@ -162,11 +162,11 @@ class NotesCard(Card):
 
     def _add_note(self) -> None:
         if self.field.toPlainText().strip():
-            self._keep_note()
+            self._submit_note()
         else:
             self.field.setFocus(Qt.FocusReason.ShortcutFocusReason)
 
-    def _keep_note(self) -> None:
+    def _submit_note(self) -> None:
         text = self.field.toPlainText().strip()
         if text:
             self.field.clear()
@@ -174,7 +174,7 @@ class NotesCard(Card):
 
 
 class _NoteRow(QWidget):
-    """Sign, time and text; the newest note has two lines, and elided texts are complete in the tip."""
+    """A note with its icon, time and text, which has up to two lines in the newest note."""
 
     def __init__(self, *, newest: bool) -> None:
         super().__init__()
@@ -195,7 +195,7 @@ LEAST_WIDTH, LEAST_HEIGHT = 320, 160
 
 
 class _StopButton(Themed, QPushButton):
-    """STOP FORCE, with the other ways to stop it; it acts when pressed, not when released."""
+    """The button STOP FORCE, which names other ways to stop; it acts when pressed, not when released."""
 
     def __init__(self, device_button: str) -> None:
         super().__init__()
@@ -228,9 +228,9 @@ class _StopButton(Themed, QPushButton):
 
 
 class StopPanel(Card):
-    """The stop button below a line with the state of the force, and after a stop the button to resume.
+    """The stop button, the state of the force above it, and after a stop the button to resume.
 
-    For a device without force (``felt``) the line says so; ``device_button`` is the device button that also stops the
+    ``felt`` tells whether the device exerts force; ``device_button`` names the device's button that also stops the
     force, if any.
     """
 
@@ -242,9 +242,9 @@ class StopPanel(Card):
         self.fade_in = ActionButton("", "Fade in again", height=36)
         self.stop = _StopButton(device_button)
         row = hbox(self.sign, self.word, STRETCH, self.fade_in, spacing=10, margins=(6, 0, 0, 0))
-        keep = self.fade_in.sizePolicy()
-        keep.setRetainSizeWhenHidden(True)
-        self.fade_in.setSizePolicy(keep)
+        policy = self.fade_in.sizePolicy()
+        policy.setRetainSizeWhenHidden(True)
+        self.fade_in.setSizePolicy(policy)
         self.fade_in.hide()
         add_parts(self.column, row, (self.stop, 1))
 
@@ -268,7 +268,7 @@ ALL_ROWS = 99
 
 
 class DeviceCard(Card):
-    """Name, state and rows of the device."""
+    """The name, state and properties of the device."""
 
     def __init__(self) -> None:
         super().__init__(padding=16, gap=10)
@@ -277,7 +277,7 @@ class DeviceCard(Card):
         self.chip = Chip("neutral", "ring", "Waiting", small=True)
         self.diagnose = ActionButton("pulse", "Diagnose …", key="D", height=36)
         self.diagnose.setToolTip("Turns off the force and pauses the session first")
-        self._most = ALL_ROWS
+        self._row_limit = ALL_ROWS
         self._view: OperatorView | None = None
         row = hbox(self.icon, self.name, STRETCH, self.chip, spacing=10)
         add_layout(self.column, row)
@@ -286,9 +286,9 @@ class DeviceCard(Card):
         add_parts(self.column, self._grid, self.diagnose)
         self.rows: list[tuple[QLabel, Elided]] = []
 
-    def show_rows(self, most: int) -> None:
+    def set_row_limit(self, most: int) -> None:
         """Show at most ``most`` rows; the others are in the card's tip."""
-        self._most = most
+        self._row_limit = most
         if self._view is not None:
             self.show_view(self._view)
 
@@ -304,9 +304,9 @@ class DeviceCard(Card):
             self._grid.addWidget(name, len(self.rows), 0)
             self._grid.addWidget(value, len(self.rows), 1)
             self.rows.append((name, value))
-        for index, ((name, value), (word, said)) in enumerate(zip(self.rows, device.rows, strict=True)):
-            name.setText(word)
-            value.show_text(said)
+        for index, ((name, value), (name_text, value_text)) in enumerate(zip(self.rows, device.rows, strict=True)):
+            name.setText(name_text)
+            value.show_text(value_text)
             for part in (name, value):
-                part.setVisible(index < self._most)
-        self.setToolTip(plain_tip("\n".join(f"{word}: {said}" for word, said in device.rows[self._most :])))
+                part.setVisible(index < self._row_limit)
+        self.setToolTip(plain_tip("\n".join(f"{name}: {value}" for name, value in device.rows[self._row_limit :])))

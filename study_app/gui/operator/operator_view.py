@@ -1,6 +1,6 @@
-"""What the operator's window shows, as one frozen value: widgets only draw it. No Qt here.
+"""The content of the operator's window as one immutable value, without Qt.
 
-Nothing here says a liquid, a parameter or a delay; nor, in a double-blind study, a force or what a limiter did.
+It never contains a liquid, a parameter or a delay nor, in a double-blind study, a force or the action of a limiter.
 """
 
 from collections import Counter
@@ -46,7 +46,7 @@ class TrialTime:
 
     @property
     def words(self) -> str:
-        """Return "1:08 of 2:00", or "1:08"."""
+        """The elapsed time and its limit, if any: "1:08 of 2:00"."""
         elapsed = clock_text(self.elapsed_s)
         return f"{elapsed} of {clock_text(self.most_s)}" if self.most_s else elapsed
 
@@ -63,11 +63,11 @@ class DeviceView:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OperatorView:
-    """The content of the operator's window except the data of the two plots.
+    """The content of the operator's window except the data of the plots.
 
-    ``elapsed_s`` is the working time without the gap before a resumption. ``main_trials`` counts finished trials and
-    all. ``trial`` is the number of the trial being presented or answered. ``waits`` means that writing to the disk
-    fails; the session continues when it succeeds again. ``beyond`` lists a slower device than at the start, lost
+    ``elapsed_s`` is the working time without the gap before a resumption. ``main_trials`` counts the finished main
+    trials, and all. ``trial`` is the number of the trial being presented or answered. ``waits`` means that writing to
+    the disk fails; the session continues when it succeeds again. ``beyond`` lists problems: a slower device, lost
     outlets and recordings, undelivered trials, and the limits violated by each trial, newest first. ``may_reconnect``
     means that a failed device can be reconnected, ``reconnects`` that this is under way, ``reconnection`` is its
     progress, or why it failed. ``track`` is the progress of the track of the latest trial with a design, without a
@@ -112,13 +112,13 @@ class OperatorView:
         return f"{done} of {of} {'trial' if of == 1 else 'trials'}"
 
 
-# A block of more trials than this is one row of the rail ("Delay settings 1 to 7"), so that a day's study fits it.
+# A block with more trials is a single row of the rail ("Delay settings 1 to 7"), so that a long study fits.
 _ROWS_PER_BLOCK = 4
 
 
 @dataclass(frozen=True, slots=True)
 class Stage:
-    """One row of the rail: the schedule's steps ``first`` to ``last`` under one neutral ``label``."""
+    """One row of the rail: the schedule's steps from ``first`` to ``last`` under a neutral ``label``."""
 
     label: str
     first: int
@@ -127,7 +127,7 @@ class Stage:
 
 @dataclass(frozen=True, slots=True)
 class Session:
-    """The constant data of a session that are shown: participant, devices, and limits."""
+    """The displayed data of a session that do not change: participant, device and limits."""
 
     protocol: Protocol
     schedule: Schedule
@@ -142,7 +142,7 @@ class Session:
 
     @property
     def language(self) -> str:
-        """The language of the operator's window: English, if the study has it, else its first."""
+        """The language of the operator's window: English if the study has it, otherwise the study's first."""
         return operator_language(self.protocol)
 
     def trial(self, progress: Progress) -> Trial | None:
@@ -152,14 +152,15 @@ class Session:
 
     def main_trials(self, progress: Progress) -> tuple[int, int]:
         """Return the number of finished main trials, and their total number."""
-        main = [at for at, step in enumerate(self.schedule.steps) if isinstance(step, Trial) and step.phase == "main"]
-        return sum(at < progress.here or progress.reached_end for at in main), len(main)
+        main = [i for i, step in enumerate(self.schedule.steps) if isinstance(step, Trial) and step.phase == "main"]
+        return sum(index < progress.here or progress.reached_end for index in main), len(main)
 
     def broken_limits(self, progress: Progress) -> dict[int, tuple[Broken, ...]]:
         """Return the limits violated by finished trials that the operator may know: only timing if double-blind."""
         hidden = SEALED if self.protocol.study.blinding == "double" else frozenset()
         return {
-            trial: tuple(limit for limit in them if limit[0] not in hidden) for trial, them in progress.broken.items()
+            trial: tuple(limit for limit in limits if limit[0] not in hidden)
+            for trial, limits in progress.broken.items()
         }
 
 
@@ -247,8 +248,8 @@ def _track_lines(session: Session, progress: Progress) -> tuple[str, ...]:
     design = session.protocol.design_of(session.protocol.blocks[trial.block])
     names = words(session.language).design_answers
     lines = track_lines(progress, session.schedule, trial, {answer: names[answer] for answer in design.answers})
-    own = session.protocol.study.codes == "participant"
-    return (lines[0].replace(f" {trial.code}:", ":", 1), *lines[1:]) if own else lines
+    is_coded_per_participant = session.protocol.study.codes == "participant"
+    return (lines[0].replace(f" {trial.code}:", ":", 1), *lines[1:]) if is_coded_per_participant else lines
 
 
 def _state(progress: Progress, *, force_on: bool, trouble: str) -> State:
@@ -308,14 +309,14 @@ def _heading(session: Session, progress: Progress) -> str:
 
 def _setting_line(session: Session, progress: Progress, *, answering: bool) -> str:
     if progress.ended:
-        shown = f"Fingerprint {progress.fingerprint}" if progress.fingerprint else ""
-        return "  ·  ".join(filter(None, ("All answers are on disk", str(progress.missing_trials), shown)))
+        fingerprint = f"Fingerprint {progress.fingerprint}" if progress.fingerprint else ""
+        return "  ·  ".join(filter(None, ("All answers are on disk", str(progress.missing_trials), fingerprint)))
     trial = session.trial(progress)
     if trial is None:
         if progress.here < 0:
             return "The first page will appear shortly"
-        filled_in = isinstance(session.schedule.steps[progress.here], FormStep)
-        return "The participant is filling in a form" if filled_in else "The participant is reading"
+        is_form = isinstance(session.schedule.steps[progress.here], FormStep)
+        return "The participant is filling in a form" if is_form else "The participant is reading"
     block = session.protocol.blocks[trial.block]
     task = session.protocol.tasks[block.task]
     doing = task.activity
@@ -347,13 +348,13 @@ def _trial_time(session: Session, progress: Progress, now_s: float) -> TrialTime
 
 
 def _step_row(stage: Stage, progress: Progress) -> StepRow:
-    many = stage.last - stage.first + 1
-    spent = sum(progress.durations_s.get(step, 0.0) for step in range(stage.first, stage.last + 1))
+    count = stage.last - stage.first + 1
+    spent_s = sum(progress.durations_s.get(step, 0.0) for step in range(stage.first, stage.last + 1))
     if progress.here > stage.last or progress.reached_end:
-        return StepRow(stage.label, "done", clock_text(spent))
+        return StepRow(stage.label, "done", clock_text(spent_s))
     if stage.first <= progress.here <= stage.last:
-        place = f"{progress.here - stage.first + 1} of {many}" if many > 1 else "now"
-        return StepRow(stage.label, "now", "" if progress.ended else place)
+        position = f"{progress.here - stage.first + 1} of {count}" if count > 1 else "now"
+        return StepRow(stage.label, "now", "" if progress.ended else position)
     return StepRow(stage.label, "open", "")
 
 
@@ -386,12 +387,14 @@ def _lost_recording_sentences(session: Session, progress: Progress, lost: Mappin
     )
 
 
-def _incomplete_recording_sentences(session: Session, progress: Progress, now: Mapping[int, int]) -> tuple[str, ...]:
+def _incomplete_recording_sentences(
+    session: Session, progress: Progress, current: Mapping[int, int]
+) -> tuple[str, ...]:
     """Return a sentence for every trial whose recording lacks samples, newest first."""
     labels = {trial.number: trial.label(session.protocol, session.language) for trial in session.schedule.trials}
     return tuple(
         f"The recording of {labels[number]} is missing {grouped(count)} samples because the disk is too slow"
-        for number, count in sorted({**progress.lacking, **now}.items(), reverse=True)
+        for number, count in sorted({**progress.lacking, **current}.items(), reverse=True)
     )
 
 
@@ -409,9 +412,9 @@ def _limit_sentences(session: Session, progress: Progress) -> tuple[str, ...]:
     """Return a sentence for every finished trial that violated a limit, newest first."""
     labels = {trial.number: trial.label(session.protocol, session.language) for trial in session.schedule.trials}
     return tuple(
-        f"{labels[number]} exceeded limits: " + "; ".join(broken_limit_text(*limit) for limit in beyond)
-        for number, beyond in reversed(session.broken_limits(progress).items())
-        if beyond
+        f"{labels[number]} exceeded limits: " + "; ".join(broken_limit_text(*limit) for limit in limits)
+        for number, limits in reversed(session.broken_limits(progress).items())
+        if limits
     )
 
 
@@ -447,23 +450,25 @@ def _block_rows(protocol: Protocol, schedule: Schedule, first: int, last: int, l
 
 
 _LONG_RUN: Final = 8
-"""So many equal answers in a row are marked."""
+"""The number of equal answers in a row from which a run is called unusually long."""
 _FAST_S: Final = 0.3
-"""A median time to answer below this is marked [s]."""
+"""The median response time below which it is called unusually short [s]."""
 
 
 def track_lines(progress: Progress, schedule: Schedule, trial: Trial, choices: Mapping[str, str]) -> tuple[str, ...]:
-    """Return lines about the track of ``trial``; ``choices`` maps its answers to labels.
+    """Return lines about the progress of the track of ``trial``; ``choices`` maps its answers to labels.
 
-    A line that says "unusually" deserves attention.
+    "unusually" in a line marks a result that deserves the operator's attention.
     """
-    own = [planned.number for planned in schedule.trials if (planned.block, planned.code) == (trial.block, trial.code)]
-    answers = [progress.trial_answers[number] for number in own if number in progress.trial_answers]
-    limits = Counter(limit for number in own for limit in progress.undelivered.get(number, ()))
-    given_up = [lost for lost in progress.missing_trials.missing if lost.trial in own]
-    reasons = Counter(reason for number in own for reason in progress.repeated.get(number, ()))
+    numbers = [
+        planned.number for planned in schedule.trials if (planned.block, planned.code) == (trial.block, trial.code)
+    ]
+    answers = [progress.trial_answers[number] for number in numbers if number in progress.trial_answers]
+    limits = Counter(limit for number in numbers for limit in progress.undelivered.get(number, ()))
+    given_up = [lost for lost in progress.missing_trials.missing if lost.trial in numbers]
+    reasons = Counter(reason for number in numbers for reason in progress.repeated.get(number, ()))
     return (
-        f"Track {trial.code}: {len(answers)} of at most {grouped(len(own))} trials answered",
+        f"Track {trial.code}: {len(answers)} of at most {grouped(len(numbers))} trials answered",
         *(_answer_lines(answers, choices) if answers else ()),
         *(f"{count} repeated: {reason}" for reason, count in reasons.items()),
         *(f"{count} not delivered: {REASONS.get(limit, limit)}" for limit, count in limits.items()),
@@ -472,12 +477,12 @@ def track_lines(progress: Progress, schedule: Schedule, trial: Trial, choices: M
 
 
 def _answer_lines(answers: Sequence[TrialAnswer], choices: Mapping[str, str]) -> list[str]:
-    given = [str(answer.value) for answer in answers]
-    shares = ", ".join(f"{label} {100 * given.count(choice) / len(given):.0f} %" for choice, label in choices.items())
-    run = max(len(list(same)) for _, same in groupby(given))
+    values = [str(answer.value) for answer in answers]
+    shares = ", ".join(f"{label} {100 * values.count(choice) / len(values):.0f} %" for choice, label in choices.items())
+    run = max(len(list(same)) for _, same in groupby(values))
     lines = [*([shares] if shares else []), f"longest run {run}" + (", unusually long" if run >= _LONG_RUN else "")]
     seconds = [answer.seconds for answer in answers if answer.seconds is not None]
     if seconds:
-        middle = median(seconds)
-        lines.append(f"median response time {middle:.2f} s" + (", unusually short" if middle < _FAST_S else ""))
+        median_s = median(seconds)
+        lines.append(f"median response time {median_s:.2f} s" + (", unusually short" if median_s < _FAST_S else ""))
     return lines

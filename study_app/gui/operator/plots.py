@@ -1,4 +1,4 @@
-"""What the operator watches: tiles of the servo's health, and plots of force, position and lateness."""
+"""The operator's displays: tiles with the servo's health, and plots of force, position and lateness."""
 
 import pyqtgraph as pg
 from PySide6.QtCore import QPointF, QSize, Qt
@@ -24,9 +24,9 @@ from study_app.gui.widgets.live_plots import (
 )
 
 _FIELD = QSize(320, 210)
-"""What the card asks for, whether it shows the force or hides it."""
-_LEAST_SHARE = 1 / 16  # share of the limit: a smaller range would show noise as large as force
-_NARROWS_BELOW = 0.8  # hysteresis of the range, so that a force at its edge does not toggle the scale
+"""The preferred size of the force card, whether it shows the force or hides it."""
+_MIN_RANGE = 1 / 16  # of the limit: a smaller range would make noise look like force
+_NARROW_BELOW = 0.8  # hysteresis of the range, so that a force at its edge does not toggle the scale
 _FILL_ALPHA = 46
 
 
@@ -38,37 +38,37 @@ class _ForcePlot(TracePlot):
 
     limits: tuple[pg.InfiniteLine, ...] = ()
     limit_name: pg.TextItem | None = None
-    size_field: pg.PlotCurveItem | None = None
+    magnitude_area: pg.PlotCurveItem | None = None
 
     def __init__(self, limit_n: float) -> None:
         super().__init__(TRACE_WINDOW_S, limit_n, (*NAMES, "size"))
         self.limit_n = limit_n
-        self._least = limit_n * _LEAST_SHARE
-        self.size_field = pg.PlotCurveItem(fillLevel=0.0)  # the last curve's field, without its line
-        self.size_field.setZValue(-5)
+        self._least = limit_n * _MIN_RANGE
+        self.magnitude_area = pg.PlotCurveItem(fillLevel=0.0)  # the area below the magnitude
+        self.magnitude_area.setZValue(-5)
         self.limits = tuple(pg.InfiniteLine(sign * limit_n, angle=0) for sign in (1, -1))
         self.limit_name = pg.TextItem(f"limit {tick_text(limit_n)} N", anchor=(0, 0))
         self.limit_name.textItem.setFont(font("small", weight=600, tabular=True))
         self.limit_name.textItem.document().setDocumentMargin(NAME_MARGIN)
-        for item in (self.size_field, *self.limits, self.limit_name):
+        for item in (self.magnitude_area, *self.limits, self.limit_name):
             self.box.addItem(item)
         self.axes["bottom"].setHeight(6)
         self.show_ticks("bottom", [])
-        self._make_room()
+        self._fit_axes()
         self.apply_theme(LIGHT)
 
     def show_forces(self, times_s: Floats, forces_n: Floats) -> None:
-        """Draw forces (n, 4: x, y, z, size) [N]."""
+        """Draw forces (n, 4: x, y, z, magnitude) [N] over times before now (n,) [s]."""
         peak = float(forces_n[:, 3].max(initial=0.0))
-        wanted = min(max(peak, self._least), self.limit_n)
-        if wanted < _NARROWS_BELOW * self.reach:
-            self.show_reach(wanted / _NARROWS_BELOW if wanted < self.limit_n else self.limit_n)
+        reach = min(max(peak, self._least), self.limit_n)
+        if reach < _NARROW_BELOW * self.reach:
+            self.show_reach(reach / _NARROW_BELOW if reach < self.limit_n else self.limit_n)
         self.show_traces(times_s, forces_n)
-        if self.size_field is not None:
-            self.size_field.setData(times_s, forces_n[:, 3])
+        if self.magnitude_area is not None:
+            self.magnitude_area.setData(times_s, forces_n[:, 3])
 
-    def _make_room(self) -> None:
-        super()._make_room()
+    def _fit_axes(self) -> None:
+        super()._fit_axes()
         for line in self.limits:
             line.setVisible(self.limit_n <= self.reach)
         if self.limit_name is not None:
@@ -83,11 +83,11 @@ class _ForcePlot(TracePlot):
             line.setPen(self.stroke(theme.bad, 1.4, (4.0, 3.0)))
         if self.limit_name is not None:
             self.limit_name.setColor(QColor(theme.bad))
-        if self.size_field is not None:
+        if self.magnitude_area is not None:
             field = QColor(theme.text3)
             field.setAlpha(_FILL_ALPHA)
-            self.size_field.setPen(NOTHING)
-            self.size_field.setBrush(field)
+            self.magnitude_area.setPen(NOTHING)
+            self.magnitude_area.setBrush(field)
 
 
 class ForceCard(Card):
@@ -104,7 +104,7 @@ class ForceCard(Card):
         describe_plot(self.plot, "Force on the hand", force)
 
     def show_forces(self, forces: Forces, now_ns: int) -> None:
-        """Draw the force as of now, on the servo's clock."""
+        """Draw the force up to ``now_ns`` on the servo's clock."""
         self.plot.show_forces(*forces.trace(now_ns))
         self.plot.paint_now()
 
@@ -116,7 +116,7 @@ class ForceCard(Card):
 
 
 class LatenessCard(Card):
-    """Histogram of the last minute's ticks."""
+    """A histogram of the lateness of the last minute's ticks."""
 
     def __init__(self, limit_s: float) -> None:
         super().__init__("Tick lateness", label("last 60 s", "small", "text2"), padding=16, gap=4)
@@ -133,14 +133,14 @@ class LatenessCard(Card):
 
 
 class PositionCard(Card):
-    """The hand along x, y and z over the last ten seconds; with the mouse, the pointer."""
+    """The position of the hand, or of the mouse pointer, over the last ten seconds."""
 
     def __init__(self, reach_m: float, *, pointer: bool) -> None:
         title = "Position of the pointer" if pointer else "Position of the hand"
         super().__init__(title, label(f"last {TRACE_WINDOW_S:.0f} s, mm", "small", "text2"), padding=16, gap=4)
         self.plot = TracePlot(TRACE_WINDOW_S, reach_m * 1000)
-        what = f"Position along x, y and z over the last {TRACE_WINDOW_S:.0f} s, in mm."
-        describe_plot(self.plot, title, what)
+        description = f"Position along x, y and z over the last {TRACE_WINDOW_S:.0f} s, in mm."
+        describe_plot(self.plot, title, description)
         self.column.addWidget(self.plot, 1)
 
     def show_health(self, health: ServoHealth, now_s: float) -> None:
@@ -150,7 +150,7 @@ class PositionCard(Card):
 
 
 class HiddenForceCard(Card):
-    """A placeholder of the force plot's size while the study is double-blind: nothing about the force."""
+    """A placeholder for the force plot in a double-blind study, of the same size."""
 
     TITLE = "Hidden because the study is double-blind"
     WHY = "The trace would reveal the liquid."
@@ -174,7 +174,7 @@ _VERDICTS: dict[Verdict, tuple[str, Ink]] = {
 
 
 class _TileCard(Card):
-    """One number."""
+    """A tile with one number and its verdict."""
 
     def __init__(self) -> None:
         super().__init__(padding=14, gap=4)
@@ -209,8 +209,8 @@ class Tiles(QWidget):
         self.cards = [_TileCard() for _ in range(4)]
         self.set_narrow(False)
 
-    def set_narrow(self, yes: bool) -> None:
-        self.across = across = 2 if yes else 4
+    def set_narrow(self, narrow: bool) -> None:
+        self.across = across = 2 if narrow else 4
         for index, card in enumerate(self.cards):
             self._grid.addWidget(card, index // across, index % across)
         for column in range(4):

@@ -1,4 +1,4 @@
-"""Is the session healthy: ticks, lateness, screen frames and the hand's recent path, kept in rings. No Qt here."""
+"""The health of a session: ticks, lateness, screen frames and the hand's recent path in ring buffers, without Qt."""
 
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -78,8 +78,8 @@ class ServoHealth:
         count = len(samples)
         if count == 0:
             return
-        _into_ring(self.lateness_ns, self._latenesses, np.asarray(samples.lateness_ns))
-        _into_ring(self._recent, self._ticks, np.column_stack((samples.tick, samples.time_ns)))
+        _write_to_ring(self.lateness_ns, self._latenesses, np.asarray(samples.lateness_ns))
+        _write_to_ring(self._recent, self._ticks, np.column_stack((samples.tick, samples.time_ns)))
         if self._ticks == 0:
             self._first_delay_ticks = int(samples.delay_ticks[0])
         self._delay_ticks = int(samples.delay_ticks[-1])
@@ -87,16 +87,16 @@ class ServoHealth:
         self._ticks += count
 
     def add_hand_position(self, at_s: float, position_m: Any) -> None:
-        """Add the hand's position [m, hand frame]; positions beyond the trace's resolution are dropped."""
+        """Add the hand's position [m, hand frame], unless the last one is less than a trace step ago."""
         if self._path_rows and at_s < self._path[(self._path_rows - 1) % len(self._path), 0] + _TRACE_STEP_S:
             return
         self._path[self._path_rows % len(self._path)] = (at_s, *position_m)
         self._path_rows += 1
 
     def add_frame(self, painted_ns: int) -> None:
-        """Add the time at which a frame of the tank was painted; refreshes since the last one were missed.
+        """Add the time at which a frame of the tank was painted, and count the refreshes missed since the last one.
 
-        The lateness of a frame's content is in the trial's row (``frames_late``).
+        The lateness of a frame's content is recorded elsewhere: in the trial's row (``frames_late``).
         """
         if self._last_frame_ns:
             gap = painted_ns - self._last_frame_ns
@@ -115,7 +115,7 @@ class ServoHealth:
         gaps = self._frame_gaps_ns[: min(self._frames, len(self._frame_gaps_ns))]
         return Vitals(
             rate_hz=self._rate_hz(),
-            lateness_p99_s=float(np.percentile(self._kept_latenesses(), 99)) * 1e-9 if self._latenesses else None,
+            lateness_p99_s=float(np.percentile(self._recent_latenesses(), 99)) * 1e-9 if self._latenesses else None,
             overruns=self.overruns,
             ticks=self._ticks,
             refreshes=self._refreshes,
@@ -128,7 +128,7 @@ class ServoHealth:
     @property
     def latenesses_us(self) -> Floats:
         """The latenesses of the last minute's ticks [µs] (n,)."""
-        return self._kept_latenesses().astype(np.float64) * 1e-3
+        return self._recent_latenesses().astype(np.float64) * 1e-3
 
     def trace(self, now_s: float) -> tuple[Floats, Floats]:
         """Return times before now [s] (n,), oldest first, and positions [m] (n, 3) of the last ten seconds."""
@@ -137,7 +137,7 @@ class ServoHealth:
         path = path[path[:, 0] >= now_s - TRACE_WINDOW_S]
         return path[:, 0] - now_s, path[:, 1:]
 
-    def _kept_latenesses(self) -> NDArray[np.int64]:
+    def _recent_latenesses(self) -> NDArray[np.int64]:
         return self.lateness_ns[: min(self._latenesses, len(self.lateness_ns))]
 
     def _rate_hz(self) -> float | None:
@@ -150,8 +150,8 @@ class ServoHealth:
         return float(ticks) * 1e9 / float(time_ns) if time_ns > 0 else None
 
 
-def _into_ring(ring: NDArray[Any], written: int, rows: NDArray[Any]) -> None:
-    """Write ``rows`` after ``written`` earlier ones into ``ring``, over the oldest."""
+def _write_to_ring(ring: NDArray[Any], written: int, rows: NDArray[Any]) -> None:
+    """Write ``rows`` into ``ring``, over the oldest ones; ``written`` is the number of earlier rows."""
     skipped = max(0, len(rows) - len(ring))
     rows = rows[skipped:]
     start = (written + skipped) % len(ring)
@@ -205,15 +205,15 @@ def _verdict(within: bool) -> Verdict:
 _STEP_NS = round(_TRACE_STEP_S * 1e9)
 _ROWS = round(TRACE_WINDOW_S / _TRACE_STEP_S) + 2
 _LIMITERS = tuple(limiter for limiter in ALL_LIMITERS if not limiter.expected)
-"""Limiters that are counted: fading in and the stop are no sign of anything, and are said elsewhere."""
+"""The limiters that are counted; fading in and the stop are expected, and shown elsewhere."""
 FORCE, SIZE = slice(0, 3), 3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ForceFigures:
-    """For the current or last trial: the force relative to its limit (now, maximum), and ticks by limiter.
+    """The force of the current or last trial relative to its limit (now, maximum), and ticks by limiter.
 
-    ``withheld`` is the share of the force so far that limits, passivity controller and device withheld.
+    ``withheld`` is the share of the force that limits, passivity controller and device have withheld so far.
     """
 
     share: float
@@ -223,27 +223,27 @@ class ForceFigures:
 
 
 def force_rows(protocol: Protocol, forces: ForceFigures | None) -> tuple[tuple[str, str], ...]:
-    """Return share of the limit, limiters and withheld force, or as many rows that say they are hidden."""
+    """Return the rows of relative force, limited ticks and withheld force; double-blind, their values are "hidden"."""
     share, limiters = f"Force relative to {protocol.device.force_limit_n:g} N", "Limited ticks"
     withheld = f"Force held back, limit {protocol.limits.withheld_percent:g}{THIN_SPACE}%"
     if protocol.study.blinding == "double":
         return (share, "hidden"), (limiters, "hidden"), (withheld, "hidden")
     if forces is None:
         return (share, "–"), (limiters, "–"), (withheld, "–")
-    most_first = sorted(forces.limiters, key=lambda counted: -counted[1])
+    by_count = sorted(forces.limiters, key=lambda counted: -counted[1])
     return (
         (share, f"{forces.share:.0%}, peak {forces.most:.0%}".replace("%", f"{THIN_SPACE}%")),
-        (limiters, ", ".join(f"{name} {grouped(ticks)}" for name, ticks in most_first) or "none"),
+        (limiters, ", ".join(f"{name} {grouped(ticks)}" for name, ticks in by_count) or "none"),
         (withheld, f"{forces.withheld:.1%}".replace("%", f"{THIN_SPACE}%")),
     )
 
 
 class Forces:
-    """Collects telemetry; for every 20 ms it keeps the strongest force, so that no peak is missed."""
+    """Collects telemetry; it keeps the strongest force of every 20 ms, so that no peak is missed."""
 
     def __init__(self, limit_n: float) -> None:
         self.limit_n = limit_n
-        self._steps = np.full(_ROWS, -1, np.int64)  # which 20 ms, on the servo's clock
+        self._steps = np.full(_ROWS, -1, np.int64)  # the number of each row's 20 ms on the servo's clock
         self._rows = np.zeros((_ROWS, 4))  # x, y, z, size [N]
         self._written = 0
         self._scene = 0
@@ -282,8 +282,8 @@ class Forces:
         )
 
     def _keep_rows(self, steps: NDArray[np.int64], rows: Floats) -> None:
-        firsts = np.concatenate(([0], np.flatnonzero(np.diff(steps)) + 1))
-        for first, end in zip(firsts, (*firsts[1:], len(steps)), strict=True):
+        starts = np.concatenate(([0], np.flatnonzero(np.diff(steps)) + 1))
+        for first, end in zip(starts, (*starts[1:], len(steps)), strict=True):
             strongest = rows[first + int(np.argmax(rows[first:end, SIZE]))]
             newest = (self._written - 1) % _ROWS
             if self._written == 0 or self._steps[newest] != steps[first]:
@@ -294,19 +294,21 @@ class Forces:
                 self._rows[newest] = strongest
 
     def _count_samples(self, samples: Any, sizes_n: Floats) -> None:
-        """Count limiters, forces and the strongest force of the newest scene except rest."""
+        """Update the counts and the strongest force of the newest scene; rest (scene 0) does not count."""
         scenes = samples["scene"]
         self._now_n = float(sizes_n[-1])
-        felt = scenes[scenes != 0]
-        if len(felt) == 0:
+        active = scenes[scenes != 0]
+        if len(active) == 0:
             return
-        if felt[-1] != self._scene:
-            self._scene, self._most_n = int(felt[-1]), 0.0
+        if active[-1] != self._scene:
+            self._scene, self._most_n = int(active[-1]), 0.0
             self._limited[:] = 0
             self._sums_n[:] = 0
-        here = scenes == self._scene
-        self._most_n = max(self._most_n, float(sizes_n[here].max()))
-        self._sums_n += samples["permitted_n"][here].sum(), samples["withheld_n"][here].sum()
-        acted = samples["limiters"][here]
-        if acted.any():
-            self._limited += np.count_nonzero(acted[:, None] & np.array([it.bit for it in _LIMITERS]), axis=0)
+        is_newest = scenes == self._scene
+        self._most_n = max(self._most_n, float(sizes_n[is_newest].max()))
+        self._sums_n += samples["permitted_n"][is_newest].sum(), samples["withheld_n"][is_newest].sum()
+        limited = samples["limiters"][is_newest]
+        if limited.any():
+            self._limited += np.count_nonzero(
+                limited[:, None] & np.array([limiter.bit for limiter in _LIMITERS]), axis=0
+            )

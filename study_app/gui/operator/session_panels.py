@@ -1,4 +1,4 @@
-"""The operator's header and rail: state and trouble, where the session is, counts, the strip over one screen."""
+"""The operator's panels about the session: header, banner and rail, and the strip used on a single screen."""
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QPaintEvent, QPen, QResizeEvent
@@ -24,14 +24,14 @@ _STATES: dict[State, tuple[Tone, str]] = {
     "trouble": ("bad", "warning"),
     "ended": ("ok", "check"),
 }
-_OTHER_WINDOW = "F6"  # not every desktop has a key for this, above all in full screen
+_SWITCH_KEY = "F6"  # not every desktop has a key that switches windows in full screen
 _BLINDINGS = {"double": ("lock", "Double-blind"), "single": ("eye", "Single-blind")}
 _SAVED_RECENTLY_S = 2.0
 _TRIALS_PX = 120
 
 
-def _shown_state(view: OperatorView) -> tuple[Tone, str, str]:
-    """Return tone, icon and word of a session's state."""
+def _state_chip(view: OperatorView) -> tuple[Tone, str, str]:
+    """Return tone, icon and word of the chip with a session's state."""
     tone, icon = _STATES[view.state]
     if view.state == "ended" and view.state_word != "Complete":
         tone, icon = "neutral", "cross"
@@ -39,7 +39,7 @@ def _shown_state(view: OperatorView) -> tuple[Tone, str, str]:
 
 
 class _ThemeButton(IconButton):
-    """Toggles light and dark; it shows a moon in light mode, a sun in dark mode."""
+    """The button that switches between light and dark theme."""
 
     def __init__(self) -> None:
         super().__init__("moon", "Switch between light and dark theme", "Light or dark", size=40, role="plain")
@@ -70,22 +70,20 @@ class Header(QWidget):
         self.bar.setFixedWidth(_TRIALS_PX)
         self.trials = figures("", "small", "text2")
         self.theme_button = _ThemeButton()
-        self.page = ActionButton("", "Participant's window", key=_OTHER_WINDOW, height=40)
+        self.page = ActionButton("", "Participant's window", key=_SWITCH_KEY, height=40)
         self.page.hide()
         self._lay_out()
 
     def _lay_out(self) -> None:
-        whose, how_long = _column(self.study, self.who), _column(self.clock, self.expected)
-        chips = self.state, self.blind, self.saved
-        left = Logo(), whose, 8, *chips
-        right = how_long, _column(self.bar, self.trials), 8, self.page, self.theme_button
+        left = Logo(), _column(self.study, self.who), 8, self.state, self.blind, self.saved
+        right = _column(self.clock, self.expected), _column(self.bar, self.trials), 8, self.page, self.theme_button
         hbox(*left, (STRETCH, 1), *right, spacing=12, margins=(24, 8, 24, 8), parent=self)
 
     def show_view(self, view: OperatorView) -> None:
         self.study.show_text(view.study)
         self.who.show_text(view.who)
         self.blind.show_state("neutral", *_BLINDINGS[view.blinding])
-        self.state.show_state(*_shown_state(view))
+        self.state.show_state(*_state_chip(view))
         if view.saved_ago_s is None:
             self.saved.show_state("neutral", "ring", "Nothing to save yet")
         elif view.over or view.saved_ago_s > _SAVED_RECENTLY_S:
@@ -103,7 +101,7 @@ def _column(*widgets: QWidget) -> QVBoxLayout:
     return vbox(STRETCH, *widgets, STRETCH, spacing=2)
 
 
-_WHAT_TO_DO = (
+_END_SESSION = (
     "The force is off and every answer so far is on disk. End the session, fix the cause, then start a new one."
 )
 _RECONNECT = (
@@ -122,13 +120,13 @@ _WAITS_AT_END = (
 
 
 class Banner(QWidget):
-    """A tinted strip with a sign, the problem, its remedy, and a button if the device can be reconnected."""
+    """A tinted strip with the problem, its remedy, and a button if the device can be reconnected."""
 
     def __init__(self) -> None:
         super().__init__()
         give_ground(self, "bad tint")
         self.what = label("", "strong", "bad", wraps=True)
-        self.then = label(_WHAT_TO_DO, "label", "text", wraps=True)
+        self.then = label(_END_SESSION, "label", "text", wraps=True)
         text = vbox(self.what, self.then, spacing=4)
         sign = Icon("warning", "bad", 24), 0, Qt.AlignmentFlag.AlignTop
         self.reconnect = ActionButton("repeat", "Reconnect", key="C", role="primary")
@@ -141,7 +139,7 @@ class Banner(QWidget):
         if view.trouble != self.what.text():
             self.what.setText(view.trouble[:1].upper() + view.trouble[1:])
         offered = view.may_reconnect and not view.over
-        advice = _RECONNECT if offered else _WAITS if view.waits else _WHAT_TO_DO
+        advice = _RECONNECT if offered else _WAITS if view.waits else _END_SESSION
         afterwards = _WAITS_AT_END if view.waits else _AFTERWARDS
         self.then.setText(afterwards if view.over else view.reconnection or advice)
         self.reconnect.setVisible(offered)
@@ -153,9 +151,9 @@ HEIGHT = 52
 
 
 class Strip(QWidget):
-    """Session state, progress, a button for the operator's window, and the force stop; it never takes the focus.
+    """A strip with the session's state and progress, a button for the operator's window, and the force stop.
 
-    A session that is ``played`` has no operator's window; its stop button ends it.
+    It never takes the focus. A session that is ``played`` has no operator's window; its stop button ends it.
     """
 
     def __init__(self, *, played: bool = False) -> None:
@@ -164,7 +162,7 @@ class Strip(QWidget):
         self.setFixedHeight(HEIGHT)
         self.state = Chip("neutral", "clock", "Preparing")
         self.where = Elided("label", "text2")
-        self.operator = ActionButton("", "Operator's window", key=_OTHER_WINDOW, height=40)
+        self.operator = ActionButton("", "Operator's window", key=_SWITCH_KEY, height=40)
         self.stop = CompactStop("Stop playing", key_cap("stop")) if played else CompactStop()
         row = hbox(self.state, (self.where, 1), spacing=12, margins=(16, 4, 8, 4), parent=self)
         for button in (self.operator, self.stop):
@@ -173,7 +171,7 @@ class Strip(QWidget):
         self.operator.setHidden(played)
 
     def show_view(self, view: OperatorView) -> None:
-        self.state.show_state(*_shown_state(view))
+        self.state.show_state(*_state_chip(view))
         self.where.show_text(view.heading)
 
 
@@ -181,7 +179,7 @@ _HEADINGS: tuple[TypeRole, ...] = ("display", "title", "title_dense", "card")
 
 
 class _Now(QWidget):
-    """Current part, trial, activity, and elapsed time."""
+    """The current part, trial and activity, and the elapsed time."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -192,22 +190,22 @@ class _Now(QWidget):
         self.elapsed_word = label("Elapsed", "label", "text2")
         self.elapsed = figures("", "label")
         self.bar = Bar()
-        keep = self.bar.sizePolicy()
-        keep.setRetainSizeWhenHidden(True)
-        self.bar.setSizePolicy(keep)
+        policy = self.bar.sizePolicy()
+        policy.setRetainSizeWhenHidden(True)
+        self.bar.setSizePolicy(policy)
         self.least = figures("", "small", "text2")
-        self._words, self._time = QWidget(), QWidget()
+        self._titles, self._timing = QWidget(), QWidget()
         row = hbox(self.elapsed_word, STRETCH, self.elapsed)
-        vbox(self.part, self.heading, self.setting, STRETCH, spacing=6, margins=0, parent=self._words)
-        vbox(row, self.bar, self.least, STRETCH, spacing=6, margins=0, parent=self._time)
+        vbox(self.part, self.heading, self.setting, STRETCH, spacing=6, margins=0, parent=self._titles)
+        vbox(row, self.bar, self.least, STRETCH, spacing=6, margins=0, parent=self._timing)
         self._grid = grid(24, 12, margins=0, parent=self)
         self.set_flat(False)
 
-    def set_flat(self, yes: bool) -> None:
-        self._grid.addWidget(self._words, 0, 0)
-        self._grid.addWidget(self._time, 0 if yes else 1, 1 if yes else 0)
+    def set_flat(self, flat: bool) -> None:
+        self._grid.addWidget(self._titles, 0, 0)
+        self._grid.addWidget(self._timing, 0 if flat else 1, 1 if flat else 0)
         self._grid.setColumnStretch(0, 3)
-        self._grid.setColumnStretch(1, 2 if yes else 0)
+        self._grid.setColumnStretch(1, 2 if flat else 0)
 
     def show_view(self, view: OperatorView) -> None:
         self.part.show_text(view.part_line)
@@ -235,12 +233,12 @@ class _Now(QWidget):
     def _fit_heading(self) -> None:
         for role in _HEADINGS:
             self.heading.setFont(font(role, tabular=True))
-            if self.heading.fontMetrics().horizontalAdvance(self.heading.text()) <= self._words.width():
+            if self.heading.fontMetrics().horizontalAdvance(self.heading.text()) <= self._titles.width():
                 break
 
 
 class Tally(QWidget):
-    """Stored answers, trials within limits, marks and repeats; the limit violated last; the track."""
+    """Counts of answers, trials, marks and repeats, the limit violated last, and the state of the track."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -252,8 +250,8 @@ class Tally(QWidget):
         self._flat = False
         self._grid = grid(8, 8, margins=0, parent=self)
 
-    def set_flat(self, yes: bool) -> None:
-        self._flat = yes
+    def set_flat(self, flat: bool) -> None:
+        self._flat = flat
         self._place_counts()
 
     def show_view(self, view: OperatorView) -> None:
@@ -287,11 +285,11 @@ class Tally(QWidget):
 WIDTH, NARROW, SLIM = 318, 248, 72
 _ROW_HEIGHT = 44
 _LEAST_ROW_HEIGHT = 26
-_DOT = 11
+_DOT_RADIUS = 11
 
 
 class _StepLine(Themed, QWidget):
-    """One step: a dot on the line that connects all steps, its name, and its time or position."""
+    """A step of the rail: a dot on the line that connects all steps, its name, and its duration or progress."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -305,14 +303,14 @@ class _StepLine(Themed, QWidget):
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Preferred)
 
     def sizeHint(self) -> QSize:
-        """Return the preferred size; with many steps, each is smaller."""
+        """Return the preferred size, which shrinks if there are many steps."""
         return QSize(super().sizeHint().width(), _ROW_HEIGHT)
 
-    def set_slim(self, yes: bool) -> None:
-        """Show only the dot; its text is in the tip."""
-        self._layout.setContentsMargins(0 if yes else 37, 0, 0, 0)
+    def set_slim(self, slim: bool) -> None:
+        """Show only the dot if ``slim``; the tip has the text."""
+        self._layout.setContentsMargins(0 if slim else 37, 0, 0, 0)
         for part in (self.name, self.note):
-            part.setVisible(not yes)
+            part.setVisible(not slim)
 
     def show_row(self, row: StepRow, *, first: bool, last: bool) -> None:
         if (row, first, last) == (self.row, self.first, self.last):
@@ -335,19 +333,19 @@ class _StepLine(Themed, QWidget):
         reached = self.row.state != "open"
         if not self.first:
             painter.setPen(QPen(QColor(t.ok if reached else t.border), 1.6))
-            painter.drawLine(QPointF(12, 0), QPointF(12, middle.y() - _DOT))
+            painter.drawLine(QPointF(12, 0), QPointF(12, middle.y() - _DOT_RADIUS))
         if not self.last:
             painter.setPen(QPen(QColor(t.ok if self.row.state == "done" else t.border), 1.6))
-            painter.drawLine(QPointF(12, middle.y() + _DOT), QPointF(12, self.height()))
+            painter.drawLine(QPointF(12, middle.y() + _DOT_RADIUS), QPointF(12, self.height()))
         if self.row.state == "done":
             painter.setPen(Qt.PenStyle.NoPen)
             painter.setBrush(QColor(t.ok_bg))
-            painter.drawEllipse(middle, _DOT, _DOT)
+            painter.drawEllipse(middle, _DOT_RADIUS, _DOT_RADIUS)
             draw_icon(painter, "check", QRectF(5, middle.y() - 7, 14, 14), t.ok, 2.6)
         elif self.row.state == "now":
             painter.setPen(QPen(QColor(t.accent), 1.8))
             painter.setBrush(QColor(t.selected))
-            painter.drawEllipse(middle, _DOT, _DOT)
+            painter.drawEllipse(middle, _DOT_RADIUS, _DOT_RADIUS)
             painter.setPen(Qt.PenStyle.NoPen)
             painter.setBrush(QColor(t.accent))
             painter.drawEllipse(middle, 4.5, 4.5)
@@ -358,7 +356,7 @@ class _StepLine(Themed, QWidget):
 
 
 class Rail(Card):
-    """Current step, steps and counts; in slim mode only the steps' dots."""
+    """The current step, all steps and the counts; in slim mode, only the dots of the steps."""
 
     def __init__(self) -> None:
         super().__init__(gap=10)
@@ -371,37 +369,37 @@ class Rail(Card):
         self.steps_area = scrolled(self._steps)
         self._rules = Rule(), Rule()
         add_parts(self.column, self._rules[0], (self.steps_area, 1), self._rules[1])
-        self.take_back_panels()
+        self.show_panels()
 
-    def take_back_panels(self) -> None:
-        """Show the current step and the counts above and below the steps."""
+    def show_panels(self) -> None:
+        """Show the current step above the steps and the counts below them."""
         for part in (self.now, self.tally):
             part.set_flat(False)
         self.column.insertWidget(0, self.now)
         self.column.addWidget(self.tally)
         self._set_slim(slim=False)
 
-    def give_away_panels(self) -> None:
-        """Show only the steps' dots; the current step and the counts are elsewhere."""
+    def show_dots_only(self) -> None:
+        """Show only the dots of the steps; the caller must place the current step and the counts elsewhere."""
         for part in (self.now, self.tally):
             part.set_flat(True)
         self._set_slim(slim=True)
 
-    def set_narrow(self, yes: bool) -> None:
-        self.setFixedWidth(SLIM if self._slim else NARROW if yes else WIDTH)
+    def set_narrow(self, narrow: bool) -> None:
+        self.setFixedWidth(SLIM if self._slim else NARROW if narrow else WIDTH)
 
     def _set_slim(self, *, slim: bool) -> None:
         self._slim = slim
         for part in self._rules:
             part.setVisible(not slim)
         self._steps_column.setContentsMargins(0, 0, 0 if slim else 8, 0)
-        bars = Qt.ScrollBarPolicy
-        self.steps_area.setVerticalScrollBarPolicy(bars.ScrollBarAlwaysOff if slim else bars.ScrollBarAsNeeded)
+        policy = Qt.ScrollBarPolicy
+        self.steps_area.setVerticalScrollBarPolicy(policy.ScrollBarAlwaysOff if slim else policy.ScrollBarAsNeeded)
         for line in self.lines:
             line.set_slim(slim)
 
     def show_view(self, view: OperatorView) -> None:
-        """Show the steps; ``now`` and ``tally`` are shown separately, since each may fail on its own."""
+        """Show the steps; ``now`` and ``tally`` are updated separately, since each may fail on its own."""
         rows = view.steps
         while len(self.lines) < len(rows):
             line = _StepLine()
@@ -409,9 +407,9 @@ class Rail(Card):
             self.lines.append(line)
             self._steps_column.insertWidget(len(self.lines) - 1, line)
         for index, (line, row) in enumerate(zip(self.lines, rows, strict=True)):
-            arrived = row.state == "now" != line.row.state
+            became_current = row.state == "now" != line.row.state
             line.show_row(row, first=index == 0, last=index == len(rows) - 1)
-            if arrived:
+            if became_current:
                 self.steps_area.ensureWidgetVisible(line, 0, 2 * _LEAST_ROW_HEIGHT)
 
     def resizeEvent(self, event: QResizeEvent) -> None:

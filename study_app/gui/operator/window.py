@@ -1,6 +1,6 @@
-"""The operator's window: left where we are, in the middle whether it is healthy, right what can be done.
+"""The operator's window: the progress on the left, the session's health in the middle, the actions on the right.
 
-It draws an ``OperatorView`` and two plots, and says what the operator asks for; it knows no runner and no servo.
+It shows an ``OperatorView`` and plots, and emits the operator's requests; it does not depend on runner or servo.
 """
 
 import re
@@ -39,14 +39,14 @@ LOW_BELOW, LOWER_BELOW, LEAST_BELOW = 870, 750, 705
 _STOPS: dict[_Height, int] = {"high": 250, "low": 236, "lower": 236, "least": 236}
 _NOTES: dict[_Height, int] = {"high": NOTES_SHOWN, "low": 2, "lower": 1, "least": 0}
 _DEVICE_ROWS: dict[_Height, int] = {"high": ALL_ROWS, "low": 3, "lower": 2, "least": 2}
-_ACROSS_FROM = 640  # minimum width for four tiles, and two plots, side by side
-_SIGNS_FROM = 690  # minimum width of the buttons with icons
+_SIDE_BY_SIDE_FROM = 640  # minimum width for four tiles, and two plots, side by side
+_ICONS_FROM = 690  # minimum width of the buttons with icons
 _GAP = 10
-_ENDS: Final = (("aborted", "Another reason"), ("withdrawn", "The participant withdrew"))
+_END_REASONS: Final = (("aborted", "Another reason"), ("withdrawn", "The participant withdrew"))
 
 
 class _Arrangement(QWidget):
-    """The content of the window: header, rail, middle and side."""
+    """The layout of the window, which adapts to its size: header, rail, middle and side."""
 
     def __init__(self, window: "OperatorWindow") -> None:
         super().__init__()
@@ -78,32 +78,32 @@ class _Arrangement(QWidget):
     def _arrange(self, size: QSize) -> None:
         width: _Width = "wide" if size.width() >= NARROW_BELOW else "narrow" if size.width() >= SLIM_BELOW else "slim"
         steps: tuple[tuple[int, _Height], ...] = ((LOW_BELOW, "high"), (LOWER_BELOW, "low"), (LEAST_BELOW, "lower"))
-        height: _Height = next((name for from_, name in steps if size.height() >= from_), "least")
+        height: _Height = next((name for least, name in steps if size.height() >= least), "least")
         row = size.width() - 2 * _MARGINS[width] - _GAPS[width] - _SIDE
         middle = row - _RAILS[width] - _GAPS[width]
-        signs = (row if width == "slim" else middle) >= _SIGNS_FROM
-        across = middle >= _ACROSS_FROM
-        if (width, height, across, signs) == self._arranged:
+        has_icons = (row if width == "slim" else middle) >= _ICONS_FROM
+        side_by_side = middle >= _SIDE_BY_SIDE_FROM
+        if (width, height, side_by_side, has_icons) == self._arranged:
             return
-        self._arranged = (width, height, across, signs)
+        self._arranged = (width, height, side_by_side, has_icons)
         self._set_width(width)
         self._parts.stop.setFixedSize(_SIDE, _STOPS[height])
         self._parts.notes.set_note_count(_NOTES[height])
-        self._parts.device.show_rows(_DEVICE_ROWS[height])
-        self._parts.buttons.set_narrow(not signs)
+        self._parts.device.set_row_limit(_DEVICE_ROWS[height])
+        self._parts.buttons.set_narrow(not has_icons)
         self._parts.buttons.hint.setVisible(width == "wide")
-        self._fill_middle(across=across)
+        self._fill_middle(side_by_side=side_by_side)
 
     def _set_width(self, width: _Width) -> None:
         header, rail, slim = self._parts.header, self._parts.rail, width == "slim"
-        for part in (header.bar, header.trials):  # "Now" says them, too
+        for part in (header.bar, header.trials):  # the card of the current step shows the same
             part.setHidden(slim)
         if slim:
-            rail.give_away_panels()
+            rail.show_dots_only()
             self.now.column.addWidget(rail.now)
             self.now.column.addWidget(rail.tally)
         else:
-            rail.take_back_panels()
+            rail.show_panels()
         self.now.setVisible(slim)
         rail.set_narrow(width != "wide")
         margin = _MARGINS[width]
@@ -113,26 +113,26 @@ class _Arrangement(QWidget):
         self._body.addWidget(self.middle_area, 0, 1)
         self._body.addWidget(self._parts.buttons, 1, 0 if slim else 1, 1, 2 if slim else 1)
 
-    def _fill_middle(self, *, across: bool) -> None:
-        p, span = self._parts, 1 if across else 2
+    def _fill_middle(self, *, side_by_side: bool) -> None:
+        p, span = self._parts, 1 if side_by_side else 2
         for card, least in ((p.lateness, 210), (p.force, 210), (p.position, 170)):
             card.setMinimumHeight(least)
-        p.tiles.set_narrow(not across)
+        p.tiles.set_narrow(not side_by_side)
         self._middle.addWidget(p.banner, 0, 0, 1, 2)
         self._middle.addWidget(self.now, 1, 0, 1, 2)
         self._middle.addWidget(p.tiles, 2, 0, 1, 2)
         self._middle.addWidget(p.lateness, 3, 0, 1, span)
-        self._middle.addWidget(p.force, *((3, 1) if across else (5, 0)), 1, span)
+        self._middle.addWidget(p.force, *((3, 1) if side_by_side else (5, 0)), 1, span)
         self._middle.addWidget(p.position, 4, 0, 1, 2)
-        for row, stretch in ((3, 30), (4, 26), (5, 0 if across else 30)):
+        for row, stretch in ((3, 30), (4, 26), (5, 0 if side_by_side else 30)):
             self._middle.setRowStretch(row, stretch)
 
 
 _FULL = QSize(1600, 900)
 _LEAST = QSize(1024, 640)
 
-_PASSED_ON: Final = re.compile(r"^(Error calling Python override of [\w:]+\(\): )+")
-"""What PySide 6.10 and newer write before the words of an exception that one of Qt's calls passes on."""
+_OVERRIDE_PREFIX: Final = re.compile(r"^(Error calling Python override of [\w:]+\(\): )+")
+"""The prefix that PySide 6.10 and newer add to the message of an exception that passes through a Qt call."""
 
 
 class OperatorWindow(Themed, QMainWindow):
@@ -142,9 +142,10 @@ class OperatorWindow(Themed, QMainWindow):
     ----------
     lateness_limit_s : the protocol's limit of the 99th percentile of lateness [s]
     reach_m : half of the longest edge of the tank [m], for the scale of the position plot
-    pointer : whether positions are of the mouse pointer
-    stop_button : the device's button that stops the force, too; "" without one
-    force_limit_n : largest force on the hand [N] in a single-blind study; None where the force is hidden
+    pointer : whether positions are those of the mouse pointer
+    felt : whether the device exerts force
+    stop_button : the device's button that also stops the force, or ""
+    force_limit_n : the largest force on the hand [N] in a single-blind study; None if the force is hidden
     """
 
     asked = Signal(str, tuple)
@@ -178,7 +179,7 @@ class OperatorWindow(Themed, QMainWindow):
         self.stop = StopPanel(felt=felt, device_button=stop_button)
         self.buttons = Actions()
         self.question: Question | None = None
-        self._asks_about = ""  # the setting of the open question
+        self._question_trial = ""  # the trial that the open question is about
         self._failures: set[str] = set()
         self.escape = EscapeKey(self, anywhere=True)
         self.arrangement = _Arrangement(self)
@@ -190,8 +191,8 @@ class OperatorWindow(Themed, QMainWindow):
 
     def _connect(self) -> None:
         ask, buttons = self.ask, self.buttons
-        # Pressed, not clicked: the force stops at the first touch.
-        for signal, what in (
+        # The stop is connected to pressed, not clicked, so that the force stops at the first touch.
+        for signal, request in (
             (self.stop.stop.pressed, "stop"),
             (self.escape.held, "stop"),
             (self.stop.fade_in.clicked, "resume"),
@@ -200,7 +201,7 @@ class OperatorWindow(Themed, QMainWindow):
             (self.banner.reconnect.clicked, "reconnect"),
             (self.header.page.clicked, "page"),
         ):
-            signal.connect(partial(self._ask_by_button, what))
+            signal.connect(partial(self._ask_by_button, request))
         buttons.pause.clicked.connect(lambda: ask(buttons.pause_request))
         buttons.repeat.clicked.connect(self.ask_to_repeat)
         buttons.end.clicked.connect(self.ask_to_end)
@@ -208,36 +209,39 @@ class OperatorWindow(Themed, QMainWindow):
         self.notes.note_written.connect(partial(ask, "note"))
         self.header.theme_button.clicked.connect(self._change_theme)
 
-    def ask(self, what: str, *details: Any) -> None:
-        """Emit the request of a button by name."""
-        self.asked.emit(what, details)
+    def ask(self, request: str, *details: Any) -> None:
+        """Emit a request with its details."""
+        self.asked.emit(request, details)
 
-    def _ask_by_button(self, what: str, _checked: bool = False) -> None:
-        self.ask(what)
+    def _ask_by_button(self, request: str, _checked: bool = False) -> None:
+        self.ask(request)
 
     def show_guarded(self, show: Callable[..., object], *shown: object) -> None:
-        """Show a part that the session does not depend on; if it fails, the session continues."""
+        """Call ``show``; if it fails, report the error and let the session continue."""
         try:
             show(*shown)
-        except Exception as error:  # noqa: BLE001 - reported, and passed on to log and journal
+        except Exception as error:  # noqa: BLE001 - reported, logged and recorded in the journal
             self.report_failure(error)
 
     def report_failure(self, error: BaseException) -> None:
         """Report once that a part of the window failed."""
-        clear_frames(error.__traceback__)  # frames may hold a painter, and Qt would then paint no window
-        if (what := f"{type(error).__name__}: {_PASSED_ON.sub('', str(error))}") not in self._failures:
-            self._failures.add(what)
-            self.show_message("Part of this window failed", f"{what}. The session continues.")
-            self.ask("failed", what, error)
+        clear_frames(error.__traceback__)  # a painter that a frame keeps alive would block Qt's painting
+        if (message := f"{type(error).__name__}: {_OVERRIDE_PREFIX.sub('', str(error))}") not in self._failures:
+            self._failures.add(message)
+            self.show_message("Part of this window failed", f"{message}. The session continues.")
+            self.ask("failed", message, error)
 
     def show_view(self, view: OperatorView) -> None:
-        """Show everything except the plots; the problem comes first, since another part may fail."""
+        """Show everything except the plots; first the banner with the problem, since other parts may fail."""
         if view == self._view:
             return
         self.banner.show_view(view)
         self.may_close = view.over
-        if self.question is not None and self._asks_about not in {"", _setting_name(view) if view.may_repeat else None}:
-            self.question.reject()  # its trial is over: the answer would apply to the next one
+        if self.question is not None and self._question_trial not in {
+            "",
+            _setting_name(view) if view.may_repeat else None,
+        }:
+            self.question.reject()  # its trial is over, so the answer would apply to the next one
         for part in (self.stop, self.header, self.buttons):
             part.show_view(view)
         for show in (self.rail.now, self.rail.tally, self.tiles, self.notes, self.rail, self.device):
@@ -248,7 +252,7 @@ class OperatorWindow(Themed, QMainWindow):
         self.show_guarded(self.position.show_health, health, now_s)
 
     def show_forces(self, forces: Forces, now_ns: int) -> None:
-        """Draw the force (30 times a second) unless it is hidden."""
+        """Draw the force unless it is hidden; called 30 times a second."""
         if isinstance(self.force, ForceCard):
             self.show_guarded(self.force.show_forces, forces, now_ns)
 
@@ -256,7 +260,7 @@ class OperatorWindow(Themed, QMainWindow):
         self.show_guarded(self.lateness.show_health, health)
 
     def ask_to_repeat(self) -> None:
-        """Ask for the reason of a repetition, which is required."""
+        """Ask for the reason to repeat the trial, which is required."""
         if self._view is not None and self._view.may_repeat:
             setting = _setting_name(self._view)
             self._open_question(
@@ -267,7 +271,7 @@ class OperatorWindow(Themed, QMainWindow):
                 fields=(Field("reason", "Reason", placeholder="For example: the phone rang"),),
                 needs={"reason": REASON},
             )
-            self._asks_about = setting
+            self._question_trial = setting
 
     def ask_to_end(self) -> None:
         if self._view is not None and not self._view.over:
@@ -279,42 +283,42 @@ class OperatorWindow(Themed, QMainWindow):
                 ActionButton("cross", "End session", role="danger"),
                 back="Continue the session",
                 fields=(
-                    Field("status", "What happened", "radio", _ENDS),
+                    Field("status", "What happened", "radio", _END_REASONS),
                     Field("reason", "Reason", placeholder="Optional"),
                 ),
             )
             assert self.question is not None  # noqa: S101 - just made
             self.question.back.setDefault(True)
 
-    def _open_question(self, what: str, title: str, explanation: str, go_on: ActionButton, **more: Any) -> None:
-        """Open a question unless one is open; its answer emits the request with the values."""
+    def _open_question(self, request: str, title: str, explanation: str, go_on: ActionButton, **more: Any) -> None:
+        """Open a question unless one is open; accepting it emits the ``request`` with the answers."""
         if self.question is not None:
             self.question.raise_()
             self.question.activateWindow()
             return
         question = self.question = Question(self, self.theme, title, explanation, go_on, **more)
-        question.accepted.connect(lambda: self.ask(what, *map(question.value, question.editors)))
-        question.finished.connect(self._question_answered)
+        question.accepted.connect(lambda: self.ask(request, *map(question.value, question.editors)))
+        question.finished.connect(self._discard_question)
         question.show()
 
     def show_message(self, title: str, sentence: str) -> None:
         notice = Question(self, self.theme, title, sentence)
         notice.finished.connect(notice.deleteLater)
-        notice.finished.connect(self._take_keyboard)
+        notice.finished.connect(self._regain_focus)
         notice.show()
 
     def bring_forward(self) -> None:
         self.raise_()
         self.activateWindow()
 
-    def _question_answered(self) -> None:
+    def _discard_question(self) -> None:
         if self.question is not None:
             self.question.deleteLater()
-        self.question, self._asks_about = None, ""
-        self._take_keyboard()
+        self.question, self._question_trial = None, ""
+        self._regain_focus()
 
-    def _take_keyboard(self) -> None:
-        """Take the focus after a dialog, since Esc must also work without a window manager."""
+    def _regain_focus(self) -> None:
+        """Regain the focus after a dialog, since Esc must also work without a window manager."""
         if QGuiApplication.focusWindow() is None:
             self.activateWindow()
 
@@ -322,7 +326,7 @@ class OperatorWindow(Themed, QMainWindow):
         apply_theme(self, LIGHT if self.theme.dark else DARK)
 
     def closeEvent(self, event: QCloseEvent) -> None:
-        """Close at once after the session; otherwise let the listener decide and keep the window open."""
+        """Close at once after the session; otherwise stay open and emit the request "close"."""
         if self.may_close:
             event.accept()
         else:
@@ -331,5 +335,5 @@ class OperatorWindow(Themed, QMainWindow):
 
 
 def _setting_name(view: OperatorView) -> str:
-    """Return the neutral name of the current trial, with its number so that it is unique."""
+    """Return the neutral name of the current trial with its number, which makes it unique."""
     return f"{view.setting_line.split('  ·  ')[0]} ({view.heading.lower()})"

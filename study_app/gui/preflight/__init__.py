@@ -1,1 +1,1 @@
-"""Pre-flight: the checks before a session, and whether to begin."""
+"""Pre-flight: the checks before a session, and the decision to begin."""

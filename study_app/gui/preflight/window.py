@@ -1,4 +1,4 @@
-"""Whether to begin: every check with its value, what will run, and one button that says what is accepted by it."""
+"""The pre-flight window: every check with its value, the coming session, and a button that names accepted warnings."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -47,7 +47,8 @@ _WAITING = "measuring …"
 class PreflightView:
     """The content of the window.
 
-    ``rows`` are (label, value) of the coming session, ``facts`` the measurements; while ``busy`` it cannot be started.
+    ``rows`` are labels and values about the coming session and ``facts`` the measurements; the session cannot be
+    started while ``busy``.
     """
 
     study: str
@@ -66,13 +67,13 @@ class PreflightView:
         return sum(check.verdict == "failure" for check in self.checks)
 
     @property
-    def passed_words(self) -> str:
-        well = len(self.checks) - self.warnings - self.failures
-        return f"{well} of {len(self.checks)} passed"
+    def passed_text(self) -> str:
+        passed = len(self.checks) - self.warnings - self.failures
+        return f"{passed} of {len(self.checks)} passed"
 
     @property
-    def start_words(self) -> str:
-        """The text of the button: pressing it accepts warnings, or it is disabled."""
+    def start_text(self) -> str:
+        """The text of the start button, which names the warnings that pressing it accepts."""
         if self.failures:
             return "Cannot start"
         if self.warnings:
@@ -80,25 +81,25 @@ class PreflightView:
         return "Start"
 
 
-def resumed_rows(protocol: Protocol, schedule: Schedule, lines: Iterable[Event]) -> tuple[tuple[str, str], ...]:
-    """Return the point at which the session with these journal lines resumes, and how much of it is kept.
+def resumed_rows(protocol: Protocol, schedule: Schedule, events: Iterable[Event]) -> tuple[tuple[str, str], ...]:
+    """Return the rows about a resumed session: where it continues, and how many answers are kept.
 
     Raises
     ------
     SessionError
         The journal does not fit this schedule.
     """
-    journal = list(lines)
+    journal = list(events)
     start = resume_at(protocol, schedule, journal)
     language = operator_language(protocol)
     step = schedule.steps[start.step] if start.step < len(schedule.steps) else None
     if isinstance(step, Trial):
         attempt = start.presented.get(step.number, 0) + 1
-        here = step.label(protocol, language) + (f", attempt\u00a0{attempt}" if attempt > 1 else "")
+        position = step.label(protocol, language) + (f", attempt\u00a0{attempt}" if attempt > 1 else "")
     else:
-        here = "the end" if step is None else step_title(protocol, step, language)
+        position = "the end" if step is None else step_title(protocol, step, language)
     kept = f"{sum(progress_of(journal).answered.values())} of {orders_of(protocol).answers} answers"
-    return ("Continues at", here), ("Kept", kept)
+    return ("Continues at", position), ("Kept", kept)
 
 
 def planned_rows(
@@ -107,7 +108,7 @@ def planned_rows(
     """Return the rows about the coming session.
 
     ``error_n`` is the largest difference of a scene's force from the exact definition [N], None until it is known; its
-    line is omitted unless ``asked_error``.
+    row is omitted if ``asked_error`` is false.
     """
     extent = extent_of(protocol)
     ends = now + timedelta(seconds=max(extent.expected_s))
@@ -123,8 +124,8 @@ def planned_rows(
     )
 
 
-OF_THE_COMPUTER: Final = ("Servo rate", "Servo lateness", "Priority", "Screen", "Results folder", "Free space")
-"""The checks before a session that say nothing of the study or its device."""
+COMPUTER_CHECK_NAMES: Final = ("Servo rate", "Servo lateness", "Priority", "Screen", "Results folder", "Free space")
+"""The names of the pre-flight checks that depend neither on the study nor on its device."""
 
 _RECOMPILES: Final = (
     "The model is compiled at every start, which takes up to a minute. Set NUMBA_CACHE_DIR to a writable folder."
@@ -134,18 +135,18 @@ _RECOMPILES: Final = (
 def computer_checks(
     facts: Measurements, protocol: Protocol, devices: Sequence[Backend], *, cache: Path | None, compiled: int
 ) -> tuple[Check, ...]:
-    """Return the checks of a computer.
+    """Return the checks of a computer, with the limits of ``protocol``.
 
-    ``facts`` were measured with the simulated hand, for which ``compiled`` functions had to be compiled; the protocol's
-    limits apply; ``cache`` is the folder of compiled code, None if nothing can be stored.
+    ``facts`` were measured with the simulated hand, for which ``compiled`` functions had to be compiled. ``cache`` is
+    the folder of compiled code, or None if it cannot be stored.
     """
-    of_servo = {check.name: check for check in preflight_checks(facts, protocol)}
-    results = [of_servo[name] for name in OF_THE_COMPUTER]
+    checks = {check.name: check for check in preflight_checks(facts, protocol)}
+    results = [checks[name] for name in COMPUTER_CHECK_NAMES]
     return (*results, _device_check(devices), _compiled_check(cache, compiled))
 
 
 def _device_check(devices: Sequence[Backend]) -> Check:
-    """Return the check of the connected haptic devices; without one, sessions use the mouse."""
+    """Return the check that a haptic device is connected; a session without one uses the mouse."""
     haptic = [device for device in devices if device.state.startswith("connected")]
     missing = [device.name for device in devices if device.state == NOT_AVAILABLE]
     about = f"not available now: {', '.join(missing)}" if missing else "all devices are available"
@@ -166,8 +167,8 @@ _ROW_HEIGHT = 42
 _DOT = 13.0
 LEFT = 70
 NAME, BAR = 148, 160
-_LEAST_WORDS = 160  # narrower, wrapped text would request too much room
-_LOOKS: dict[str, tuple[str, Ink, str]] = {
+_MIN_TEXT_WIDTH = 160  # narrower wrapped text would become too high
+_VERDICT_STYLES: dict[str, tuple[str, Ink, str]] = {
     "ok": ("check", "ok", "passed"),
     "warning": ("warning", "warn", "warning"),
     "failure": ("cross", "bad", "cannot start"),
@@ -175,17 +176,17 @@ _LOOKS: dict[str, tuple[str, Ink, str]] = {
 
 
 class _CheckRow(Themed, QWidget):
-    """A check; if it needs a decision, it is tinted and has an advice below."""
+    """A row with a check; a warning or failure is tinted and has advice below it."""
 
     def __init__(self, check: Check, *, last: bool) -> None:
         super().__init__()
         self.check, self._last = check, last
-        _, ink, word = _LOOKS[check.verdict]
+        _, ink, word = _VERDICT_STYLES[check.verdict]
         name = label(check.name, "body")
         name.setFont(font("body", weight=600, scale=0.97))
         name.setFixedWidth(NAME)
         about = label(check.about, "label", "text2", wraps=True, weight=400, tabular=True)
-        about.setMinimumWidth(_LEAST_WORDS)
+        about.setMinimumWidth(_MIN_TEXT_WIDTH)
         value = figures(check.value, "body", "text" if check.verdict == "ok" else ink)
         value.setFont(font("body", weight=600, tabular=True, scale=0.97))
         value.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
@@ -207,7 +208,7 @@ class _CheckRow(Themed, QWidget):
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         t = self.theme
-        icon, ink, _ = _LOOKS[self.check.verdict]
+        icon, ink, _ = _VERDICT_STYLES[self.check.verdict]
         painter = smooth_painter(self)
         tint = QColor(getattr(t, f"{ink}_bg"))
         if self.check.verdict != "ok":
@@ -224,28 +225,28 @@ class _CheckRow(Themed, QWidget):
 
 
 def _check_rows(checks: Sequence[Check], before: list[_CheckRow], column: QBoxLayout) -> list[_CheckRow]:
-    """Return the rows of checks, which replace ``before`` in a column."""
+    """Replace the rows ``before`` in a column with rows of ``checks``, and return these."""
     for row in before:
         remove_widget(row)
-    made = [_CheckRow(check, last=check is checks[-1]) for check in checks]
-    for place, row in enumerate(made):
-        column.insertWidget(place, row)
-    return made
+    rows = [_CheckRow(check, last=check is checks[-1]) for check in checks]
+    for index, row in enumerate(rows):
+        column.insertWidget(index, row)
+    return rows
 
 
 FULL, LEAST = QSize(1200, 800), QSize(1024, 640)
-_ASIDE = 352
+_SIDE_WIDTH = 352
 _PAGES = {
     Qt.Key.Key_PageDown: QAbstractSlider.SliderAction.SliderPageStepAdd,
     Qt.Key.Key_PageUp: QAbstractSlider.SliderAction.SliderPageStepSub,
 }
-_NOTHING_YET = "Nothing is created until you start."
+_NOT_STARTED = "Nothing is created until you start."
 
 
 class PreflightWindow(QWidget):
-    """The checks before a session; device and servo are ready, at rest.
+    """The window with the checks before a session, while device and servo are ready and at rest.
 
-    ``start_asked`` accepts the displayed warnings; ``again_asked`` requests a new measurement; ``cancelled`` goes back.
+    ``start_asked`` means that the displayed warnings are accepted, ``again_asked`` requests a new measurement.
     With ``asks_masking`` the window asks whether the device's motor noise is masked.
     """
 
@@ -273,8 +274,8 @@ class PreflightWindow(QWidget):
         self._values: dict[str, QLabel] = {}
         self._done = False
         self._busy = False
-        around = self.checks.column.contentsMargins()
-        self.checks.column.setContentsMargins(4, around.top(), 4, around.bottom())
+        margins = self.checks.column.contentsMargins()
+        self.checks.column.setContentsMargins(4, margins.top(), 4, margins.bottom())
         self._lay_out()
         self.cancel.clicked.connect(self.close)
         self.again.clicked.connect(self.again_asked)
@@ -289,14 +290,14 @@ class PreflightWindow(QWidget):
         inside = QWidget()
         vbox(self.checks, STRETCH, margins=0, parent=inside)
         area = self._area = scrolled(inside)
-        middle = hbox((area, 1), self._column_beside(), spacing=20)
+        middle = hbox((area, 1), self._make_side_column(), spacing=20)
         foot = hbox(self.cancel, self.again, spacing=16)
-        self.note = label(_NOTHING_YET, "label", "text2")
+        self.note = label(_NOT_STARTED, "label", "text2")
         add_parts(foot, self.note, STRETCH, self.start)
         vbox(head, (middle, 1), Rule(), foot, spacing=16, margins=(32, 22, 32, 20), parent=self)
 
-    def _column_beside(self) -> QWidget:
-        """Return the scrolling column beside the checks: the servo's lateness and the coming session."""
+    def _make_side_column(self) -> QWidget:
+        """Return the scroll area beside the checks, with the servo's lateness and the coming session."""
         lateness = Card("Servo lateness", label("measured at rest, µs", "small", "text2"), padding=18, gap=6)
         self.plot.setMinimumHeight(150)
         lateness.column.addWidget(self.plot, 1)
@@ -307,17 +308,17 @@ class PreflightWindow(QWidget):
         if self.masking is not None:
             self.runs.column.addWidget(self.masking)
         side = scrolled(vbox((lateness, 1), self.runs, spacing=12, margins=0))
-        side.setFixedWidth(_ASIDE)
+        side.setFixedWidth(_SIDE_WIDTH)
         return side
 
     def show_view(self, view: PreflightView) -> None:
         self.who.setText(f"{view.study}  ·  {view.who}")
         self._show_chip(view)
-        self.start.show_action("play", view.start_words)
+        self.start.show_action("play", view.start_text)
         self.start.setEnabled(not view.busy and not view.failures)
         self.again.setEnabled(not view.busy)
         if self._busy and not view.busy:
-            self.start.setFocus()  # meanwhile the pressed button has lost the focus to Cancel
+            self.start.setFocus()  # the disabled button lost the focus to Cancel
         self._busy = view.busy
         if [row.check for row in self.rows] != list(view.checks):
             self.rows = _check_rows(view.checks, self.rows, self.checks.column)
@@ -330,20 +331,20 @@ class PreflightWindow(QWidget):
         if view.busy:
             self.chip.show_state("neutral", "clock", _WAITING.capitalize())
         elif view.failures:
-            self.chip.show_state("bad", "cross", view.passed_words)
+            self.chip.show_state("bad", "cross", view.passed_text)
         elif view.warnings:
-            self.chip.show_state("warn", "warning", view.passed_words)
+            self.chip.show_state("warn", "warning", view.passed_text)
         else:
-            self.chip.show_state("ok", "check", view.passed_words)
+            self.chip.show_state("ok", "check", view.passed_text)
 
     def _show_rows(self, view: PreflightView) -> None:
-        for place, (name, text) in enumerate(view.rows):
+        for row, (name, text) in enumerate(view.rows):
             if name not in self._values:
                 value = figures("", "label", weight=600)
                 value.setAlignment(Qt.AlignmentFlag.AlignRight)
                 value.setWordWrap(True)
-                self._grid.addWidget(label(name, "label", "text2"), place, 0)
-                self._grid.addWidget(value, place, 1)
+                self._grid.addWidget(label(name, "label", "text2"), row, 0)
+                self._grid.addWidget(value, row, 1)
                 self._values[name] = value
             self._values[name].setText(text)
 
@@ -356,7 +357,7 @@ class PreflightWindow(QWidget):
             self.start_asked.emit()
 
     def finish(self) -> None:
-        """Close without a signal: the session begins, or was cancelled elsewhere."""
+        """Close without a signal, because the session begins or was cancelled elsewhere."""
         self._done = True
         self.close()
 
@@ -379,7 +380,7 @@ class PreflightWindow(QWidget):
 
 
 class _MaskingQuestion(QWidget):
-    """A choice and, for masking noise, its level in dB."""
+    """A choice of how the motors are masked and, for masking noise, its level in dB."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -412,7 +413,7 @@ _MEASURING = "Measuring … On first use the force model is compiled, which may 
 
 
 class ComputerWindow(Question):
-    """The checks of this computer; ``asked`` requests to repeat them. The user closes it."""
+    """The dialog with the checks of this computer; ``asked`` requests to repeat them."""
 
     asked = Signal()
 

@@ -1,1 +1,1 @@
-"""A recorded trial, watched again: the participant's tank, both forces, and what happened when."""
+"""The replay of a recorded trial: the participant's tank, the forces and the events."""

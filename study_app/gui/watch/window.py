@@ -1,4 +1,4 @@
-"""A recorded trial watched again: a moment of it with arrows, forces and time line; its window, and its video."""
+"""The replay of a recorded trial: one moment with arrows, forces and time line; its window and its export as video."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from study_app.gui.kit.commands import Command, connect_button
 from study_app.gui.kit.dialogs import Work
 from study_app.gui.kit.fields import Field
 from study_app.gui.kit.opening import open_here
-from study_app.gui.participant.tank.arrows import HEIGHTS, Arrow, arrows_place, paint_arrows
-from study_app.gui.participant.tank.frame import Placed
+from study_app.gui.participant.tank.arrows import HEIGHTS, Arrow, arrows_area, paint_arrows
+from study_app.gui.participant.tank.frame import DrawnPart
 from study_app.gui.participant.tank_widget import TankWidget
 from study_app.gui.theme.theme import LIGHT, TANK, Theme, font
 from study_app.gui.theme.themed import Themed, apply_theme, remove_widget
@@ -38,11 +38,11 @@ from study_app.session.watch import Kind, Watched, read_watched
 from study_app.store.files import write_file
 from study_app.video.encoding import VideoWriter
 
-LEAST_N, LEAST_MPS = 0.05, 0.01  # lower peaks are not drawn larger
-_MOST_POINTS: Final = 800  # of a curve
-_AXIS_PX: Final = 60  # of the plot's numbers
+LEAST_N, LEAST_MPS = 0.05, 0.01  # lower peaks do not enlarge the scale
+_MAX_POINTS: Final = 800  # of a curve
+_AXIS_PX: Final = 60  # the width of the plot's numbers
 _FORCES_HIDDEN: Final = "Hidden while the study is blinded"
-_SHOWS_FORCES: Final = "Run liquid-study unblind RESULTS to show forces."
+_UNBLIND_HINT: Final = "Run liquid-study unblind RESULTS to show forces."
 
 
 class _WatchedTank(TankWidget):
@@ -56,24 +56,25 @@ class _WatchedTank(TankWidget):
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
 
     def show_moment(self, view: TankView, arrows: tuple[Arrow, ...]) -> None:
-        """Draw a view with arrows, whose vectors are in units of the water's height."""
-        self._still_images()
-        high = self._box.water - self._box.floor
+        """Draw a view with arrows, whose vectors are relative to the water's height."""
+        self._static_images()
+        height_m = self._box.water - self._box.floor
         self.arrows = tuple(
-            Arrow(name, start_m, (high * x, high * y, high * z), colour) for name, start_m, (x, y, z), colour in arrows
+            Arrow(name, start_m, (height_m * x, height_m * y, height_m * z), colour)
+            for name, start_m, (x, y, z), colour in arrows
         )
         self.show_view(view)
 
-    def _frame_parts(self) -> dict[str, Placed]:
-        things = super()._frame_parts()
+    def _frame_parts(self) -> dict[str, DrawnPart]:
+        parts = super()._frame_parts()
         if self.camera is not None and self.arrows:
-            things["arrows"] = Placed(self.arrows, arrows_place(self.camera, self.arrows))
-        return things
+            parts["arrows"] = DrawnPart(self.arrows, arrows_area(self.camera, self.arrows))
+        return parts
 
-    def _paint_things(self, painter: QPainter, region: QRegion) -> None:
+    def _paint_parts(self, painter: QPainter, region: QRegion) -> None:
         if self.camera is not None:
             paint_arrows(painter, self.camera, self.arrows)
-        super()._paint_things(painter, region)
+        super()._paint_parts(painter, region)
 
 
 class _ForcePlot(Plot):
@@ -91,14 +92,14 @@ class _ForcePlot(Plot):
         for item in (self.requested, self.sent, self.cursor):
             self.box.addItem(item)
         peak = max(LEAST_N, *(float(size.max()) for size in sizes))
-        up, along = tick_step(peak, 3), tick_step(shown.ends_s - shown.begins_s, 8)
-        self.show_ticks("left", [(up * k, tick_text(up * k)) for k in range(int(peak / up + 1e-9) + 1)])
-        first, last = np.ceil(shown.begins_s / along), np.floor(shown.ends_s / along)
-        self.show_ticks("bottom", [(along * k, f"{tick_text(along * k)} s") for k in np.arange(first, last + 1)])
+        step_n, step_s = tick_step(peak, 3), tick_step(shown.ends_s - shown.begins_s, 8)
+        self.show_ticks("left", [(step_n * k, tick_text(step_n * k)) for k in range(int(peak / step_n + 1e-9) + 1)])
+        first, last = np.ceil(shown.begins_s / step_s), np.floor(shown.ends_s / step_s)
+        self.show_ticks("bottom", [(step_s * k, f"{tick_text(step_s * k)} s") for k in np.arange(first, last + 1)])
         self.box.setXRange(shown.begins_s, shown.ends_s, padding=0)
         self.box.setYRange(0.0, 1.12 * peak, padding=0)
-        described = f"Magnitude of the forces sent and requested during the trial, up to {peak:.2f} N."
-        describe_plot(self, "Force on the hand", described)
+        description = f"Magnitude of the forces sent and requested during the trial, up to {peak:.2f} N."
+        describe_plot(self, "Force on the hand", description)
         self.apply_theme(LIGHT)
 
     def apply_theme(self, theme: Theme) -> None:
@@ -112,8 +113,8 @@ class _ForcePlot(Plot):
 
 
 def _thin_out(times_s: Floats, values: Floats) -> tuple[Floats, tuple[Floats, Floats]]:
-    """Return times (k,) and the least and greatest values (k,) between them, at most `_MOST_POINTS`."""
-    starts = np.arange(0, len(values), max(1, len(values) // _MOST_POINTS))
+    """Return about `_MAX_POINTS` times (k,), and the least and greatest values (k,) from each to the next."""
+    starts = np.arange(0, len(values), max(1, len(values) // _MAX_POINTS))
     return times_s[starts], (np.minimum.reduceat(values, starts), np.maximum.reduceat(values, starts))
 
 
@@ -123,30 +124,30 @@ class _TimeLine(Slider):
     def __init__(self, shown: Watched) -> None:
         super().__init__()
         self._shown = shown
-        self._reach = Range(shown.begins_s, shown.ends_s)
+        self._range = Range(shown.begins_s, shown.ends_s)
         self.setAccessibleName("Time in seconds")
         self.setFixedHeight(40)
 
     def show_time(self, at_s: float) -> None:
-        self.show_number(self._reach, at_s)
+        self.show_number(self._range, at_s)
 
     def paintEvent(self, event: QPaintEvent) -> None:
         super().paintEvent(event)
         painter = smooth_painter(self)
         inks: dict[Kind, str] = {"target": self.theme.ok, "answer": self.theme.accent, "event": self.theme.text2}
         for mark in self._shown.marks:
-            at, ink = QPointF(self._position_of(mark.at_s), 6), QColor(inks[mark.kind])
+            position, ink = QPointF(self._position_of(mark.at_s), 6), QColor(inks[mark.kind])
             painter.setPen(QPen(ink, 2))
             painter.setBrush(ink)
             if mark.kind == "event":
-                painter.drawLine(at + QPointF(0, -5), at + QPointF(0, 6))
+                painter.drawLine(position + QPointF(0, -5), position + QPointF(0, 6))
                 continue
             corners = [(-4, -3), (4, -3), (0, 4)] if mark.kind == "target" else [(-4, 0), (0, -4), (4, 0), (0, 4)]
-            painter.drawPolygon(QPolygonF([at + QPointF(*corner) for corner in corners]))
+            painter.drawPolygon(QPolygonF([position + QPointF(*corner) for corner in corners]))
 
 
 class Stage(QWidget):
-    """The complete picture of one moment, also used for exported videos."""
+    """The complete picture of one moment, also used for the exported video."""
 
     def __init__(self, shown: Watched) -> None:
         super().__init__()
@@ -154,14 +155,14 @@ class Stage(QWidget):
         self.tank, self.line = _WatchedTank(shown), _TimeLine(shown)
         self.forces = None if shown.blinded else _ForcePlot(shown)
         self.numbers, self.happened = figures("", "label"), Elided("label", "text2")
-        plot = self.forces or MaskedPanel(_FORCES_HIDDEN, _SHOWS_FORCES)
+        plot = self.forces or MaskedPanel(_FORCES_HIDDEN, _UNBLIND_HINT)
         plot.setMinimumHeight(88)
         plot.setMaximumHeight(190)
         key = label("" if shown.blinded else "N (line = sent, area = requested)", "small", "text2")
-        above = hbox(self.numbers, (self.happened, 1), key, spacing=16, margins=(0, 4, int(MARGIN), 0))
-        along = hbox((plot, 1), margins=(0, 0, int(MARGIN), 0))
-        timed = hbox((self.line, 1), margins=(_AXIS_PX - int(MARGIN), 0, 0, 0))
-        vbox((self.tank, 3), above, (along, 1), timed, spacing=4, margins=0, parent=self)
+        caption_row = hbox(self.numbers, (self.happened, 1), key, spacing=16, margins=(0, 4, int(MARGIN), 0))
+        plot_row = hbox((plot, 1), margins=(0, 0, int(MARGIN), 0))
+        line_row = hbox((self.line, 1), margins=(_AXIS_PX - int(MARGIN), 0, 0, 0))
+        vbox((self.tank, 3), caption_row, (plot_row, 1), line_row, spacing=4, margins=0, parent=self)
         self._peaks = {
             name: max(least, float(np.linalg.norm(np.nan_to_num(shown.samples[name]), axis=1).max()))
             for name, least in (("device_force_n", LEAST_N), ("velocity_mps", LEAST_MPS))
@@ -190,12 +191,12 @@ class Stage(QWidget):
 
     def _make_arrows(self, view: TankView, sample: Any) -> tuple[Arrow, ...]:
         start = tuple(float(part) for part in view.position_m)
-        chosen = [("velocity", "velocity_mps", TANK.wake)]
+        vectors = [("velocity", "velocity_mps", TANK.wake)]
         if not self.shown.blinded:
-            chosen.insert(0, ("force", "device_force_n", TANK.proxy_light))
+            vectors.insert(0, ("force", "device_force_n", TANK.proxy_light))
         return tuple(
             Arrow(word, start, tuple(HEIGHTS * np.nan_to_num(sample[name]) / self._peaks[name]), colour)  # type: ignore[arg-type]
-            for word, name, colour in chosen
+            for word, name, colour in vectors
         )
 
 
@@ -210,12 +211,12 @@ _STEPS: Final = (
     (Command("frame after", "Next frame", ("Right",)), "frame", 1),
     (Command("sample after", "Next sample", (".",)), "sample", 1),
 )
-"""Each with what it steps by, and which way."""
+"""Each command with the kind and direction of its step."""
 _CAPS: Final = {"Left": "←", "Right": "→"}
 
 
 class WatchWindow(Themed, QDialog):
-    """Plays a trial of a session, read in a thread; unreadable parts are replaced by a sentence.
+    """Replays a trial of a session, which is read in a thread; a sentence replaces what cannot be read.
 
     Parameters
     ----------
@@ -236,7 +237,7 @@ class WatchWindow(Themed, QDialog):
         self._reader.failed.connect(self._show_recording)
         self._timer = QTimer(self, interval=_PAINT_MS, timerType=Qt.TimerType.PreciseTimer)
         self._timer.timeout.connect(self._show_next_moment)
-        self._since = (0.0, 0.0)
+        self._clock_start = (0.0, 0.0)
         self._writing = QTimer(self, interval=0)
         self.sentence = label("Reading …", "body", "text2", wraps=True)
         self.sentence.setAlignment(Qt.AlignmentFlag.AlignCenter)
@@ -282,7 +283,7 @@ class WatchWindow(Themed, QDialog):
         vbox(head, self.lacking, (self.room, 1), foot, spacing=10, margins=(24, 16, 24, 16), parent=self)
         for button in (self.play, self.export, self.close_button, *self.steps.values()):
             button.setAutoDefault(False)
-            button.setFocusPolicy(Qt.FocusPolicy.TabFocus)  # after a click, the time line keeps the focus
+            button.setFocusPolicy(Qt.FocusPolicy.TabFocus)  # so that a click leaves the focus on the time line
         self._set_enabled(False)
 
     def _connect(self) -> None:
@@ -291,7 +292,7 @@ class WatchWindow(Themed, QDialog):
             actions[command.id] = command.action(self.room, partial(self.step, kind, way))  # type: ignore[arg-type]
         actions[_PLAY.id].setShortcutContext(
             Qt.ShortcutContext.WidgetWithChildrenShortcut
-        )  # otherwise the key would press the button
+        )  # otherwise Space would not press a focused button
         for name, button in {_PLAY.id: self.play, **self.steps}.items():
             connect_button(button, actions[name])
         self.interval.activated.connect(lambda at: self._read_interval(at + 1))
@@ -331,10 +332,10 @@ class WatchWindow(Themed, QDialog):
         self.stage.line.setFocus()
         self._show_as_seen(self.seen.isChecked())
 
-    def _set_enabled(self, able: bool) -> None:
+    def _set_enabled(self, enabled: bool) -> None:
         for part in (self.play, self.export, self.seen, self.interval, self.speed, *self.steps.values()):
-            part.setEnabled(able)
-        if not able:
+            part.setEnabled(enabled)
+        if not enabled:
             for part in (self.interval, self.seen, self.presented, self.lacking):
                 part.hide()
             self.room.setCurrentWidget(self.sentence)
@@ -351,16 +352,16 @@ class WatchWindow(Themed, QDialog):
         if self.stage is not None:
             times_s = self.stage.shown.steps_s(kind)
             side: Literal["left", "right"] = "right" if way > 0 else "left"
-            at = int(np.searchsorted(times_s, self.stage.at_s, side)) - (way < 0)
-            if 0 <= at < len(times_s):
-                self.go(float(times_s[at]))
+            index = int(np.searchsorted(times_s, self.stage.at_s, side)) - (way < 0)
+            if 0 <= index < len(times_s):
+                self.go(float(times_s[index]))
 
     @property
     def playing(self) -> bool:
         return self._timer.isActive()
 
     def toggle(self) -> None:
-        """Play from here (at the end from the start), or pause."""
+        """Pause, or play from the current time; from the beginning if it is at the end."""
         if self.playing or self.stage is None:
             self.pause()
             return
@@ -377,20 +378,20 @@ class WatchWindow(Themed, QDialog):
             self.stage.describe_moment()
 
     def _start_clock(self) -> None:
-        """Start the clock at the chosen speed."""
-        self._since = (time.perf_counter(), 0.0 if self.stage is None else self.stage.at_s)
+        """Restart the playback clock at the displayed time."""
+        self._clock_start = (time.perf_counter(), 0.0 if self.stage is None else self.stage.at_s)
 
     def _show_next_moment(self) -> None:
         if self.stage is None:
             return
-        began, at_s = self._since
-        self.stage.show_moment(at_s + (time.perf_counter() - began) * self.speed.currentData())
+        started, at_s = self._clock_start
+        self.stage.show_moment(at_s + (time.perf_counter() - started) * self.speed.currentData())
         if self.stage.at_s >= self.stage.shown.ends_s:
             self.pause()
 
-    def _show_as_seen(self, yes: bool) -> None:
+    def _show_as_seen(self, as_seen: bool) -> None:
         if self.stage is not None:
-            self.stage.as_seen = yes
+            self.stage.as_seen = as_seen
             self.stage.show_moment(self.stage.at_s)
 
     def _ask_export(self) -> None:
@@ -399,7 +400,7 @@ class WatchWindow(Themed, QDialog):
             self,
             self.theme,
             "Export as video",
-            f"{self._name} will show this view at {self.speed.currentText()} speed.",
+            f"{self._file_name} will show this view at {self.speed.currentText()} speed.",
             ActionButton("download", "Export", role="primary"),
             fields=(Field("to", "Folder", "folder", hint="An existing file will be overwritten."),),
             needs={"to": "Please choose a folder."},
@@ -414,27 +415,27 @@ class WatchWindow(Themed, QDialog):
         dialog.open()
 
     @property
-    def _name(self) -> str:
+    def _file_name(self) -> str:
         interval = f"-interval-{self.interval.currentIndex() + 1}" if self.interval.count() > 1 else ""
         participant, session = self._folder.parent.name, self._folder.name
         return f"{participant}_{session}_trial-{self._trial:03}{interval}.mp4"
 
     def _begin_export(self) -> None:
         assert self.export_dialog is not None  # noqa: S101 - it has begun
-        pictures = self._pictures(Path(self.export_dialog.value("to")).expanduser() / self._name)
+        pictures = self._write_pictures(Path(self.export_dialog.value("to")).expanduser() / self._file_name)
         self._writing = QTimer(self, interval=0)
         self._writing.timeout.connect(lambda: self._write_next_picture(pictures))
         self._writing.start()
 
     def _write_next_picture(self, pictures: Iterator[float | Path]) -> None:
-        """Write one more picture; show the progress or the result."""
+        """Write the next picture of the video; show the progress or the result."""
         dialog = self.export_dialog
         assert dialog is not None  # noqa: S101 - it has begun
         try:
             progress = next(pictures)
-        except StudyError as refused:
+        except StudyError as error:
             self._writing.stop()
-            dialog.show_refused(f"{str(refused)[:1].upper()}{str(refused)[1:]}.")
+            dialog.show_refused(f"{str(error)[:1].upper()}{str(error)[1:]}.")
             return
         if isinstance(progress, Path):
             self._writing.stop()
@@ -442,11 +443,11 @@ class WatchWindow(Themed, QDialog):
         else:
             dialog.show_progress("Painting …", progress)
 
-    def _pictures(self, to: Path) -> Iterator[float | Path]:
-        """Write a video; yield the fraction done, then the file."""
+    def _write_pictures(self, to: Path) -> Iterator[float | Path]:
+        """Write a video; yield the fraction done after each picture, and finally the file."""
         stage = self.stage
-        assert stage is not None  # noqa: S101 - the button is off without one
-        back, size = stage.at_s, stage.grab().size()
+        assert stage is not None  # noqa: S101 - the button is disabled without one
+        shown_s, size = stage.at_s, stage.grab().size()
         writer = VideoWriter(size.toTuple(), _VIDEO_HZ)  # type: ignore[arg-type]  # a pair of int
         times_s = np.arange(stage.shown.begins_s, stage.shown.ends_s, self.speed.currentData() / _VIDEO_HZ)
         for count, at_s in enumerate(times_s):
@@ -454,7 +455,7 @@ class WatchWindow(Themed, QDialog):
             writer.add(_stage_pixels(stage, size))
             yield count / len(times_s)
         write_file(to, writer.finish())
-        stage.show_moment(back)
+        stage.show_moment(shown_s)
         yield to
 
     def _stop_export(self) -> None:
@@ -468,7 +469,7 @@ class WatchWindow(Themed, QDialog):
 
 
 def _stage_pixels(stage: Stage, size: QSize) -> np.ndarray:
-    """Return the shown picture (height, width, 4): blue, green, red, unused."""
+    """Return the pixels of the stage (height, width, 4): blue, green, red, unused."""
     image = stage.grab().toImage().convertToFormat(QImage.Format.Format_RGB32)
     if image.size() != size:  # the window was resized meanwhile
         image = image.scaled(size)
