@@ -28,7 +28,7 @@ _WAKE_POINTS = 48
 
 
 class DeviceCard(Card):
-    """The device of new sessions, whether it gives force now, and the screens."""
+    """The card with the device of new sessions, its state, and the screens."""
 
     def __init__(self) -> None:
         super().__init__(padding=20, gap=8)
@@ -58,7 +58,7 @@ class DeviceCard(Card):
 
 
 class LabCard(Card):
-    """The link to the liquid lab, under a picture of a ball and its wake, which is smaller in a low window."""
+    """The card that opens the liquid lab, with a picture of a ball and its wake that shrinks in a low window."""
 
     def __init__(self) -> None:
         super().__init__(padding=20, gap=6)
@@ -66,7 +66,7 @@ class LabCard(Card):
         self.column.addSpacerItem(self._picture)
         about = label(
             "Tune a liquid by feel and save it.", "label", "text2"
-        )  # a line that wraps keeps the picture high
+        )  # with a wrapping line, the picture would not shrink
         about.setFont(font("label", weight=400))
         self.open = ActionButton("", "Open", height=38)
         self.open.setAccessibleName("Open the liquid lab")
@@ -113,7 +113,7 @@ def _paint_wake(painter: QPainter, water: QRectF) -> None:
 
 
 class ResumeBanner(QWidget):
-    """A tinted strip, hidden if there is no session to resume. ``resume_asked`` carries the session."""
+    """A tinted strip about the session that can be resumed, if any; ``resume_asked`` carries the session."""
 
     resume_asked = Signal(object)
 
@@ -131,7 +131,7 @@ class ResumeBanner(QWidget):
         self.hide()
 
     def minimumSizeHint(self) -> QSize:
-        """Return the height at the current width, since wrapped texts report that of the narrowest lines."""
+        """Return the height at the current width, since wrapped texts report the height at their minimum width."""
         hint = super().minimumSizeHint()
         return QSize(hint.width(), self.heightForWidth(max(hint.width(), self.width())))
 
@@ -154,19 +154,19 @@ COLUMNS = (
     Column("validity", "Validity", 130, 134),
     Column("answers", "Answers", 80, 78),
 )
-_EVERY = "every"
+_ALL = "every"
 LEAST_HEIGHT = 200
 _NONE = {
     "": "No participant sessions yet. The first session will appear here when it starts.",
     "pilot": "No pilot sessions.",
     "simulated": "No simulated sessions.",
     "sample": "No sample sessions.",
-    _EVERY: "No sessions yet. The first session will appear here when it starts.",
+    _ALL: "No sessions yet. The first session will appear here when it starts.",
 }
 
 
 class SessionsCard(Card):
-    """The sessions table, newest first; rows that need attention come first. An empty table is a single line.
+    """The card with the sessions: those that need attention, then the newest; a single line if there are none.
 
     ``open_asked`` carries the `SessionFacts` of a session; ``emptied`` is emitted when the table appears or disappears.
     """
@@ -177,7 +177,7 @@ class SessionsCard(Card):
     def __init__(self) -> None:
         super().__init__(gap=8, padding=20)
         self.column.setContentsMargins(14, self.column.contentsMargins().top(), 14, 14)
-        self._found: tuple[SessionFacts, ...] = ()
+        self._sessions: tuple[SessionFacts, ...] = ()
         self._now = datetime.now().astimezone()
         self.where = Elided("small", "text2")
         self.kind = Choice()
@@ -209,15 +209,15 @@ class SessionsCard(Card):
         return self.rows.shown
 
     def show_sessions(self, sessions: Sequence[SessionFacts], where: str, now: datetime) -> None:
-        """Show these sessions; ``where`` names the results folder."""
-        self._found, self._now = tuple(sessions), now
+        """Show the sessions in the results folder ``where``."""
+        self._sessions, self._now = tuple(sessions), now
         self.where.show_text(f"in {where}")
         self._show_kinds()
-        self.rows.show_rows(self._found, now)
+        self.rows.show_rows(self._sessions, now)
         self._apply_filter()
 
     def show_kind(self, kind: str) -> None:
-        """Show the sessions of a kind: "" for participants', one of `KINDS`, or `_EVERY`."""
+        """Show the sessions of a kind: "" for participants', one of `KINDS`, or `_ALL`."""
         self.kind.setCurrentIndex(self.kind.findData(kind))
 
     def _show_kinds(self) -> None:
@@ -225,26 +225,26 @@ class SessionsCard(Card):
         with QSignalBlocker(self.kind):
             self.kind.clear()
             for kind, plural in KINDS.items():
-                count = sum(session.kind == kind for session in self._found)
+                count = sum(session.kind == kind for session in self._sessions)
                 self.kind.addItem(f"{plural} ({count})", kind)
-            self.kind.addItem(f"All ({len(self._found)})", _EVERY)
+            self.kind.addItem(f"All ({len(self._sessions)})", _ALL)
             self.kind.setCurrentIndex(self.kind.findData(chosen))
 
     def _apply_filter(self) -> None:
-        kind = str(self.kind.currentData() or "") if self._found else _EVERY
-        self.rows.show_matching(lambda session: kind in (session.kind, _EVERY))
+        kind = str(self.kind.currentData() or "") if self._sessions else _ALL
+        self.rows.show_matching(lambda session: kind in (session.kind, _ALL))
         hidden = [
             counted(count, f"{other or 'participant'} session")
             for other in KINDS
-            if (count := sum(session.kind == other for session in self._found))
+            if (count := sum(session.kind == other for session in self._sessions))
         ]
         self.nothing.setText(f"{_NONE[kind]} Not shown: {', '.join(hidden)}." if hidden else _NONE[kind])
         emptied = self.rows.isHidden() != self.is_empty
         self.nothing.setVisible(self.is_empty)
         for part in (self.where, self.details, self.rows):
             part.setVisible(not self.is_empty)
-        self.kind.setVisible(bool(self._found))
-        self.all.setVisible(bool(self._found))
+        self.kind.setVisible(bool(self._sessions))
+        self.all.setVisible(bool(self._sessions))
         self.setMinimumHeight(0 if self.is_empty else LEAST_HEIGHT)
         if emptied:
             self.emptied.emit()
@@ -257,15 +257,15 @@ Facts: TypeAlias = StudyFacts | BrokenFacts | DraftFacts
 
 
 class _FileCard(Card):
-    """A study: its title, its origin, and its unsaved draft, if any; ``edit`` carries its facts.
+    """The card of a study with its title, origin and unsaved draft, if any; ``edit`` and ``discard`` carry its facts.
 
     Parameters
     ----------
     facts : the facts on the card
     title : the title; at most two lines
-    copies : whether *Edit* makes a copy
-    first : whether its draft is the most recently edited one
-    sign : an icon before the title, "" for none
+    copies : whether editing makes a copy
+    first : whether the draft is the most recently edited one
+    sign : the icon before the title, or ""
     """
 
     edit = Signal(object)
@@ -288,8 +288,8 @@ class _FileCard(Card):
         self.pen: ActionButton | IconButton
         self.bin: IconButton | None = None
         if facts.draft is None:
-            word, name = ("Make a copy", f"Make a copy of {title}") if copies else ("Edit", f"Edit {title}")
-            self.pen = IconButton("copy" if copies else "pen", name, word, size=36, role="plain")
+            tip, name = ("Make a copy", f"Make a copy of {title}") if copies else ("Edit", f"Edit {title}")
+            self.pen = IconButton("copy" if copies else "pen", name, tip, size=36, role="plain")
             top.addWidget(self.pen, 0, Qt.AlignmentFlag.AlignTop)
             self.draft.hide()
         else:
@@ -306,9 +306,9 @@ class _FileCard(Card):
 
 
 class StudyCard(_FileCard):
-    """A study that can be run; ``new_session`` and ``rehearsal`` carry its facts.
+    """The card of a study that can be run; ``new_session`` and ``rehearsal`` carry its facts.
 
-    ``shipped`` means that it ships with the program, ``first`` that it is the most likely choice.
+    ``shipped`` means that the study ships with the program, ``first`` that it is the most likely choice.
     """
 
     new_session = Signal(object)
@@ -337,7 +337,7 @@ class StudyCard(_FileCard):
 
 
 class BrokenCard(_FileCard):
-    """A protocol file that cannot be used, with the reason, or a study without a file."""
+    """The card of a protocol file that cannot be used, with the reason, or of a study that was never saved."""
 
     def __init__(self, facts: BrokenFacts | DraftFacts, *, first: bool = False) -> None:
         if isinstance(facts, DraftFacts):
@@ -347,13 +347,13 @@ class BrokenCard(_FileCard):
             super().__init__(facts, Path(facts.source).stem, first=first, sign="warning")
             self.column.addWidget(label("This file cannot be used.", "strong", "warn"))
             why = facts.problem
-        said = label(why, "label", "text2", wraps=True)
-        said.setAlignment(Qt.AlignmentFlag.AlignTop)
-        self.column.addWidget(said, 1)
+        reason = label(why, "label", "text2", wraps=True)
+        reason.setAlignment(Qt.AlignmentFlag.AlignTop)
+        self.column.addWidget(reason, 1)
 
 
 class CardGrid(QWidget):
-    """Cards side by side, as many per row as fit; ``laid_out`` is emitted when heights may differ."""
+    """A grid of cards, as many per row as fit; ``laid_out`` is emitted when their heights may have changed."""
 
     laid_out = Signal()
 
@@ -361,51 +361,55 @@ class CardGrid(QWidget):
         super().__init__()
         self.cards: list[QWidget] = []
         self._grid = grid(_GAP, _GAP, margins=0, parent=self)
-        self._across, self._least = 0, _LEAST_WIDTH
+        self._columns, self._least = 0, _LEAST_WIDTH
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
 
     @property
     def row_height(self) -> int:
         """The height of the first row of cards at their current width."""
-        wide = (self.width() - self._grid.contentsMargins().right() + _GAP) // max(1, self._across) - _GAP
+        card_width = (self.width() - self._grid.contentsMargins().right() + _GAP) // max(1, self._columns) - _GAP
         heights = (
-            card.heightForWidth(wide) if card.hasHeightForWidth() else card.sizeHint().height()
-            for card in self.cards[: self._across]
+            card.heightForWidth(card_width) if card.hasHeightForWidth() else card.sizeHint().height()
+            for card in self.cards[: self._columns]
         )
         return max(heights, default=0)
 
     @property
     def whole_height(self) -> int:
-        grows = self._grid.hasHeightForWidth()
-        return self._grid.totalHeightForWidth(self.width()) if grows else self._grid.totalSizeHint().height()
+        has_height_for_width = self._grid.hasHeightForWidth()
+        return (
+            self._grid.totalHeightForWidth(self.width())
+            if has_height_for_width
+            else self._grid.totalSizeHint().height()
+        )
 
     def show_cards(self, cards: list[QWidget]) -> None:
         for card in self.cards:
             remove_widget(card)
         self.cards = cards
-        self._across = 0
+        self._columns = 0
         self._least = max([_LEAST_WIDTH, *(card.minimumSizeHint().width() for card in cards)])
         self.arrange(self.width())
 
-    def leave_room(self, width: int) -> None:
+    def set_right_margin(self, width: int) -> None:
         self._grid.setContentsMargins(0, 0, width, 0)
 
     def event(self, event: QEvent) -> bool:
-        done = super().event(event)
+        handled = super().event(event)
         if event.type() == QEvent.Type.LayoutRequest:
             self.laid_out.emit()
-        return done
+        return handled
 
     def arrange(self, width: int) -> None:
-        """Place the cards in a width; a single card is not stretched."""
-        across = max(1, (width + _GAP) // (self._least + _GAP))
-        if across == self._across:
+        """Place as many cards per row as fit ``width``; a single card is not stretched."""
+        columns = max(1, (width + _GAP) // (self._least + _GAP))
+        if columns == self._columns:
             return
         for column in range(self._grid.columnCount()):
             self._grid.setColumnStretch(column, 0)
-        self._across = across
+        self._columns = columns
         for index, card in enumerate(self.cards):
-            self._grid.addWidget(card, index // across, index % across)
-        for column in range(min(across, max(2, len(self.cards)))):
+            self._grid.addWidget(card, index // columns, index % columns)
+        for column in range(min(columns, max(2, len(self.cards)))):
             self._grid.setColumnStretch(column, 1)
-        self._grid.activate()  # at once, or the part above keeps the previous layout's room
+        self._grid.activate()  # at once, since the parent would otherwise use the old size

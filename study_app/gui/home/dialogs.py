@@ -1,4 +1,4 @@
-"""The dialogs of the home page: a new session, a rehearsal, the workspace. Nothing is created before one accepts."""
+"""The dialogs of the home page: a new session, a rehearsal, the workspace; nothing is created before acceptance."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -43,14 +43,14 @@ from study_app.workspace import workspace
 
 _MAX_PARTICIPANTS = 200
 _REHEARSED = 5
-"""The simulated participants that are suggested if the study states no planned number."""
-_LISTEN_MS = 40
+"""The number of simulated participants that is suggested if the study does not plan a number."""
+_POLL_MS = 40
 
 
 class RehearsalDialog(Work):
-    """Asks for the number of simulated participants, then shows progress and a link to the results.
+    """A dialog that asks for the number of simulated participants, then shows progress and a link to the results.
 
-    Cancel keeps completed sessions. It is accepted if the results are to be shown.
+    Cancel keeps completed sessions. The dialog is accepted when the results should be shown.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ class RehearsalDialog(Work):
     ) -> None:
         self.folder = rehearsal_folder(results, facts.protocol.study.name)
         groups = LANGUAGES["en"].joined(tuple(facts.protocol.groups))
-        dealt = (
+        group_note = (
             f" Participants are divided among the groups {groups} in the planned ratio."
             if facts.protocol.asks_group
             else ""
@@ -73,7 +73,7 @@ class RehearsalDialog(Work):
             theme,
             f"Rehearse {facts.title}",
             "Simulated participants complete whole sessions faster than real time. The sessions are marked as "
-            f"simulated and stored separately in {self.folder}.{dealt}",
+            f"simulated and stored separately in {self.folder}.{group_note}",
             ActionButton("fast_forward", "Rehearse", role="primary"),
             fields=(
                 Field("participants", "Simulated participants", "count", limits=(1, _MAX_PARTICIPANTS)),
@@ -91,7 +91,7 @@ class RehearsalDialog(Work):
         self.begun.connect(self._start_rehearsal)
         self.stop_asked.connect(self._stop_rehearsal)
         self.opened.connect(lambda: self.done(QDialog.DialogCode.Accepted.value))
-        self._listening = QTimer(self, interval=_LISTEN_MS)
+        self._listening = QTimer(self, interval=_POLL_MS)
         self._listening.timeout.connect(self._read_answers)
 
     def _start_rehearsal(self) -> None:
@@ -111,8 +111,8 @@ class RehearsalDialog(Work):
             self.worker.close()
 
     def _read_answers(self) -> None:
-        """Read the new answers; close the dialog once a stopped rehearsal's process has ended."""
-        assert self.worker is not None  # noqa: S101 - answers are read only after its start
+        """Read new answers; after a request to stop, close the dialog once the process has ended."""
+        assert self.worker is not None  # noqa: S101 - answers are read only after the start
         if not self.back.isEnabled():
             if self.worker.ended:
                 self._listening.stop()
@@ -136,7 +136,7 @@ class RehearsalDialog(Work):
                     self.show_refused(answer.sentence)
 
     def end(self) -> None:
-        """Stop the rehearsal and wait for it, because the windows are closed."""
+        """Stop the rehearsal and wait for its process, because the windows are closed."""
         self._listening.stop()
         self.working = False
         if self.worker is not None:
@@ -144,7 +144,7 @@ class RehearsalDialog(Work):
             self.worker.wait_until_ended()
 
 
-_FRAME = 60  # of a window, at most
+_FRAME = 60  # maximum height of a window's frame [px]
 INSIDE, OUTSIDE = "in the workspace", "outside the workspace: Home will not list its sessions"
 _HOLDS = "The workspace will contain the folders protocols and results."
 _ROW_HINT = "the session uses that participant's order; leave empty if no one is being replaced"
@@ -156,9 +156,9 @@ _GROUP_HINT = "recorded as a property of the participant"
 
 @dataclass(frozen=True, slots=True)
 class _StudyFolderState:
-    """A snapshot of a study's folder: used ids, and the reason if it cannot hold new sessions.
+    """A snapshot of a study's folder: the used IDs, and the reason why it cannot hold new sessions, or "".
 
-    ``held`` are the entries of its participants in groups.
+    ``held`` are the recorded groups of its participants.
     """
 
     path: Path
@@ -167,12 +167,12 @@ class _StudyFolderState:
     fault: str
 
     def group_of(self, participant: str) -> str | None:
-        """Return the recorded pre-existing group of a participant; None if there is none yet."""
+        """Return the recorded group of a participant, or None."""
         return next((claim.group for claim in self.held if claim.participant == participant), None)
 
 
 def _read_study_folder_state(path: Path, protocol: Protocol) -> _StudyFolderState:
-    """Read a study's folder; ``fault`` is the reason if it cannot be used."""
+    """Return a snapshot of a study's folder."""
     folder, fault = StudyFolder(path), ""
     used = UsedIds(path, frozenset(), ())
     try:
@@ -185,11 +185,11 @@ def _read_study_folder_state(path: Path, protocol: Protocol) -> _StudyFolderStat
 
 
 class _ChoiceMissing(ValueError):
-    """A choice is still to be made."""
+    """A choice that the operator still has to make."""
 
 
 class NewSessionDialog(QDialog):
-    """Asks for participant, seed, language, device and screen of a new session.
+    """A dialog that asks for participant, seed, language, device and screen of a new session.
 
     Parameters
     ----------
@@ -211,14 +211,14 @@ class NewSessionDialog(QDialog):
         self.facts, self._all_results = facts, results
         self._state: _StudyFolderState | None = None
         self._reader = Background(self)
-        self._reader.done.connect(self._take_state)
+        self._reader.done.connect(self._apply_state)
         self.setWindowTitle("New session")
         self.setModal(True)
         self.setMinimumWidth(736)
         self.verdict_icon, self.verdict = Icon("check", "ok", 18), label("", "label", "ok", wraps=True)
-        self._free = 1, ""
+        self._free_ids = 1, ""
         self._windowed_without_pilot = False
-        self.ways = another, new = ActionButton("", "", height=34), ActionButton("", "", height=34)
+        self.suggestions = another, new = ActionButton("", "", height=34), ActionButton("", "", height=34)
         self.begin = ActionButton("play", "Begin", role="primary", height=46)
         self.cancel = ActionButton("", "Cancel", height=46)
         self._make_editors(machine)
@@ -228,8 +228,8 @@ class NewSessionDialog(QDialog):
             editor.edited.connect(
                 {"device": self._choose_device, "pilot": self._choose_pilot}.get(name, self._check_answers)
             )
-        another.clicked.connect(lambda: self.editors["session"].show_value(self._free[0]))
-        new.clicked.connect(lambda: self.editors["participant"].show_value(self._free[1]))
+        another.clicked.connect(lambda: self.editors["session"].show_value(self._free_ids[0]))
+        new.clicked.connect(lambda: self.editors["participant"].show_value(self._free_ids[1]))
         self.begin.clicked.connect(self.accept)
         self.cancel.clicked.connect(self.reject)
         self._check_answers()
@@ -287,23 +287,23 @@ class NewSessionDialog(QDialog):
         for name, value in values.items():
             self.editors[name].show_value(value)
         self.editors["participant"].show_value(self._current_state().used.suggested())
-        self.editors["group"].show_value(None)  # chosen, never assumed
+        self.editors["group"].show_value(None)  # so that the operator must choose
         self.editors["group"].setVisible(self.facts.protocol.asks_group)
         self.editors["row_of"].setVisible(self.facts.protocol.assigns_rows or bool(self.facts.protocol.groups))
 
     def _lay_out(self) -> None:
-        self._ways_row, self._inside = QWidget(), QWidget()
-        hbox(*self.ways, STRETCH, margins=(26, 0, 0, 0), parent=self._ways_row)
-        for button in (*self.ways, self.cancel):
+        self._suggestions_row, self._inside = QWidget(), QWidget()
+        hbox(*self.suggestions, STRETCH, margins=(26, 0, 0, 0), parent=self._suggestions_row)
+        for button in (*self.suggestions, self.cancel):
             button.setAutoDefault(False)
         self.begin.setDefault(True)
         verdict = hbox((self.verdict_icon, 0, Qt.AlignmentFlag.AlignTop), (self.verdict, 1), spacing=8)
-        judged, checks, e = QWidget(), QWidget(), self.editors
-        vbox(verdict, self._ways_row, spacing=6, margins=0, parent=judged)
+        verdict_box, checks, e = QWidget(), QWidget(), self.editors
+        vbox(verdict, self._suggestions_row, spacing=6, margins=0, parent=verdict_box)
         vbox(e["windowed"], e["pilot"], spacing=2, margins=(0, 4, 0, 0), parent=checks)
         pairs = (
             (e["participant"], e["session"]),
-            (judged,),
+            (verdict_box,),
             (e["group"],),
             (e["seed"], e["operator"]),
             (e["language"], e["device"]),
@@ -339,12 +339,12 @@ class NewSessionDialog(QDialog):
 
     def showEvent(self, event: QShowEvent) -> None:
         super().showEvent(event)
-        QTimer.singleShot(0, self, self._fit_height)  # once the parts have their style
+        QTimer.singleShot(0, self, self._fit_height)  # after the style sheet is applied
 
     def _fit_height(self) -> None:
-        """Make the dialog as high as its questions, or as the screen if that is lower; the questions then scroll.
+        """Make the dialog as high as its fields or, if the screen is lower, as the screen; the fields then scroll.
 
-        The dialog is wide enough for the questions and their scroll bar.
+        The dialog is wide enough for the fields and their scroll bar.
         """
         questions, outer = self._inside.layout(), self.layout()
         assert questions is not None and outer is not None  # noqa: S101, PT018 - laid out above
@@ -353,10 +353,10 @@ class NewSessionDialog(QDialog):
         least_px = questions.totalMinimumSize().width() + self._area.verticalScrollBar().sizeHint().width() + margins_px
         self.setMinimumWidth(max(self.minimumWidth(), least_px))
         width_px = self.minimumWidth() - margins_px
-        needed_px = questions.totalHeightForWidth(width_px)
+        fields_px = questions.totalHeightForWidth(width_px)
         self._area.setMinimumHeight(0)
-        around_px = outer.totalMinimumSize().height() - self._area.minimumSizeHint().height()
-        self._area.setMinimumHeight(min(needed_px, self.screen().availableSize().height() - _FRAME - around_px))
+        frame_px = outer.totalMinimumSize().height() - self._area.minimumSizeHint().height()
+        self._area.setMinimumHeight(min(fields_px, self.screen().availableSize().height() - _FRAME - frame_px))
         self.adjustSize()
 
     def _choose_device(self) -> None:
@@ -364,14 +364,14 @@ class NewSessionDialog(QDialog):
         self._check_answers()
 
     def _suggest_folder(self) -> None:
-        """Suggest separate folders for pilots and simulated hands, unless the operator chose one."""
+        """Suggest the folder for the chosen device or for pilots, unless the operator has chosen a folder."""
         if self._value("results") == self._suggested:
             study, device, pilot = self.facts.protocol.study.name, self._value("device"), self._value("pilot")
             self._suggested = str(study_results(self._all_results, study, device, pilot=pilot))
             self.editors["results"].show_value(self._suggested)
 
     def _choose_pilot(self) -> None:
-        """Choose a framed window and the pilots' folder, or restore both choices."""
+        """Choose a window and the folder for pilots, or restore both choices."""
         pilot, windowed = self._value("pilot"), self.editors["windowed"]
         if pilot:
             self._windowed_without_pilot = windowed.value
@@ -384,61 +384,61 @@ class NewSessionDialog(QDialog):
         return self.editors[name].value
 
     def _check_answers(self) -> None:
-        """Check the answers, and reread the folder in the background."""
+        """Show whether the session can begin, and read the folder again in the background."""
         self._show_verdict()
         if text := self._value("results"):
             self._reader.run(partial(_read_study_folder_state, Path(text), self.facts.protocol))
 
-    def _take_state(self, state: _StudyFolderState) -> None:
+    def _apply_state(self, state: _StudyFolderState) -> None:
         if state.path == Path(self._value("results")) and state != self._state:
             self._state = state
             self._show_verdict()
 
     def _current_state(self) -> _StudyFolderState:
-        """Return the last state of the study's folder; read a newly chosen folder at once."""
+        """Return the last snapshot of the study's folder; read a newly chosen folder at once."""
         path = Path(self._value("results") or ".")
         if self._state is None or self._state.path != path:
             self._state = _read_study_folder_state(path, self.facts.protocol)
         return self._state
 
     def _show_verdict(self) -> None:
-        inside = Path(self._value("results")).resolve().is_relative_to(workspace().folder.resolve())
-        self.editors["results"].aside.setText(INSIDE if inside else OUTSIDE)
+        in_workspace = Path(self._value("results")).resolve().is_relative_to(workspace().folder.resolve())
+        self.editors["results"].aside.setText(INSIDE if in_workspace else OUTSIDE)
         for option in window_options():
             self.editors[option.name].setVisible(option.name in self._asked_options())
         participant, session, used = self._value("participant"), self._value("session"), self._current_state().used
         self._show_recorded_group(self._current_state().group_of(participant))
         numbers = used.numbers(participant)
-        self._ways_row.setVisible(session in numbers)
-        if session in numbers:  # choices that need no decision; resuming is on the home page
-            self._free = min(max(numbers) + 1, MAX_SESSION), used.suggested()
-            self.ways[0].show_action("", f"Session {self._free[0]} of {participant}")
-            self.ways[1].show_action("", f"New participant {self._free[1]}")
+        self._suggestions_row.setVisible(session in numbers)
+        if session in numbers:  # offer free IDs; interrupted sessions are resumed on the home page
+            self._free_ids = min(max(numbers) + 1, MAX_SESSION), used.suggested()
+            self.suggestions[0].show_action("", f"Session {self._free_ids[0]} of {participant}")
+            self.suggestions[1].show_action("", f"New participant {self._free_ids[1]}")
         fault, sign = "", "check"
         ink: Ink = "ok"
         try:
-            self._raise_if_refused()
-        except _ChoiceMissing as missing:  # what is still to be done is not a mistake
+            self._check_session()
+        except _ChoiceMissing as missing:  # not an error
             fault, sign, ink = str(missing), "info", "text2"
         except (StudyError, ValueError) as error:
             fault, sign, ink = str(error), "warning", "bad"
         sentence = fault or f"The ID {participant} can be used for session {session}"
-        by_id = sentence.startswith(f"{participant} ")  # an id is kept as typed
-        self.verdict.setText(sentence if by_id else sentence[:1].upper() + sentence[1:])
+        begins_with_id = sentence.startswith(f"{participant} ")  # IDs are not capitalised
+        self.verdict.setText(sentence if begins_with_id else sentence[:1].upper() + sentence[1:])
         set_ink(self.verdict, ink)
         self.verdict_icon.show_icon(sign, ink)
         self.begin.setEnabled(not fault)
         self._fit_height()
 
     def _show_recorded_group(self, recorded: str | None) -> None:
-        """Show the recorded group of a participant, which cannot change; otherwise it can be chosen."""
+        """Show the recorded group of a participant, which cannot be changed, or let the operator choose one."""
         group = self.editors["group"]
         if recorded is not None or not group.isEnabled():
             group.show_value(recorded)
         group.setEnabled(recorded is None)
 
-    def _raise_if_refused(self) -> None:
-        """Raise an error if the session cannot begin; nothing is changed."""
+    def _check_session(self) -> None:
+        """Raise ValueError or StudyError if the session cannot begin."""
         if not self._value("results"):
             raise ValueError("choose a results folder")
         participant, session, state = self._value("participant"), self._value("session"), self._current_state()
@@ -464,7 +464,7 @@ class NewSessionDialog(QDialog):
         return {option.name for option in descriptor_of(self._value("device")).window_options}
 
     def chosen(self) -> NewSession:
-        """Return the chosen session; raise ValueError for invalid values."""
+        """Return the chosen session; raise ValueError if a value is invalid."""
         asked, options = self._asked_options(), {option.name for option in window_options()}
         values = {name: editor.value for name, editor in self.editors.items() if name in asked or name not in options}
         chosen = {name: values.pop(name) for name in asked}
@@ -476,7 +476,7 @@ class NewSessionDialog(QDialog):
 
 
 class WorkspaceDialog(Question):
-    """Shows the suggested folder; another one can be chosen or typed. Nothing is created until it is accepted."""
+    """A dialog that suggests a workspace folder; another one can be chosen. Nothing is created until acceptance."""
 
     def __init__(self, parent: QWidget, theme: Theme, offered: Path) -> None:
         super().__init__(

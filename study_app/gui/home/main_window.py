@@ -1,4 +1,4 @@
-"""The main window: the rail, and one view at a time."""
+"""The main window: the navigation rail, and one page at a time."""
 
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
@@ -48,12 +48,12 @@ DESTINATIONS = (
 
 
 class _RailButton(Themed, PressedByEnter):
-    """A page or a switch in the rail: icon and label, side by side if wide, otherwise below each other."""
+    """A button in the rail for a page or a switch; its label is next to its icon, or below it in a narrow rail."""
 
     def __init__(self, icon: str, word: str, short: str) -> None:
         super().__init__(word)
         self.icon_name, self.word, self.short = icon, word, short
-        self._here = False
+        self._is_current = False
         self._narrow = False
         self.setProperty("role", "plain")
         self.setAccessibleName(word)
@@ -61,27 +61,27 @@ class _RailButton(Themed, PressedByEnter):
         self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
         self.set_narrow(False)
 
-    def set_narrow(self, yes: bool) -> None:
-        self._narrow = yes
-        self.setText(self.short if yes else self.word)
+    def set_narrow(self, narrow: bool) -> None:
+        self._narrow = narrow
+        self.setText(self.short if narrow else self.word)
         self.updateGeometry()
         self.update()
 
     def sizeHint(self) -> QSize:
-        """Return the size of icon and label; a fixed height would not survive a change of theme."""
+        """Return the size of icon and label; a fixed height would be lost when the theme changes."""
         return QSize(NARROW_RAIL - 2 * NARROW_MARGIN, 58) if self._narrow else QSize(WIDE_RAIL - 2 * WIDE_MARGIN, 42)
 
     def minimumSizeHint(self) -> QSize:
         return self.sizeHint()
 
     @property
-    def here(self) -> bool:
-        return self._here
+    def is_current(self) -> bool:
+        return self._is_current
 
-    @here.setter
-    def here(self, yes: bool) -> None:
-        self._here = yes
-        self.setAccessibleDescription("You are here" if yes else "")
+    @is_current.setter
+    def is_current(self, current: bool) -> None:
+        self._is_current = current
+        self.setAccessibleDescription("You are here" if current else "")
         self.update()
 
     def set_texts(self, icon: str, word: str, short: str) -> None:
@@ -94,17 +94,17 @@ class _RailButton(Themed, PressedByEnter):
         painter = smooth_painter(self)
         painter.setPen(Qt.PenStyle.NoPen)
         rect = QRectF(self.rect())
-        if self.here or self.underMouse():
-            painter.setBrush(QColor(t.selected if self.here else t.hover))
+        if self.is_current or self.underMouse():
+            painter.setBrush(QColor(t.selected if self.is_current else t.hover))
             painter.drawRoundedRect(rect, RADIUS_CONTROL, RADIUS_CONTROL)
-        if self.here and not self._narrow:
+        if self.is_current and not self._narrow:
             painter.setBrush(QColor(t.accent))
             painter.drawRoundedRect(QRectF(0, 6, 3, rect.height() - 12), 1.5, 1.5)
         if self.hasFocus():
             painter.setPen(QPen(QColor(t.accent), _FOCUS_RING))
             painter.setBrush(Qt.BrushStyle.NoBrush)
             painter.drawRoundedRect(rect.adjusted(1, 1, -1, -1), RADIUS_CONTROL - 1, RADIUS_CONTROL - 1)
-        ink = t.accent if self.here else t.text2
+        ink = t.accent if self.is_current else t.text2
         if self._narrow:
             draw_icon(painter, self.icon_name, QRectF(rect.width() / 2 - 10, 8, 20, 20), ink)
             room, align = QRectF(0, 30, rect.width(), 22), Qt.AlignmentFlag.AlignCenter
@@ -112,7 +112,7 @@ class _RailButton(Themed, PressedByEnter):
         else:
             draw_icon(painter, self.icon_name, QRectF(14, rect.height() / 2 - 10, 20, 20), ink)
             room, align = QRectF(46, 0, rect.width() - 46, rect.height()), Qt.AlignmentFlag.AlignVCenter
-            painter.setFont(font("label", weight=600 if self.here else 500))
+            painter.setFont(font("label", weight=600 if self.is_current else 500))
         painter.setPen(QColor(ink))
         painter.drawText(room, align, self.text())
 
@@ -138,22 +138,22 @@ class _Rail(Coloured, QWidget):
         self._column = vbox(self._head, 22, *self.buttons.values(), STRETCH, self.switch, spacing=6, parent=self)
 
     def _make_button(self, place: _Destination) -> _RailButton:
-        made = _RailButton(place.icon, place.word, place.short)
-        made.clicked.connect(lambda: self.go_asked.emit(place.name))
-        return made
+        button = _RailButton(place.icon, place.word, place.short)
+        button.clicked.connect(lambda: self.go_asked.emit(place.name))
+        return button
 
-    def mark_place(self, name: str) -> None:
+    def mark_page(self, name: str) -> None:
         for other, button in self.buttons.items():
-            button.here = other == name
+            button.is_current = other == name
 
-    def set_narrow(self, yes: bool) -> None:
-        self.setFixedWidth(NARROW_RAIL if yes else WIDE_RAIL)
-        margin = NARROW_MARGIN if yes else WIDE_MARGIN
+    def set_narrow(self, narrow: bool) -> None:
+        self.setFixedWidth(NARROW_RAIL if narrow else WIDE_RAIL)
+        margin = NARROW_MARGIN if narrow else WIDE_MARGIN
         self._column.setContentsMargins(margin, 20, margin, 16)
         self._head.setContentsMargins(20 - margin, 0, 0, 0)
-        self.name.setVisible(not yes)
+        self.name.setVisible(not narrow)
         for button in (*self.buttons.values(), self.switch):
-            button.set_narrow(yes)
+            button.set_narrow(narrow)
 
     def apply_theme(self, theme: Theme) -> None:
         word = "Light" if theme.dark else "Dark"
@@ -166,9 +166,9 @@ _NARROW_BELOW = 1680
 
 
 def bug_sentence(error: BaseException) -> str:
-    """Return the sentence about a bug of the program or a plug-in."""
-    if isinstance(said := explain_error(error), StudyError):
-        return f"{said}."
+    """Return a sentence about an unexpected error in the program or a plug-in."""
+    if isinstance(explanation := explain_error(error), StudyError):
+        return f"{explanation}."
     return f"{type(error).__name__}: {error}. This is a bug: please report it and include the terminal output."
 
 
@@ -177,9 +177,9 @@ class MainWindow(Themed, QMainWindow):
 
     Parameters
     ----------
-    makers : functions that create the pages, by name; the first page is shown at the start
+    makers : functions that create the pages, by name; the first page is shown initially
 
-    ``closed`` is emitted when the operator closes the window, ``theme_changed`` carries the requested `Theme`.
+    ``closed`` is emitted when the operator closes the window; ``theme_changed`` carries the chosen `Theme`.
     """
 
     closed = Signal()
@@ -190,77 +190,77 @@ class MainWindow(Themed, QMainWindow):
         self.setWindowTitle("Liquid Study")
         self.setMinimumSize(_LEAST)
         self.notice: Question | None = None
-        self._notice_of = ""  # the place of the message
-        self._resting = False  # whether a session uses the screen
-        self.not_opened: BaseException | None = None  # the error of a place that could not be opened, already shown
-        self._had_keyboard: QWidget | None = None
+        self._notice_of = ""  # the page of the message
+        self._in_session = False  # whether a session uses the screen
+        self.not_opened: BaseException | None = None  # the shown error of a page that could not be opened
+        self._focused: QWidget | None = None
         self._makers = makers
         self._places: dict[str, Place] = {}
         self._here = next(iter(makers))
         self.rail = _Rail(makers)
         self.stack = QStackedWidget()
-        whole = QWidget(accessibleName="Liquid Study")
-        whole.setProperty("role", "window")
-        hbox(self.rail, (self.stack, 1), spacing=0, margins=0, parent=whole)
-        self.setCentralWidget(whole)
-        whole.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
+        central = QWidget(accessibleName="Liquid Study")
+        central.setProperty("role", "window")
+        hbox(self.rail, (self.stack, 1), spacing=0, margins=0, parent=central)
+        self.setCentralWidget(central)
+        central.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
         self.rail.switch.clicked.connect(self._change_theme)
         self.rail.go_asked.connect(self.go)
-        QShortcut(QKeySequence("Ctrl+Q"), self, self.close)  # not every window has a frame whose keys close it
+        QShortcut(QKeySequence("Ctrl+Q"), self, self.close)  # not every window manager has a key for this
         apply_theme(self, theme)
         self.resize(FULL)
         self.go(self._here)
-        whole.setFocus()
+        central.setFocus()
 
     @property
     def here(self) -> str:
         return self._here
 
     def place(self, name: str) -> Place:
-        """Return a page, creating it on first use; show the error if that fails."""
+        """Return a page, creating it on first use; if that fails, show the error and raise it."""
         if name not in self._places:
             QGuiApplication.setOverrideCursor(Qt.CursorShape.WaitCursor)
             try:
-                made = self._makers[name]()
+                page = self._makers[name]()
             except Exception as error:
                 self._show_not_opened(name, error)
                 raise
             finally:
                 QGuiApplication.restoreOverrideCursor()
-            made.message.connect(lambda title, sentence: self.show_message(title, sentence, of=name))
-            made.file_message.connect(
+            page.message.connect(lambda title, sentence: self.show_message(title, sentence, of=name))
+            page.file_message.connect(
                 lambda title, sentence, file: self.show_message(title, sentence, of=name, file=file)
             )
-            made.message_over.connect(lambda: self._close_notice(name))
-            made.go_asked.connect(self.go)
-            self._places[name] = made
-            self.stack.addWidget(made)
-            name_scroll_bars(made)
+            page.message_over.connect(lambda: self._close_notice(name))
+            page.go_asked.connect(self.go)
+            self._places[name] = page
+            self.stack.addWidget(page)
+            name_scroll_bars(page)
         return self._places[name]
 
     def go(self, name: str) -> None:
-        """Leave the current page and show another one, which is created at its first visit."""
-        asked = self.place(name)
-        if name != self._here or not asked.isVisible():
+        """Leave the current page and show another one."""
+        page = self.place(name)
+        if name != self._here or not page.isVisible():
             if name != self._here:
                 self._close_notice(self._here)
                 self._places[self._here].leave()
             self._here = name
-            self.rail.mark_place(name)
-            self.stack.setCurrentWidget(asked)
-            asked.enter()
-        self._give_keyboard(self.rail.buttons[name], asked)
+            self.rail.mark_page(name)
+            self.stack.setCurrentWidget(page)
+            page.enter()
+        self._focus_page(self.rail.buttons[name], page)
 
-    def _give_keyboard(self, button: QWidget, place: Place) -> None:
-        """Move the focus from a rail button into its page: to the last focused part, else the first."""
+    def _focus_page(self, button: QWidget, page: Place) -> None:
+        """Move the focus from a button of the rail into its page, to the widget that last had it, or the first one."""
         if self.focusWidget() is not button:
             return
-        if (last := last_focused(place)) is not None:
+        if (last := last_focused(page)) is not None:
             last.setFocus(Qt.FocusReason.OtherFocusReason)
             return
-        place.setFocus()
-        place.focusNextChild()
-        if not place.isAncestorOf(self.focusWidget()):
+        page.setFocus()
+        page.focusNextChild()
+        if not page.isAncestorOf(self.focusWidget()):
             button.setFocus()
 
     def _show_not_opened(self, name: str, error: BaseException) -> None:
@@ -268,35 +268,35 @@ class MainWindow(Themed, QMainWindow):
             return
         self.not_opened = error
         word = next(place.word for place in DESTINATIONS if place.name == name)
-        what = bug_sentence(error)
         again = ActionButton("", "Try again", role="primary")
-        notice = Question(self, self.theme, f"“{word}” could not be opened", what, again, back="Close")
+        title = f"“{word}” could not be opened"
+        notice = Question(self, self.theme, title, bug_sentence(error), again, back="Close")
         notice.accepted.connect(lambda: self.go(name))
         self._show_notice(notice)
 
     def hide_for_session(self) -> None:
         """Leave the current page and hide the window during a session."""
         self._places[self._here].leave()
-        self._had_keyboard = self.focusWidget()
-        self._resting = True
+        self._focused = self.focusWidget()
+        self._in_session = True
         self.hide()
 
     def return_from_session(self) -> None:
-        """Show the window again with the same page.
+        """Show the window again with the same page and focus.
 
-        A window that is activated while hidden, for example when the dialog before a session closes, gives the focus to
-        the next part instead of the focused one.
+        The focus is restored explicitly: Qt moves it if the window is activated while hidden, for example when the
+        dialog before a session closes.
         """
         self.show()
-        self._resting = False
+        self._in_session = False
         if self.notice is not None and isValid(self.notice):
             self.notice.show()
-        if self._had_keyboard is not None and isValid(self._had_keyboard):
-            self._had_keyboard.setFocus()
+        if self._focused is not None and isValid(self._focused):
+            self._focused.setFocus()
         self._places[self._here].enter()
 
     def show_message(self, title: str, sentence: str, *, of: str = "", file: Path | None = None) -> None:
-        """Show a message, and a button that opens ``file``; that of the page ``of`` closes when the page is left."""
+        """Show a message, with a button that opens ``file``; it closes when the page ``of`` is left."""
         opens = None if file is None else ActionButton("file", "Open the file")
         if opens is not None and file is not None:
             opens.clicked.connect(lambda: open_here(file))
@@ -305,7 +305,7 @@ class MainWindow(Themed, QMainWindow):
     def ask_about_device(
         self, title: str, sentence: str, again: Callable[[], object], diagnose: Callable[[], object] | None
     ) -> None:
-        """Show that a device failed; offer to try again and, if possible, to diagnose it."""
+        """Show that a device failed, and offer to try again and, if possible, to diagnose it."""
         go_on = ActionButton("repeat", "Try again", role="primary")
         other = None if diagnose is None else ActionButton("pulse", "Diagnose …")
         if other is not None and diagnose is not None:
@@ -317,7 +317,7 @@ class MainWindow(Themed, QMainWindow):
     def _show_notice(self, notice: Question, of: str = "") -> None:
         notice.finished.connect(notice.deleteLater)
         self.notice, self._notice_of = notice, of
-        if not self._resting:  # otherwise it would cover a session
+        if not self._in_session:  # it would cover the session
             notice.show()
 
     def _close_notice(self, of: str) -> None:

@@ -1,4 +1,4 @@
-"""What the home window says of protocols and sessions, as values. No Qt here."""
+"""Facts about protocols and sessions for the home page, without Qt."""
 
 import time
 import typing
@@ -43,7 +43,7 @@ _FIRST_STUDY: Final = "demo"
 
 @dataclass(frozen=True, slots=True)
 class DraftNote:
-    """The note on an unsaved draft, and the time at which it was stored, as ISO 8601."""
+    """The note about an unsaved draft, and the time at which the draft was stored (ISO 8601)."""
 
     words: str
     kept_at: str
@@ -51,9 +51,9 @@ class DraftNote:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StudyFacts:
-    """A study as shown on a card; ``source`` is the name or path by which it is loaded.
+    """The facts on a study's card; ``source`` is the name or path from which the study is loaded.
 
-    ``origin`` is its origin ("Shipped study", "Copy of demo"), ``draft`` the note on unsaved changes, if any.
+    ``origin`` is "Shipped study", "Copy of demo" or "Own study", ``draft`` the note about unsaved changes, if any.
     """
 
     source: str
@@ -74,13 +74,13 @@ class StudyFacts:
 
     @property
     def file_name(self) -> str:
-        """The name of its file without suffix, which commands accept."""
+        """The name of the study's file without suffix, which commands accept."""
         return Path(self.source).stem
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BrokenFacts:
-    """A protocol file that cannot be used, and its first problem; other fields as in `StudyFacts`."""
+    """The facts about a protocol file that cannot be used: its first problem, and fields as in `StudyFacts`."""
 
     source: str
     problem: str
@@ -90,7 +90,7 @@ class BrokenFacts:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DraftFacts:
-    """A study that was never saved: the path of its file, its title; other fields as in `StudyFacts`."""
+    """The facts about a study that was never saved; ``source`` is the path that its file will have."""
 
     source: str
     title: str
@@ -127,7 +127,7 @@ class DraftWords(typing.Protocol):
 
 
 LoadWords: TypeAlias = Callable[[], DraftWords] | None
-"""Loads the designer's modules, only where there is a draft; None where a draft's content is not described."""
+"""A function that imports the designer, called only if there is a draft; None if drafts are not described."""
 
 
 def last_written_ns(session: Path) -> int:
@@ -138,7 +138,7 @@ def last_written_ns(session: Path) -> int:
 
 
 def _last_study(results: Path) -> str:
-    """Return the study of the latest session under ``results`` except samples; "" if there is none."""
+    """Return the name of the study of the latest session under ``results``, except samples, or ""."""
     folders = results.glob("*/data/sub-*/ses-*")
     with suppress(StudyError, ValueError):
         last = max(
@@ -159,23 +159,27 @@ def read_studies(
     """
     opened = tuple(opened)
     last = "" if results is None else _last_study(results)
-    begins = results is not None and not last
+    has_no_session = results is not None and not last
     drafts = (_draft_facts(file, draft_words) for file in unsaved_files(workspace().protocols))
     facts = (
         *filter(None, drafts),
         *(study_facts(source, draft_words) for source in dict.fromkeys((*opened, *known_sources()))),
     )
 
-    def place(it: StudyFacts | BrokenFacts | DraftFacts) -> tuple[float, bool, bool]:
-        first = it.name == last if last and isinstance(it, StudyFacts) else it.source == _FIRST_STUDY and begins
-        return 0.0 if it.draft is None else -_seconds(it.draft.kept_at), it.source not in opened, not first
+    def order(study: StudyFacts | BrokenFacts | DraftFacts) -> tuple[float, bool, bool]:
+        if last and isinstance(study, StudyFacts):
+            is_next = study.name == last
+        else:
+            is_next = study.source == _FIRST_STUDY and has_no_session
+        edited_s = 0.0 if study.draft is None else _seconds(study.draft.kept_at)
+        return -edited_s, study.source not in opened, not is_next
 
-    return tuple(sorted(facts, key=place))
+    return tuple(sorted(facts, key=order))
 
 
 def _draft_facts(file: Path, draft_words: LoadWords) -> DraftFacts | None:
     draft = draft_of(file)
-    if draft is None:  # it was saved meanwhile
+    if draft is None:  # the study was saved meanwhile
         return None
     title = draft_words().draft_title(draft.text, file.parent) if draft_words else ""
     note = DraftNote(f"Draft from {time_text(draft.kept_at)}, never saved", draft.kept_at)
@@ -183,7 +187,7 @@ def _draft_facts(file: Path, draft_words: LoadWords) -> DraftFacts | None:
 
 
 def holds_liquids_alone(source: str) -> bool:
-    """Return whether a file contains only liquids and no study; False if it cannot be read."""
+    """Return whether a file contains only liquids instead of a study; False if it cannot be read."""
     try:
         path = protocol_file(source)
         state = path.stat()
@@ -201,7 +205,7 @@ def _holds_liquids_alone(path: Path, _changed_ns: int, _size: int) -> bool:
 
 
 def is_shipped(source: str) -> bool:
-    """Return whether a source is a shipped study rather than one of the same name in the workspace."""
+    """Return whether a source is a shipped study, rather than one with the same name in the workspace."""
     try:
         return source in shipped() and protocol_file(source).resolve() == shipped()[source].resolve()
     except ProtocolError:
@@ -220,7 +224,7 @@ def _origin_of(source: str) -> str:
 
 
 def study_facts(source: str, draft_words: LoadWords = None) -> StudyFacts | BrokenFacts:
-    """Load the protocol ``source`` and return the facts shown on its card."""
+    """Load the protocol ``source`` and return the facts on its card."""
     try:
         protocol = load(source)
     except ProtocolError as error:
@@ -255,7 +259,7 @@ def study_facts(source: str, draft_words: LoadWords = None) -> StudyFacts | Brok
 
 
 def _draft_note(source: str, draft_words: LoadWords) -> DraftNote | None:
-    """Return the note on a draft: "Draft of today 14:02, not saved: Water"; None if everything is saved."""
+    """Return the note about a draft ("Draft from today 14:02, not saved: Water"), or None without unsaved changes."""
     with suppress(ProtocolError, OSError):
         file = protocol_file(source)
         draft, content = None if is_shipped(source) else draft_of(file), without_byte_order_mark(file.read_bytes())
@@ -270,7 +274,7 @@ def _draft_note(source: str, draft_words: LoadWords) -> DraftNote | None:
 
 
 def time_text(moment: str) -> str:
-    """Return the time of a draft: "today 14:02", "2026-11-20 14:02"."""
+    """Return a time as text: "today 14:02" or "2026-11-20 14:02"."""
     if not (seconds := _seconds(moment)):
         return "an unknown time"
     kept, now = (datetime.fromtimestamp(at).astimezone() for at in (seconds, time.time()))
@@ -287,7 +291,7 @@ def _seconds(moment: str) -> float:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Interrupted:
-    """A session that can be resumed: participant, step and stored data as text; ``folder`` is the session's."""
+    """A session that can be resumed, with texts about the participant, the step and the stored data."""
 
     folder: Path
     source: str
@@ -299,14 +303,16 @@ class Interrupted:
 def interrupted_session(
     sessions: Iterable[SessionFacts], studies: Iterable[StudyFacts | BrokenFacts], now: datetime
 ) -> Interrupted | None:
-    """Return the newest session that can be resumed here: unfinished, not open, with a known protocol.
+    """Return the first of the sessions that can be resumed: unfinished, not open, with a known protocol.
 
-    A protocol that cannot be used because its liquid file is lost can still resume, since its liquids are sealed in the
-    key.
+    A session can be resumed even if its protocol cannot be used because a liquid file is lost, since the liquids are
+    sealed in the key.
     """
     studies = tuple(studies)
     for session in sessions:
-        candidates = [it.source for it in studies if isinstance(it, BrokenFacts) or it.name == session.study]
+        candidates = [
+            study.source for study in studies if isinstance(study, BrokenFacts) or study.name == session.study
+        ]
         if session.status != "unfinished" or not candidates or is_open(session.folder):
             continue
         try:
@@ -318,48 +324,52 @@ def interrupted_session(
             read = partial(source_to_resume, session.folder)
             source = find_protocol(begun, candidates, read)
             protocol = parse(read(source), source)
-            study = locate_session(session.folder)[0]
-            protocol = session_protocol(study, protocol, session.participant, begun.session)
-            schedule = begun_schedule(protocol, begun, read_key(study.path))
+            session_study = locate_session(session.folder)[0]
+            protocol = session_protocol(session_study, protocol, session.participant, begun.session)
+            schedule = begun_schedule(protocol, begun, read_key(session_study.path))
             step = resume_at(protocol, schedule, lines).step
         except StudyError:
-            continue  # its errors are reported when its folder is requested
-        where = _place_text(protocol, schedule, step)
+            continue  # reported when the session is opened
+        position = _position_text(protocol, schedule, step)
         stopped = start_time_text(datetime.fromisoformat(lines[-1].at), now)
-        whole = f" of {session.answers_of}" if session.answers_of is not None else ""
+        total = f" of {session.answers_of}" if session.answers_of is not None else ""
         kind = "Pilot " if session.pilot else ""
         return Interrupted(
             folder=session.folder,
             source=source,
             participant=session.participant,
-            heading=f"{kind}{session.participant}, session {session.session} of {session.study} stopped {where}",
-            line=f"{stopped}. Answers on disk: {session.answers}{whole}; all data up to that point are complete.",
+            heading=f"{kind}{session.participant}, session {session.session} of {session.study} stopped {position}",
+            line=f"{stopped}. Answers on disk: {session.answers}{total}; all data up to that point are complete.",
         )
     return None
 
 
-def _place_text(protocol: Protocol, schedule: Schedule, step: int) -> str:
-    """Return the point at which a session resumes, without a condition: "in part 2, delay setting 3"."""
+def _position_text(protocol: Protocol, schedule: Schedule, step: int) -> str:
+    """Return the point at which a session resumes, without the condition: "in part 2, delay setting 3"."""
     language = operator_language(protocol)
     if step >= len(schedule.steps):
         return "after the last page"
-    here = schedule.steps[step]
-    if not isinstance(here, Trial):
-        return f"before “{step_title(protocol, here, language)}”"
-    name = here.label(protocol, language)
-    label = f"{name[:1].lower()}{name[1:]}" + (f" of {here.of}" if here.of > 1 else "")
-    return f"in part {here.part}, {label}" if here.part else f"in {label}"
+    next_step = schedule.steps[step]
+    if not isinstance(next_step, Trial):
+        return f"before “{step_title(protocol, next_step, language)}”"
+    name = next_step.label(protocol, language)
+    label = f"{name[:1].lower()}{name[1:]}" + (f" of {next_step.of}" if next_step.of > 1 else "")
+    return f"in part {next_step.part}, {label}" if next_step.part else f"in {label}"
 
 
 def session_counts_text(sessions: Iterable[SessionFacts], study: str) -> str:
     """Return the numbers of a study's sessions: "5 sessions, 3 complete, 1 incomplete, 1 excluded, 2 pilots"."""
     of_study = [session for session in sessions if session.study == study]
-    own = [session for session in of_study if not session.kind]
+    from_participants = [session for session in of_study if not session.kind]
     pilots = sum(session.kind == "pilot" for session in of_study)
-    complete = sum(session.status == COMPLETED for session in own)
-    incomplete = sum(session.status == INCOMPLETE for session in own)
-    excluded = sum(session.excluded is not None for session in own)
-    parts = [f"{counted(len(own), 'session')}, {complete} complete" if own else "no participants yet"]
+    complete = sum(session.status == COMPLETED for session in from_participants)
+    incomplete = sum(session.status == INCOMPLETE for session in from_participants)
+    excluded = sum(session.excluded is not None for session in from_participants)
+    parts = [
+        f"{counted(len(from_participants), 'session')}, {complete} complete"
+        if from_participants
+        else "no participants yet"
+    ]
     parts += [f"{incomplete} incomplete"] * bool(incomplete)
     parts += [f"{excluded} excluded"] * bool(excluded) + [counted(pilots, "pilot")] * bool(pilots)
     return ", ".join(parts)

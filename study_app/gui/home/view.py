@@ -1,4 +1,4 @@
-"""Home: choose a protocol and begin, go on where one stopped, or see what was held."""
+"""The home page: start a session, resume an interrupted one, or see the recorded ones."""
 
 from dataclasses import replace
 from datetime import datetime
@@ -39,7 +39,7 @@ from study_app.gui.home.study_facts import (
     session_counts_text,
 )
 from study_app.gui.kit.commands import add_commands, key_cap, with_key
-from study_app.gui.kit.devices import DeviceShown, device_before_look
+from study_app.gui.kit.devices import DeviceShown, device_before_search
 from study_app.gui.kit.dialogs import choose_protocol
 from study_app.gui.kit.opening import open_here
 from study_app.gui.sessions.session_facts import SessionFacts, extent_of, sessions
@@ -58,19 +58,19 @@ _STACKED_BELOW = 1080
 _COLUMN_PX = 326
 MARGIN, BAR_PX = 28, 12
 _NEXT_ROW_PX = 30
-"""So much of the second row of cards is seen at least, which says that there is one."""
+"""The minimum visible height of the second row of cards, which reveals that there is one."""
 _LOW_PX = 150
-"""The least height of the sessions in a low window: a row or two."""
+"""The minimum height of the sessions in a low window, for one or two rows."""
 CARDS_SHARE, BELOW_SHARE = 4, 3
-"""How the cards and the sessions share the height."""
+"""The stretch factors of the cards and of the sessions."""
 
 
 class HomePlace(Place):
     """The page with studies, sessions, device and lab.
 
-    ``session_asked`` carries the operator's choices, ``results_asked`` a study folder, ``protocol_opened`` the file of
-    a study that was opened here, ``edit_asked`` the source of a study to edit, ``discard_asked`` that of a draft to
-    discard, ``new_asked`` that of a study to copy, "" for any.
+    ``session_asked`` carries the operator's choices, ``results_asked`` a study folder, and ``protocol_opened`` the file
+    of a study that was opened here. ``edit_asked`` carries the source of a study to edit, ``discard_asked`` that of a
+    draft to discard, and ``new_asked`` that of a study to copy, or "".
 
     Parameters
     ----------
@@ -93,15 +93,15 @@ class HomePlace(Place):
         self.dialog: QDialog | None = None
         self._opened: list[str] = []
         self._facts: tuple[Facts, ...] = ()
-        self._files: frozenset[tuple[Path, int, int]] | None = None  # their state when the studies were last read
-        self._unread = False  # whether reading them failed
-        self._last: Path | None = None  # the folder of the session that was held last
+        self._files: frozenset[tuple[Path, int, int]] | None = None  # their states when the studies were last read
+        self._read_failed = False  # whether reading the studies failed
+        self._latest: Path | None = None  # the folder of the latest session
         self._read_once = False
         self._studies = Background(self)
         self._studies.done.connect(self._show_studies)
-        self._studies.failed.connect(self._show_unread)
+        self._studies.failed.connect(self._show_read_error)
         self._reader = Background(self)
-        self._reader.done.connect(self._show_read)
+        self._reader.done.connect(self._show_read_sessions)
         self.banner = ResumeBanner()
         self.grid = CardGrid()
         self.sessions = SessionsCard()
@@ -125,28 +125,28 @@ class HomePlace(Place):
         self.device.devices.clicked.connect(lambda: self.go_asked.emit("devices"))
         self.device.display.clicked.connect(lambda: self.go_asked.emit("machine"))
         self.lab.open.clicked.connect(lambda: self.go_asked.emit("lab"))
-        self.show_machine(DEFAULTS, device_before_look(DEFAULTS.device))
+        self.show_machine(DEFAULTS, device_before_search(DEFAULTS.device))
 
     def show_machine(self, settings: MachineSettings, device: DeviceShown) -> None:
-        """Use these settings for new sessions; ``device`` is the state of the preferred device."""
+        """Use these settings for new sessions, and show ``device``, the preferred one."""
         self.machine = settings
         self.device.show_device(device)
         self.device.show_screens(_screen_lines(settings))
 
     def enter(self) -> None:
-        """Reload protocols and results; screens may also have changed."""
+        """Read protocols, results and screens again."""
         self.device.show_screens(_screen_lines(self.machine))
         QTimer.singleShot(0, self, self.read_changes)
         QTimer.singleShot(0, self, self.show_sessions)
 
     def event(self, event: QEvent) -> bool:
-        """Check for changed protocols when the window becomes active, as after a text editor."""
-        if event.type() == QEvent.Type.WindowActivate and self.isVisible() and not self._unread:
+        """Check for changed protocols when the window becomes active, for example after using a text editor."""
+        if event.type() == QEvent.Type.WindowActivate and self.isVisible() and not self._read_failed:
             self.read_changes()
         return super().event(event)
 
     def read_changes(self) -> None:
-        """Reread the protocols in the background if a file has changed."""
+        """Read the protocols again in the background if a file has changed."""
         if file_states(self._opened) != self._files:
             self.show_studies()
 
@@ -158,19 +158,21 @@ class HomePlace(Place):
         self._below.setContentsMargins(0, 0, 0, 0)
         self._below.setSpacing(18)
         self._below.addWidget(self.sessions, 1)
-        self._beside = QBoxLayout(QBoxLayout.Direction.TopToBottom)
-        self._beside.setSpacing(18)
-        add_parts(self._beside, self.device, self.lab, STRETCH)
-        add_layout(self._below, self._beside)
-        self.below = _Below()
+        self._side_column = QBoxLayout(QBoxLayout.Direction.TopToBottom)
+        self._side_column.setSpacing(18)
+        add_parts(self._side_column, self.device, self.lab, STRETCH)
+        add_layout(self._below, self._side_column)
+        self.below = _LowerPart()
         self.below.setLayout(self._below)
         self.cards_area = scrolled(self.grid)
-        self.cards_area.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Ignored)  # no more than is free
+        self.cards_area.setSizePolicy(
+            QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Ignored
+        )  # at most the available height
         inside = QWidget()
-        self._below_row = _row_beside_bar(self.below)
+        self._below_row = _row_with_bar_margin(self.below)
         self._page = vbox(
-            _row_beside_bar(head),
-            _row_beside_bar(self.banner),
+            _row_with_bar_margin(head),
+            _row_with_bar_margin(self.banner),
             (self.waiting, 1, Qt.AlignmentFlag.AlignCenter),
             (self.cards_area, CARDS_SHARE),
             (self._below_row, BELOW_SHARE),
@@ -179,16 +181,16 @@ class HomePlace(Place):
         )
         self.area = scrolled(inside)
         vbox(self.area, margins=0, parent=self)
-        self.below.hide()  # shown once the cards are there, which would move it
+        self.below.hide()  # until the cards exist, which would move it
         self.area.verticalScrollBar().rangeChanged.connect(lambda _least, most: self._keep_margin(most > 0))
         bar = self.cards_area.verticalScrollBar()
-        bar.rangeChanged.connect(lambda _least, most: self.grid.leave_room(0 if most > 0 else BAR_PX))
-        self.grid.leave_room(BAR_PX)
+        bar.rangeChanged.connect(lambda _least, most: self.grid.set_right_margin(0 if most > 0 else BAR_PX))
+        self.grid.set_right_margin(BAR_PX)
         self.grid.laid_out.connect(self._share_height)
         self._keep_margin(bar=False)
 
     def _keep_margin(self, bar: bool) -> None:
-        """Let an appearing scroll bar use the margin, so that nothing moves."""
+        """Let the scroll bar use the right margin, so that nothing moves when it appears."""
         self._page.setContentsMargins(MARGIN, 20, MARGIN - BAR_PX * (1 + bar), 12)
 
     @property
@@ -201,9 +203,9 @@ class HomePlace(Place):
         self.show_studies()
 
     def show_studies(self) -> None:
-        """Read the known protocols in the background; show a card for each, and the sessions."""
+        """Read the known protocols in the background; then show a card for each, and the sessions."""
         self.folder.show_text(f"Workspace: {workspace().folder}")
-        self._files, self._unread = file_states(self._opened), False
+        self._files, self._read_failed = file_states(self._opened), False
         self._studies.run(partial(read_studies, tuple(self._opened), self._draft_words, self.results))
 
     def _show_studies(self, read: tuple[Facts, ...]) -> None:
@@ -212,16 +214,16 @@ class HomePlace(Place):
             self._show_facts(read)
         self.show_sessions()
 
-    def _show_unread(self, error: Exception) -> None:
+    def _show_read_error(self, error: Exception) -> None:
         self._show_studies(self._facts)
-        self._files, self._unread = None, True  # read again at the next visit, not at each activation
-        what = f"{type(error).__name__}: {error}"
-        self.message.emit("The studies could not be read", f"{what}. The terminal shows the details.")
+        self._files, self._read_failed = None, True  # to be read again at the next visit, not at each activation
+        description = f"{type(error).__name__}: {error}"
+        self.message.emit("The studies could not be read", f"{description}. The terminal shows the details.")
 
-    def _show_facts(self, shown: tuple[Facts, ...]) -> None:
-        self._facts = shown
+    def _show_facts(self, studies: tuple[Facts, ...]) -> None:
+        self._facts = studies
         cards: list[QWidget] = []
-        next_step = next((it for it in shown if it.draft is not None or isinstance(it, StudyFacts)), None)
+        next_step = next((study for study in studies if study.draft is not None or isinstance(study, StudyFacts)), None)
         for facts in self._facts:
             ships, first = facts.origin == SHIPPED, facts is next_step
             card: StudyCard | BrokenCard
@@ -231,30 +233,30 @@ class HomePlace(Place):
                 card.rehearsal.connect(self.ask_for_rehearsal)
             else:
                 card = BrokenCard(facts, first=first)
-            asked = self.new_asked if ships else self.edit_asked
-            card.edit.connect(lambda facts, asked=asked: asked.emit(facts.source))
+            signal = self.new_asked if ships else self.edit_asked
+            card.edit.connect(lambda facts, signal=signal: signal.emit(facts.source))
             card.discard.connect(lambda facts: self.discard_asked.emit(facts.source))
             cards.append(card)
-        held, bar = self._focused_card(), self.cards_area.verticalScrollBar()
-        down_px = bar.value()
+        focused, bar = self._focused_card(), self.cards_area.verticalScrollBar()
+        scrolled_px = bar.value()
         self.grid.show_cards(cards)
         self._order_focus()
-        self._fill_next_step()
+        self._mark_next_step()
         self._arrange()
-        bar.setValue(down_px)
-        if held is not None:
-            self._focus_card(*held)
+        bar.setValue(scrolled_px)
+        if focused is not None:
+            self._focus_card(*focused)
 
     def _focused_card(self) -> tuple[int, str, int] | None:
-        """Return position, study and button number of the focused card; None if none has the focus."""
-        now = self.window().focusWidget() if self.isVisible() else None
-        for at, card in enumerate(self.grid.cards):
-            if isinstance(card, StudyCard | BrokenCard) and now in _card_buttons(card):
-                return at, card.facts.source, _card_buttons(card).index(now)
+        """Return the position, study and button number of the focused card, or None."""
+        focused = self.window().focusWidget() if self.isVisible() else None
+        for index, card in enumerate(self.grid.cards):
+            if isinstance(card, StudyCard | BrokenCard) and focused in _card_buttons(card):
+                return index, card.facts.source, _card_buttons(card).index(focused)
         return None
 
     def _focus_card(self, at: int, source: str, button: int) -> None:
-        """Focus the card of a study, which may have moved, else the card at its former position."""
+        """Focus the card of a study, which may have moved, or else the card at its former position."""
         cards = [card for card in self.grid.cards if isinstance(card, StudyCard | BrokenCard)]
         card = next(
             (candidate for candidate in cards if candidate.facts.source == source),
@@ -262,10 +264,10 @@ class HomePlace(Place):
         )
         if card is not None:
             _card_buttons(card)[min(button, len(_card_buttons(card)) - 1)].setFocus(Qt.FocusReason.OtherFocusReason)
-            QTimer.singleShot(0, card, lambda: self.cards_area.ensureWidgetVisible(card))  # once it has its place
+            QTimer.singleShot(0, card, lambda: self.cards_area.ensureWidgetVisible(card))  # after the layout
 
     def _order_focus(self) -> None:
-        """Let Tab follow the reading order, since Qt puts new cards last."""
+        """Make Tab follow the reading order, since Qt appends new cards at the end."""
         cards = [card for card in self.grid.cards if isinstance(card, StudyCard | BrokenCard)]
         sessions, device = self.sessions, self.device
         parts: tuple[QWidget, ...] = (
@@ -278,24 +280,24 @@ class HomePlace(Place):
             QWidget.setTabOrder(before, after)
 
     def show_sessions(self) -> None:
-        """Reread the results folder in the background, after the studies."""
+        """Read the results folder again in the background, unless the studies are being read, which does so later."""
         if not self._studies.busy:
             self._reader.run(partial(_read_sessions, self.results, self._facts))
 
-    def _show_read(self, read: tuple[Path, tuple[SessionFacts, ...], Interrupted | None]) -> None:
-        results, sessions, stopped = read
+    def _show_read_sessions(self, read: tuple[Path, tuple[SessionFacts, ...], Interrupted | None]) -> None:
+        results, sessions, interrupted = read
         self.sessions.show_sessions(sessions, str(results), datetime.now().astimezone())
-        self._show_last(sessions)
-        self.banner.show_interrupted(stopped)
-        self._fill_next_step()
+        self._show_latest(sessions)
+        self.banner.show_interrupted(interrupted)
+        self._mark_next_step()
         self.below.show()
         self._share_height()
         for card in self.grid.cards:
             if isinstance(card, StudyCard):
                 card.held.setText(session_counts_text(sessions, card.facts.protocol.study.name))
 
-    def _fill_next_step(self) -> None:
-        """Fill only one button: that of the banner or, without an interrupted session, that of the first card."""
+    def _mark_next_step(self) -> None:
+        """Make one button primary: that of the banner or, without an interrupted session, that of the first card."""
         cards = [card for card in self.grid.cards if isinstance(card, StudyCard | BrokenCard)]
         first = next((card for card in cards if card.facts.draft is not None or isinstance(card, StudyCard)), None)
         if first is None:
@@ -304,15 +306,15 @@ class HomePlace(Place):
         if isinstance(button, ActionButton):
             button.set_role("" if self.banner.isVisibleTo(self) else "primary")
 
-    def _show_last(self, sessions: tuple[SessionFacts, ...]) -> None:
-        """After a new session, show the sessions of its kind and move its study to the front."""
+    def _show_latest(self, sessions: tuple[SessionFacts, ...]) -> None:
+        """After a new session, show the sessions of its kind, and move its study to the front."""
         last = max(
             (session for session in sessions if session.kind != "sample"),
             key=lambda session: last_written_ns(session.folder),
             default=None,
         )
-        before, self._last = self._last, None if last is None else last.folder
-        if last is not None and last.folder != before:
+        previous, self._latest = self._latest, None if last is None else last.folder
+        if last is not None and last.folder != previous:
             self.sessions.show_kind(last.kind)
             if self._read_once:
                 self.show_studies()
@@ -325,7 +327,7 @@ class HomePlace(Place):
         dialog.accepted.connect(lambda: self.session_asked.emit(dialog.chosen()))
 
     def _ask_to_resume(self, session: Interrupted) -> None:
-        """Ask to resume a session with its settings on the current screens."""
+        """Request to resume a session with its settings on the current screens."""
         try:
             names = [screen.name for screen in screens_shown()]
             chosen = resumed_choices(
@@ -340,14 +342,14 @@ class HomePlace(Place):
             self.message.emit("The session cannot be resumed", f"{error}.")
 
     def ask_for_rehearsal(self, facts: StudyFacts) -> None:
-        """Open the rehearsal dialog; the table shows the results."""
+        """Open the dialog for a rehearsal, and update the sessions afterwards."""
         dialog = RehearsalDialog(facts, self.results, theme=self.theme, parent=self)
         self._open_dialog(dialog)
         dialog.finished.connect(self.show_sessions)
         dialog.accepted.connect(lambda: self.results_asked.emit(dialog.folder))
 
     def _open_session(self, session: SessionFacts) -> None:
-        from study_app.gui.sessions.session_page import SessionPage  # noqa: PLC0415 - pyqtgraph: only once it is needed
+        from study_app.gui.sessions.session_page import SessionPage  # noqa: PLC0415 - only on demand, since it is slow
 
         page = SessionPage(self, self.theme, session, open_here)
         self._open_dialog(page)
@@ -379,9 +381,9 @@ class HomePlace(Place):
         self._page.setStretch(self._page.count() - 1, 0 if self.sessions.is_empty else BELOW_SHARE)
         down, right = QBoxLayout.Direction.TopToBottom, QBoxLayout.Direction.LeftToRight
         self._below.setDirection(down if stacked else right)
-        self._beside.setDirection(right if stacked else down)
-        for at, stretch in enumerate((stacked, stacked, not stacked)):  # two cards share a row
-            self._beside.setStretch(at, int(stretch))
+        self._side_column.setDirection(right if stacked else down)
+        for index, stretch in enumerate((stacked, stacked, not stacked)):  # if stacked, two cards share a row
+            self._side_column.setStretch(index, int(stretch))
         for card in (self.device, self.lab):
             card.setMinimumWidth(0 if stacked else _COLUMN_PX)
             card.setMaximumWidth(QWIDGETSIZE_MAX if stacked else _COLUMN_PX)
@@ -389,10 +391,10 @@ class HomePlace(Place):
         self._share_height()
 
     def _share_height(self) -> None:
-        """Give the cards at least their first row.
+        """Divide the height between cards and sessions, so that at least the first row of cards is visible.
 
-        In a low window the lab, which is also in the rail, and most rows of the sessions are hidden. If the page still
-        scrolls, the cards get their full height, so that there is only one scroll bar.
+        In a low window, the lab, which is also in the rail, and most rows of the sessions are hidden. If the page still
+        has to scroll, the cards get their full height, so that there is only one scroll bar.
         """
         if (whole := self.grid.whole_height) <= 0:  # new cards have no height yet
             return
@@ -400,28 +402,28 @@ class HomePlace(Place):
             self.lab.setVisible(not low or self.sessions.is_empty)
             if not self.sessions.is_empty:
                 self.sessions.setMinimumHeight(_LOW_PX if low else LEAST_HEIGHT)
-            self._forget_heights()
+            self._invalidate_layouts()
             others = self._page.totalMinimumSize().height() - self.cards_area.minimumHeight()
             least = min(whole, self.grid.row_height + beyond)
             if fits := others + least <= self.area.viewport().height():
                 break
         self.cards_area.setMinimumHeight(least if fits else whole)
         self.cards_area.setMaximumHeight(whole)
-        self._forget_heights()
+        self._invalidate_layouts()
         self._page.activate()
 
-    def _forget_heights(self) -> None:
-        """Let layouts recompute heights now rather than after the next events."""
-        for layout in (self._beside, self._below, self._below_row, self._page):
+    def _invalidate_layouts(self) -> None:
+        """Make the layouts recompute their heights now instead of after the next events."""
+        for layout in (self._side_column, self._below, self._below_row, self._page):
             layout.invalidate()
         self.below.updateGeometry()
 
     def focusNextPrevChild(self, forward: bool) -> bool:
         moved = super().focusNextPrevChild(forward)
-        now = self.focusWidget()
-        if moved and now is not None and self.grid.isAncestorOf(now):
+        focused = self.focusWidget()
+        if moved and focused is not None and self.grid.isAncestorOf(focused):
             for area in (self.cards_area, self.area):
-                area.ensureWidgetVisible(now)
+                area.ensureWidgetVisible(focused)
         return moved
 
     def resizeEvent(self, event: QResizeEvent) -> None:
@@ -429,10 +431,10 @@ class HomePlace(Place):
         self._arrange()
 
 
-class _Below(QWidget):
-    """Sessions, device and lab; if they share the height with the cards, they are as high as the room permits.
+class _LowerPart(QWidget):
+    """Sessions, device and lab; if this part ``shares`` the height with the cards, it fills the available height.
 
-    A layout gives a widget with wrapped text at least the height of its hint, so the minimum is used as the hint.
+    Its size hint is then its minimum size, because a layout gives a widget with wrapped text at least its hint.
     """
 
     shares = True
@@ -444,30 +446,30 @@ class _Below(QWidget):
         return self.minimumSizeHint() if self.shares else super().sizeHint()
 
 
-def _row_beside_bar(part: QWidget | QLayout) -> QHBoxLayout:
-    """Return a row with room for the cards' scroll bar."""
+def _row_with_bar_margin(part: QWidget | QLayout) -> QHBoxLayout:
+    """Return a row with a right margin as wide as the cards' scroll bar."""
     return hbox(part, margins=(0, 0, BAR_PX, 0))
 
 
 def _card_buttons(card: StudyCard | BrokenCard) -> tuple[QWidget, ...]:
-    of_file = (card.pen,) if card.bin is None else (card.pen, card.bin)
-    return (*of_file, card.new, card.rehearse) if isinstance(card, StudyCard) else of_file
+    buttons = (card.pen,) if card.bin is None else (card.pen, card.bin)
+    return (*buttons, card.new, card.rehearse) if isinstance(card, StudyCard) else buttons
 
 
 def _read_sessions(
     results: Path, studies: tuple[Facts, ...]
 ) -> tuple[Path, tuple[SessionFacts, ...], Interrupted | None]:
-    """Return the sessions in the results folder, and the one that can resume."""
-    counts = {it.name: set(extent_of(it.protocol).answers) for it in studies if isinstance(it, StudyFacts)}
+    """Return the results folder, the sessions in it, and the one that can be resumed, if any."""
+    counts = {study.name: set(extent_of(study.protocol).answers) for study in studies if isinstance(study, StudyFacts)}
     answers = {name: max(numbers) for name, numbers in counts.items() if len(numbers) == 1}
     known = sessions(results, answers)
-    saved = [it for it in studies if not isinstance(it, DraftFacts)]
+    saved = [study for study in studies if not isinstance(study, DraftFacts)]
     return results, known, interrupted_session(known, saved, datetime.now().astimezone())
 
 
 def _screen_lines(settings: MachineSettings) -> tuple[str, ...]:
-    """Return a line for each screen: whose it is, size, rate and scaling."""
+    """Return a line for each screen, with its user, size, rate and scaling."""
     screens = screens_shown()
     participants = settings.screen_among([screen.name for screen in screens])
-    whose = {participants: "Participant's screen"} if len(screens) > 1 else {}
-    return tuple(f"{whose.get(screen.number, 'Screen')} {screen.number}: {screen.words}" for screen in screens)
+    titles = {participants: "Participant's screen"} if len(screens) > 1 else {}
+    return tuple(f"{titles.get(screen.number, 'Screen')} {screen.number}: {screen.words}" for screen in screens)

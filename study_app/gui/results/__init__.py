@@ -1,1 +1,1 @@
-"""Results: which sessions count, their figures, and exports."""
+"""The results page: the sessions that are included, their figures, and exports."""

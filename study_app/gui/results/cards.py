@@ -23,11 +23,11 @@ _COLUMNS = (
     Column("validity", "Validity", 100, 102),
     Column("version", "Version", 60, 56),
 )
-_EVERY = "All states"
+_ALL_STATES = "All states"
 
 
 class SessionsCard(Card):
-    """The study's sessions; below, how many are in the figures and why others are not."""
+    """The card with the study's sessions, how many are in the figures, and why others are not."""
 
     def __init__(self) -> None:
         super().__init__(gap=8, padding=14)
@@ -38,7 +38,7 @@ class SessionsCard(Card):
         self.state = Choice()
         self.state.setAccessibleName("State")
         self.state.setFont(font("body"))
-        self.state.addItem(_EVERY, "")
+        self.state.addItem(_ALL_STATES, "")
         self._none = ""
         self.rows = SessionsTable(_COLUMNS, "")
         self.head = label("", "label", weight=600, tabular=True)
@@ -50,20 +50,20 @@ class SessionsCard(Card):
         self.version = IconButton("designer", tip, size=36, role="plain")
         self.version.setEnabled(False)
         self.version.clicked.connect(self.rows.ask_for_version)
-        self.rows.chosen_changed.connect(self._enable)
+        self.rows.chosen_changed.connect(self._update_buttons)
         filters = hbox((self.search, 1), (self.state, 1), self.details, self.version, spacing=8)
         foot = vbox(self.head, self.why, spacing=2, margins=(10, 2, 10, 0))
         add_parts(self.column, filters, (self.rows, 1), Rule(), foot)
         self.search.textChanged.connect(self._apply_filter)
         self.state.currentIndexChanged.connect(self._apply_filter)
 
-    def _enable(self) -> None:
+    def _update_buttons(self) -> None:
         chosen = self.rows.chosen
         self.details.setEnabled(chosen is not None)
         self.version.setEnabled(chosen is not None and bool(chosen.version))
 
     def show_sessions(self, sessions: Sequence[SessionFacts], none: str = "No sessions.") -> None:
-        """Show these sessions, or the text ``none``; the filters stay."""
+        """Show the sessions, or the text ``none`` if there are none; the filters are kept."""
         self._none = none
         self.rows.show_rows(sessions, datetime.now().astimezone())
         has_groups = any(session.group for session in sessions)
@@ -71,7 +71,7 @@ class SessionsCard(Card):
         chosen = self.state.currentData()
         with QSignalBlocker(self.state):
             self.state.clear()
-            self.state.addItem(_EVERY, "")
+            self.state.addItem(_ALL_STATES, "")
             for state, text in occurring_states(sessions):
                 self.state.addItem(text, state)
             self.state.setCurrentIndex(max(0, self.state.findData(chosen)))
@@ -89,10 +89,10 @@ class SessionsCard(Card):
 
 
 class ExclusionsCard(Card):
-    """The exclusions with their reasons.
+    """The card with the exclusions and their reasons.
 
-    ``take_back_asked`` carries the `Exclusion` to reverse, or a proposed one to reject; ``exclude_asked`` a proposed
-    one to accept.
+    ``take_back_asked`` carries the `Exclusion` to reverse, or a proposed one to reject; ``exclude_asked`` carries a
+    proposed one to accept.
     """
 
     take_back_asked = Signal(object)
@@ -117,29 +117,29 @@ class ExclusionsCard(Card):
     def show_left_out(
         self, listed: Sequence[Exclusion], proposed: Sequence[Exclusion] = (), rules: Sequence[str] = ()
     ) -> None:
-        """Show the exclusions, proposed ones first, then the latest, below the sentences on planned rules.
+        """Show sentences about planned rules, then the exclusions: proposed ones first, then the latest.
 
-        The focus survives a removed line.
+        If a line with the focus is removed, the button *Exclude* gets the focus.
         """
         self.open.setVisible(bool(listed))
         listed = (*listed, *reversed(proposed))
-        at = self.window().focusWidget()
-        if at is not None and any(line.isAncestorOf(at) for line in self.lines):
+        focused = self.window().focusWidget()
+        if focused is not None and any(line.isAncestorOf(focused) for line in self.lines):
             self.leave_out.setFocus()
         for line in self.lines:
             remove_widget(line)
         self.lines = [self._exclusion_row(exclusion) for exclusion in reversed(listed)]
-        for place, line in enumerate(self.lines):
-            self._rows.insertWidget(place, line)
+        for index, line in enumerate(self.lines):
+            self._rows.insertWidget(index, line)
         none = () if listed else ("Nothing is excluded from the analysis.",)
         self.summary.setText("\n".join((*none, *rules)))
         self.summary.setVisible(bool(self.summary.text()))
         self.area.setVisible(bool(listed))
-        grows = QSizePolicy.Policy.Preferred if listed else QSizePolicy.Policy.Maximum
-        self.setSizePolicy(QSizePolicy.Policy.Preferred, grows)
+        policy = QSizePolicy.Policy.Preferred if listed else QSizePolicy.Policy.Maximum
+        self.setSizePolicy(QSizePolicy.Policy.Preferred, policy)
 
     def _exclusion_row(self, exclusion: Exclusion) -> QWidget:
-        """Return the row of one exclusion: what, why, who and when; or the rule that proposes it."""
+        """Return the row of an exclusion: its subject, reason, author and time, or the rule that proposes it."""
         proposed = not exclusion.excluded_at
         back = ActionButton("undo", "Keep …" if proposed else "Include again …", role="plain", height=30)
         back.setAccessibleName(f"{'Keep' if proposed else 'Include again'}: {exclusion_text(exclusion)}")
@@ -150,13 +150,13 @@ class ExclusionsCard(Card):
             out.setAccessibleName(f"Exclude: {exclusion_text(exclusion)}")
             out.clicked.connect(lambda: self.exclude_asked.emit(exclusion))
             buttons.insert(0, out)
-        made = QWidget()
-        what = label(exclusion_text(exclusion), "label", wraps=True, weight=600)
+        row = QWidget()
+        subject = label(exclusion_text(exclusion), "label", wraps=True, weight=600)
         why = label(exclusion.reason, "label", "text2", wraps=True, weight=400)
-        now, at = datetime.now().astimezone(), time_of(exclusion.excluded_at)
-        by = exclusion.rule_or_person + ("" if at is None else f", {start_time_text(at, now)}")
+        now, excluded_at = datetime.now().astimezone(), time_of(exclusion.excluded_at)
+        by = exclusion.rule_or_person + ("" if excluded_at is None else f", {start_time_text(excluded_at, now)}")
         by = f"Proposed by the rule “{by.replace('_', ' ')}”; not yet decided" if proposed else by
         who = label(by, "small", "text2")
-        vbox(hbox((what, 1), *buttons), why, who, spacing=0, margins=(0, 0, 6, 0), parent=made)
-        made.setAccessibleName(f"{exclusion_text(exclusion)}: {exclusion.reason} ({by})")
-        return made
+        vbox(hbox((subject, 1), *buttons), why, who, spacing=0, margins=(0, 0, 6, 0), parent=row)
+        row.setAccessibleName(f"{exclusion_text(exclusion)}: {exclusion.reason} ({by})")
+        return row

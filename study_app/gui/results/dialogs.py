@@ -1,4 +1,4 @@
-"""The dialogs of the results: exports, exclusions, unblinding."""
+"""The dialogs of the results page: exports, exclusions, unblinding."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -17,11 +17,11 @@ from study_app.store.exclusions import Exclusion
 
 _WIDTH, _QUESTION_PX = 600, 560
 _WARNED = 3
-"""Of so many files that differ from the record each is named."""
+"""The maximum number of files that differ from the record and are named."""
 
 
 class Extra(NamedTuple):
-    """An optional output: its name in the command, its label, and the reason if it is unavailable."""
+    """An optional output: its name in the command, its label, and the reason why it is unavailable, or ""."""
 
     name: str
     words: str
@@ -29,7 +29,7 @@ class Extra(NamedTuple):
 
 
 class WriteDialog(Work):
-    """Asks for a folder and the outputs to write there; Cancel writes nothing.
+    """A dialog that asks for a folder and outputs, then shows the progress of writing them.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ class WriteDialog(Work):
 
     @property
     def asked(self) -> tuple[Path, tuple[str, ...]]:
-        """The folder, and the names of the chosen extras."""
+        """The chosen folder, and the names of the chosen extras."""
         return Path(self.value("to")).expanduser(), tuple(name for name in self._extras if self.value(name))
 
     def show_written(self, files: Sequence[Path], warnings: Sequence[str]) -> None:
@@ -75,12 +75,12 @@ _NEEDS: Final = {"by": "Please enter a name. It will be recorded.", "reason": RE
 
 
 def _decision_fields(by: str, who: str, example: str) -> tuple[Field, Field]:
-    """Return the fields for name and reason of a decision."""
+    """Return the fields for the name of the person who decides, and the reason."""
     return Field("by", by, placeholder=who), Field("reason", "Reason", placeholder=f"For example: {example}")
 
 
 class LeaveOutDialog(Question):
-    """Asks which session or trial to exclude, who decides, and why.
+    """A dialog that asks which session or trial to exclude, who decides, and why.
 
     Parameters
     ----------
@@ -129,12 +129,12 @@ class LeaveOutDialog(Question):
     def _show_trials(self) -> None:
         trials = self._trials.get(self.value("session"), ())
         self.editors["trial"].show_options(
-            {None: "Whole session", **{at: f"Trial {at}: {text}" for at, text in trials}}
+            {None: "Whole session", **{number: f"Trial {number}: {text}" for number, text in trials}}
         )
 
     @property
     def chosen(self) -> tuple[str, int, int | None]:
-        """Participant, session and trial; None for the whole session."""
+        """Participant, session and trial; the trial is None for the whole session."""
         return *self.value("session"), self.value("trial")
 
     @property
@@ -151,9 +151,11 @@ def _rule_sentence(proposed: Exclusion | None) -> str:
 
 
 def unblind_question(parent: QWidget, theme: Theme, study: str, incomplete: int) -> Question:
-    """Return the question whether to unblind a study with this name and number of incomplete sessions."""
-    many = "1 session is" if incomplete == 1 else f"{incomplete} sessions are"
-    later = f"{many} not complete. Operators of the remaining sessions will no longer be blinded." if incomplete else ""
+    """Return the dialog that asks whether to unblind a study; ``incomplete`` counts its incomplete sessions."""
+    count = "1 session is" if incomplete == 1 else f"{incomplete} sessions are"
+    warning = (
+        f"{count} not complete. Operators of the remaining sessions will no longer be blinded." if incomplete else ""
+    )
     return Question(
         parent,
         theme,
@@ -164,15 +166,15 @@ def unblind_question(parent: QWidget, theme: Theme, study: str, incomplete: int)
         ActionButton("eye", "Unblind", role="danger"),
         fields=_decision_fields("Name", "Your name or initials, such as AK", "collection closed"),
         needs=_NEEDS,
-        warning=later,
+        warning=warning,
         width=_QUESTION_PX,
     )
 
 
 def take_back_question(parent: QWidget, theme: Theme, exclusion: Exclusion) -> Question:
-    """Return the question whether to reverse an exclusion, or to reject a proposed one."""
+    """Return the dialog that asks whether to reverse an exclusion, or to reject a proposed one."""
     proposed = not exclusion.excluded_at
-    done = "Keep" if proposed else "Include again"
+    action = "Keep" if proposed else "Include again"
     why = (
         f"A rule proposed this exclusion: {exclusion.reason}. The data will remain in measures, figures and tests."
         if proposed
@@ -182,9 +184,9 @@ def take_back_question(parent: QWidget, theme: Theme, exclusion: Exclusion) -> Q
     return Question(
         parent,
         theme,
-        f"{done}: {exclusion_text(exclusion)}",
+        f"{action}: {exclusion_text(exclusion)}",
         f"{why} Your name, the reason and the time are stored in exclusions_reversed.jsonl.",
-        ActionButton("undo", done, role="primary"),
+        ActionButton("undo", action, role="primary"),
         fields=_decision_fields("By", "Your name or initials, such as AK", "wrong participant"),
         needs=_NEEDS,
         width=_QUESTION_PX,

@@ -1,4 +1,4 @@
-"""What the results window shows, as one frozen value, and its figures."""
+"""The content of the results page as one immutable value, and its figures."""
 
 import html
 import re
@@ -43,10 +43,10 @@ from study_app.store.exclusions import Exclusion
 from study_app.store.files import write_file
 
 _NAMED: int = 5
-"""Of so many sessions that are not in the figures each is named."""
+"""The maximum number of sessions outside the figures that are all named."""
 
 _Remedy: TypeAlias = Literal["again", "home", "read", "stop"]
-"""What the button of a sentence does: look again, go home, go on reading, stop."""
+"""The action of a button: refresh, go to the home page, continue reading, or stop."""
 
 _NOTHING: Mapping[tuple[str, int], tuple[tuple[int, str], ...]] = MappingProxyType({})
 
@@ -55,7 +55,7 @@ Kind: TypeAlias = Literal["", "simulated", "pilot"]
 
 
 def kind_of(study: StudyAt) -> Kind:
-    """Return the kind of a study without participants' data."""
+    """Return "pilot" or "simulated" for a study without participants' data, or ""."""
     return "pilot" if study.pilot else "simulated" if study.simulated else ""
 
 
@@ -73,7 +73,7 @@ def exclusion_text(exclusion: Exclusion) -> str:
 
 
 def time_of(text: object) -> datetime | None:
-    """Return a time read from a file, None if it is invalid, since people may have edited it."""
+    """Return a time that was read from a file, or None if it is invalid, since the file may have been edited."""
     try:
         return datetime.fromisoformat(str(text))
     except ValueError:
@@ -82,7 +82,7 @@ def time_of(text: object) -> datetime | None:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Trouble:
-    """The reason why there is nothing to show, with the text and action of a button."""
+    """The reason why there are no figures, with the text and action of a button."""
 
     title: str
     sentence: str
@@ -94,12 +94,12 @@ class Trouble:
 class ResultsView:
     """The content of the window.
 
-    ``trials`` are the main trials of each session (participant, number), with their labels. ``colours`` are the
-    figures' print colours, by the theme role that replaces them. ``sealed`` is None while unknown, ``opened`` describes
-    how the key was opened; ``rules`` are sentences on the planned exclusion rules; ``listed`` tells whether the study's
-    sessions are read. ``drawing`` is the activity while there are no figures yet, ``testing`` while there are;
-    ``untested`` means that it was stopped. ``groups`` are the groups by which figures can be split, ``split`` is the
-    one shown, `EACH_GROUP` if all are compared, or "".
+    ``trials`` maps sessions (participant, number) to their main trials with labels. ``colours`` maps roles of the theme
+    to the print colours that they replace. ``sealed`` is None while unknown, and ``opened`` describes how the key was
+    opened. ``rules`` are sentences about the planned exclusion rules. ``listed`` tells whether the study's sessions
+    have been read. ``drawing`` is the activity before all figures are drawn, ``testing`` the one after; ``untested``
+    means that the latter was stopped. ``groups`` are the groups by which figures can be split; ``split`` is the
+    displayed group, `EACH_GROUP` if all are compared, or "".
     """
 
     studies: tuple[StudyAt, ...] = ()
@@ -125,13 +125,13 @@ class ResultsView:
 
     @property
     def shown(self) -> list[FigureDrawn]:
-        """The figures of the split in order; one that cannot compare the groups is shown for each group."""
-        kept = [figure for figure in self.figures if figure.split == self.split]
+        """The figures of the split in their order; a figure that cannot compare groups is shown for each group."""
+        figures = [figure for figure in self.figures if figure.split == self.split]
         if self.split == EACH_GROUP:
-            compared = {figure.name for figure in kept}
-            kept += [figure for figure in self.figures if figure.split and figure.name not in compared]
+            compared = {figure.name for figure in figures}
+            figures += [figure for figure in self.figures if figure.split and figure.name not in compared]
         places = {figure.name: place for place, figure in enumerate(self.figures) if not figure.split}
-        return sorted(kept, key=lambda figure: places.get(figure.name, len(places)))
+        return sorted(figures, key=lambda figure: places.get(figure.name, len(places)))
 
     @property
     def kind(self) -> Kind:
@@ -149,20 +149,20 @@ class ResultsView:
 
 
 def figure_counts(sessions: Sequence[SessionFacts]) -> tuple[str, str]:
-    """Return the number of sessions in the figures, and why others are excluded; empty without sessions."""
+    """Return sentences about the number of sessions in the figures, and why others are not; "" without sessions."""
     inside = [session for session in sessions if session.is_counted]
     head = f"{len(inside)} of {counted(len(sessions), 'session')} in the figures"
     if not sessions:
         return "", ""
     excluded = [session.name for session in sessions if session.excluded is not None]
-    open_ones = [session.name for session in sessions if session.excluded is None and not session.is_counted]
-    parts = [_names_with_verb(open_ones, "not complete"), _names_with_verb(excluded, "excluded")]
+    incomplete = [session.name for session in sessions if session.excluded is None and not session.is_counted]
+    parts = [_names_with_verb(incomplete, "not complete"), _names_with_verb(excluded, "excluded")]
     line = "; ".join(filter(None, parts))
     return head, f"{line}." if line else ""
 
 
 def _names_with_verb(names: Sequence[str], what: str) -> str:
-    """Return "P007 is excluded", "P007, P009 and 12 others are excluded"; empty without names."""
+    """Return "P007 is excluded" or "P007, P009 and 12 others are excluded"; "" without names."""
     if not names:
         return ""
     if len(names) > _NAMED:
@@ -181,45 +181,48 @@ SECOND_LIGHT, SECOND_DARK = "#b35600", "#f0955a"
 def themed_svg(svg: bytes, colours: Mapping[str, str], theme: Theme) -> bytes:
     """Return a figure with its print colours (role → ``#rrggbb``) replaced by those of ``theme``.
 
-    White is paper, except in letters, which are on coloured bars. The levels of agreement keep their colours
-    everywhere; on dark paper they get an edge.
+    White is the paper, except in letters, which are on coloured bars. The levels of agreement keep their colours, but
+    get an edge in a dark theme.
     """
-    letters = {colour.lower().encode(): _ink(theme, role).encode() for role, colour in colours.items()}
+    letters = {colour.lower().encode(): _role_colour(theme, role).encode() for role, colour in colours.items()}
     edge = theme.ctl if theme.dark else theme.surface
     paper = {**letters, b"stroke: " + _WHITE: f"stroke: {edge}".encode(), _WHITE: theme.surface.encode()}
     parts = _LETTERS.split(svg)  # every second part is a text
     accent = colours.get("accent", "#").lower().encode()
-    parts[::2] = [_with_colours(part, paper, accent) for part in parts[::2]]
-    parts[1::2] = [_with_colours(part, letters, accent) for part in parts[1::2]]
+    parts[::2] = [_replace_colours(part, paper, accent) for part in parts[::2]]
+    parts[1::2] = [_replace_colours(part, letters, accent) for part in parts[1::2]]
     return b"".join(parts)
 
 
-def _ink(theme: Theme, role: str) -> str:
-    """Return the colour of a role; "band" is a lighter accent, on which lines are visible."""
+def _role_colour(theme: Theme, role: str) -> str:
+    """Return the colour channel a figure's role; "band" is a pale accent on which lines are visible."""
     if role == "second":
         return SECOND_DARK if theme.dark else SECOND_LIGHT
     if role != "band":
         return str(getattr(theme, role))
     paper, accent = QColor(theme.surface), QColor(theme.accent)
     share = BAND_DARK if theme.dark else BAND_LIGHT
-    mixed = [round(share * of(accent) + (1 - share) * of(paper)) for of in (QColor.red, QColor.green, QColor.blue)]
+    mixed = [
+        round(share * channel(accent) + (1 - share) * channel(paper))
+        for channel in (QColor.red, QColor.green, QColor.blue)
+    ]
     return QColor(*mixed).name()
 
 
-def _with_colours(part: bytes, by: Mapping[bytes, bytes], accent: bytes) -> bytes:
-    """Replace colours; the accent as a translucent shade under letters keeps its depth."""
+def _replace_colours(part: bytes, by: Mapping[bytes, bytes], accent: bytes) -> bytes:
+    """Replace colours, except a translucent accent, which is the background of letters."""
     shade = b"fill: " + re.escape(accent) + rb"; (?:fill-)?opacity"
     pattern = re.compile(b"|".join([shade, *map(re.escape, sorted(by, key=len, reverse=True))]))
     return pattern.sub(lambda match: by.get(match[0], match[0]), part)
 
 
 def _renderer(svg: bytes) -> QSvgRenderer:
-    """Return what draws an SVG; Qt uses only one font family of a list, so only the first is left."""
+    """Return a renderer of an SVG with the first font family only, since Qt does not support lists of families."""
     return QSvgRenderer(_FAMILY.sub(b"font-family: " + FAMILIES[0].encode(), svg))
 
 
 def drawn_svg(svg: bytes, size: QSize, ratio: float) -> QImage:
-    """Return an SVG as an image of ``size`` logical px for a screen with that device pixel ratio."""
+    """Return an SVG as an image of ``size`` logical px for a screen with device pixel ratio ``ratio``."""
     renderer = _renderer(svg)
     image = QImage(round(size.width() * ratio), round(size.height() * ratio), QImage.Format.Format_ARGB32_Premultiplied)
     image.fill(Qt.GlobalColor.transparent)
@@ -236,13 +239,13 @@ _REACH_PX = 8
 
 
 class _Mark(NamedTuple):
-    """A participant's point in a figure, with its position in the units of the SVG."""
+    """A participant's point in a figure, at a position in the units of the SVG."""
 
     participant: str
     at: QPointF
 
 
-def _marks_of(svg: bytes) -> list[_Mark]:
+def _find_marks(svg: bytes) -> list[_Mark]:
     """Return the points of all participants in a figure of `analysis.figures`."""
     return [
         _Mark(html.unescape(person.decode()), QPointF(float(x), float(y)))
@@ -252,7 +255,7 @@ def _marks_of(svg: bytes) -> list[_Mark]:
 
 
 class _FigureView(Coloured, QWidget):
-    """A figure as wide as its room permits, with its aspect ratio.
+    """A widget that shows a figure with its aspect ratio.
 
     ``person_asked`` carries the participant whose point was clicked.
     """
@@ -263,7 +266,7 @@ class _FigureView(Coloured, QWidget):
         super().__init__()
         self._figure, self._colours = figure, colours
         self._image = QImage()
-        self._wanted: tuple[object, ...] = ()
+        self._requested: tuple[object, ...] = ()
         self._drawing = Background(self)
         self._drawing.done.connect(self._show_image)
         policy = QSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
@@ -276,12 +279,12 @@ class _FigureView(Coloured, QWidget):
         return not self._drawing.busy and not self._image.isNull()
 
     def show_figure(self, figure: FigureDrawn, colours: Mapping[str, str]) -> None:
-        """Draw another figure; the previous one is visible until then."""
+        """Draw another figure; the previous one stays visible until then."""
         self._figure, self._colours = figure, colours
         size = _SIZE.search(figure.svg)
         self.width_pt = float(size[1]) if size else 516.0
         self._proportion = float(size[2]) / float(size[1]) if size else 0.5
-        self._marks = _marks_of(figure.svg)
+        self._marks = _find_marks(figure.svg)
         self.setMouseTracking(bool(self._marks))
         self.setAccessibleName(figure.title)
         self.setAccessibleDescription(figure.caption)
@@ -314,21 +317,21 @@ class _FigureView(Coloured, QWidget):
         if person and event.button() == Qt.MouseButton.LeftButton:
             self.person_asked.emit(person)
 
-    def _person_at(self, at: QPointF) -> str:
-        """Return the participant with the nearest point within reach of a position in the widget, or ""."""
+    def _person_at(self, position: QPointF) -> str:
+        """Return the participant whose point is nearest to a position in the widget, or "" if none is near."""
         scale = self.width() / self.width_pt
-        near = [((mark.at * scale - at).manhattanLength(), mark.participant) for mark in self._marks]
+        near = [((mark.at * scale - position).manhattanLength(), mark.participant) for mark in self._marks]
         return min((pair for pair in near if pair[0] <= _REACH_PX), default=(0.0, ""))[1]
 
     def _request_image(self) -> None:
-        """Request a drawing at the present size and theme, unless it exists."""
+        """Request an image for the current size and theme, unless it was requested before."""
         if self.width() < 2 or self.height() < 2 or not self.testAttribute(Qt.WidgetAttribute.WA_Resized):
             return
         size, ratio = self.size(), self.devicePixelRatioF()
-        wanted = (self._figure, self.theme.name, size, ratio)
-        if wanted == self._wanted:
+        requested = (self._figure, self.theme.name, size, ratio)
+        if requested == self._requested:
             return
-        self._wanted = wanted
+        self._requested = requested
         figure, colours, theme = self._figure, self._colours, self.theme
         self._drawing.run(lambda: drawn_svg(themed_svg(figure.svg, colours, theme), size, ratio))
 
@@ -349,31 +352,31 @@ class _FigureView(Coloured, QWidget):
 
 _GAP = 12
 _PADDING = 14
-_AROUND = 2 * (_PADDING + SHADOW)
+_FRAME_PX = 2 * (_PADDING + SHADOW)
 _AT_ONCE = 2
-"""So many figures are to be seen without scrolling, where they can be and still be read."""
+"""The number of figures that should be visible without scrolling, as long as they are legible."""
 LEAST_WIDTH, MOST_WIDTH = 830, 1240
 
 
 _VERDICTS: Mapping[str, str] = {"significant": "ok", "equivalent": "ok", "significant, exploratory": "warn"}
 _FORMS = "PDF (*.pdf);;SVG (*.svg);;PNG (*.png)"
 _MOST_SCALE = 2.5
-"""Pixels of the window for a point of a figure at most."""
+"""The maximum scale of a figure in the window [px per pt]."""
 _PNG_SCALE = 300 / 72
-"""Pixels of a PNG for a point of a figure."""
+"""The scale of a figure in a PNG [px per pt]."""
 
 
 def _save_figure(figure: FigureDrawn, path: Path) -> None:
-    """Write a figure as PDF, SVG or PNG, by the ending of ``path``; StoreError if it cannot be written."""
+    """Write a figure as PDF, SVG or PNG, depending on the suffix of ``path``; raise StoreError if that fails."""
     renderer = _renderer(figure.svg)
     size = renderer.defaultSize()
-    if (ending := path.suffix.lower()) == ".svg":
+    if (suffix := path.suffix.lower()) == ".svg":
         content = figure.svg
     else:
-        held = QBuffer()
-        held.open(QIODevice.OpenModeFlag.WriteOnly)
-        if ending == ".pdf":
-            writer = QPdfWriter(held)
+        buffer = QBuffer()
+        buffer.open(QIODevice.OpenModeFlag.WriteOnly)
+        if suffix == ".pdf":
+            writer = QPdfWriter(buffer)
             writer.setTitle(figure.title)
             writer.setPageSize(QPageSize(QSizeF(size), QPageSize.Unit.Point))
             writer.setPageMargins(QMarginsF())
@@ -381,16 +384,16 @@ def _save_figure(figure: FigureDrawn, path: Path) -> None:
             renderer.render(painter)
             painter.end()
         else:
-            QImageWriter(held, QByteArray(b"png")).write(drawn_svg(figure.svg, size, _PNG_SCALE))
-        content = bytes(held.data().data())
+            QImageWriter(buffer, QByteArray(b"png")).write(drawn_svg(figure.svg, size, _PNG_SCALE))
+        content = bytes(buffer.data().data())
     write_file(path, content)
 
 
 class FigureCard(Card):
-    """A figure below the answer that it shows, or the reason why it is missing.
+    """A card with a question, its answer and figure, or the reason why the figure is missing.
 
-    Its caption is shown on request. Figure and numbers can be copied, the figure saved. ``failed`` carries the reason
-    if saving failed, ``person_asked`` the participant whose point was clicked.
+    The caption is shown on request. Figure and numbers can be copied, and the figure can be saved. ``failed`` carries
+    the reason if saving failed, ``person_asked`` the participant whose point was clicked.
     """
 
     failed = Signal(str)
@@ -423,7 +426,7 @@ class FigureCard(Card):
         self.copy_numbers = ActionButton("", "Copy numbers", role="plain", height=30)
         self.copy_numbers.clicked.connect(lambda: QGuiApplication.clipboard().setText(self.figure.numbers))
         self.save = ActionButton("download", "Save as …", role="plain", height=30)
-        self.save.clicked.connect(self._ask_where)
+        self.save.clicked.connect(self._ask_for_path)
         self.buttons = (self.more, self.copy_figure, self.copy_numbers, self.save)
         for button in self.buttons:
             button.setFont(font("label"))
@@ -439,7 +442,7 @@ class FigureCard(Card):
         self.caption.setText(figure.caption)
         has_figure = bool(figure.svg)
         self._title.setText(figure.title)
-        self._title.setVisible(not has_figure and not figure.question)  # a figure has its own
+        self._title.setVisible(not has_figure and not figure.question)  # figures contain their title
         self.question.setText(figure.question)
         self.question.setVisible(bool(figure.question))
         self.answer.setText(re.sub(r"\bd_z\b", "d<sub>z</sub>", html.escape(figure.answer, quote=False)))
@@ -462,7 +465,7 @@ class FigureCard(Card):
             self.more.raise_()
 
     def fit_width(self, width: int) -> None:
-        """Set the figure's width; narrow figures stay narrower."""
+        """Set the figure's width, limited by its maximum scale."""
         if self.drawing is not None:
             width = min(width, round(_MOST_SCALE * self.drawing.width_pt))
         size = QSize(width, 0 if self.drawing is None else self.drawing.heightForWidth(width))
@@ -478,11 +481,11 @@ class FigureCard(Card):
             self._verdict.addWidget(self._chip)
 
     def _copy_figure(self) -> None:
-        """Copy the figure as a picture."""
+        """Copy the figure to the clipboard as an image."""
         size = _renderer(self.figure.svg).defaultSize()
         QGuiApplication.clipboard().setImage(drawn_svg(self.figure.svg, size, _PNG_SCALE))
 
-    def _ask_where(self) -> None:
+    def _ask_for_path(self) -> None:
         self.dialog = dialog = QFileDialog(self, f"Save {self.figure.title}", self.figure.name, _FORMS)
         dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
         dialog.selectFile(self.figure.name)
@@ -501,7 +504,7 @@ class FigureCard(Card):
 
 
 class _WorkLine(Card):
-    """The current activity with its progress and a stop button."""
+    """A line with the current activity, its progress, and a button to stop or continue it."""
 
     def __init__(self) -> None:
         super().__init__(padding=14, gap=0)
@@ -512,21 +515,21 @@ class _WorkLine(Card):
         row = hbox((self.words, 1), (self.bar, 1), self.stop, self.again, spacing=16)
         add_layout(self.column, row)
 
-    def show_going(self, going: Progress | None, *, untested: bool) -> None:
-        """Show the progress; with ``untested``, that the work was stopped and what is missing."""
-        self.setVisible(going is not None or untested)
-        self.bar.setVisible(going is not None)
-        self.stop.setVisible(going is not None and going.stops)
-        self.again.setVisible(going is None)
-        if going is not None:
-            self.words.show_text(f"{going.what[:1].upper()}{going.what[1:]} …")
-            self.bar.show_share(going.share)
+    def show_progress(self, progress: Progress | None, *, untested: bool) -> None:
+        """Show the progress, or if ``untested``, that the computation was stopped and what is missing."""
+        self.setVisible(progress is not None or untested)
+        self.bar.setVisible(progress is not None)
+        self.stop.setVisible(progress is not None and progress.stops)
+        self.again.setVisible(progress is None)
+        if progress is not None:
+            self.words.show_text(f"{progress.what[:1].upper()}{progress.what[1:]} …")
+            self.bar.show_share(progress.share)
         elif untested:
             self.words.show_text("The computation was stopped, so test results and some figures are missing.")
 
 
 class _TroubleCard(Card):
-    """The reason why there is nothing to show, and one button; ``asked`` carries its action."""
+    """A card with the reason why there are no figures, and a button; ``asked`` carries its action."""
 
     asked = Signal(str)
 
@@ -553,17 +556,19 @@ class _TroubleCard(Card):
         self.bar.hide()
         self._remedy = trouble.remedy
 
-    def show_going(self, going: Progress) -> None:
+    def show_progress(self, progress: Progress) -> None:
         self.show_trouble(
-            Trouble(title=f"{going.what[:1].upper()}{going.what[1:]} …", sentence="", button="Stop", remedy="stop")
+            Trouble(
+                title=f"{progress.what[:1].upper()}{progress.what[1:]} …", sentence="", button="Stop", remedy="stop"
+            )
         )
-        self.button.setVisible(going.stops)
+        self.button.setVisible(progress.stops)
         self.bar.setVisible(True)
-        self.bar.show_share(going.share)
+        self.bar.show_share(progress.share)
 
 
 class FiguresPanel(QScrollArea):
-    """The cards of the figures or, while there are none, the activity or the reason.
+    """The scroll area with the cards of the figures or, if there are none, the activity or the reason.
 
     ``asked`` carries a button's action, ``failed`` the reason why a figure was not saved, ``person_asked`` the
     participant whose point was clicked.
@@ -582,7 +587,7 @@ class FiguresPanel(QScrollArea):
         self.work.stop.clicked.connect(lambda: self.asked.emit("stop"))
         self.work.again.clicked.connect(lambda: self.asked.emit("read"))
         self._inside = QWidget()
-        parts = (self.work, self.trouble, STRETCH)  # the work above the figures, where it is seen
+        parts = (self.work, self.trouble, STRETCH)  # the activity is above the figures, where it is visible
         self._column = vbox(*parts, spacing=_GAP - 2 * SHADOW, margins=0, parent=self._inside)
         self.trouble.hide()
         self.work.hide()
@@ -593,7 +598,7 @@ class FiguresPanel(QScrollArea):
         self._whole = False
 
     def show_view(self, view: ResultsView) -> None:
-        """Show the figures; a card is kept while its figure is redrawn."""
+        """Show the figures; a card is kept when its figure is drawn again."""
         shown = view.shown
         if [card.figure.key for card in self.cards] != [figure.key for figure in shown]:
             self._order_cards(shown, view.colours)
@@ -603,43 +608,45 @@ class FiguresPanel(QScrollArea):
         if view.trouble is not None:
             self.trouble.show_trouble(view.trouble)
         elif view.drawing is not None and not shown:
-            self.trouble.show_going(view.drawing)
+            self.trouble.show_progress(view.drawing)
         self.trouble.setVisible(view.trouble is not None or (view.drawing is not None and not shown))
-        self.work.show_going(view.testing or (view.drawing if shown else None), untested=view.untested)
+        self.work.show_progress(view.testing or (view.drawing if shown else None), untested=view.untested)
         self.fit_width()
 
     def _order_cards(self, shown: Sequence[FigureDrawn], colours: Mapping[str, str]) -> None:
-        """Keep the cards of existing figures and create the others, in the figures' order."""
+        """Create the cards in the order of the figures; cards of figures that exist are kept."""
         kept = {card.figure.key: card for card in self.cards}
         self.cards = []
-        for place, figure in enumerate(shown):
+        for index, figure in enumerate(shown):
             card = kept.pop(figure.key, None)
             if card is None:
                 card = FigureCard(figure, colours)
                 card.failed.connect(self.failed)
                 card.person_asked.connect(self.person_asked)
-            self._column.insertWidget(1 + place, card)
+            self._column.insertWidget(1 + index, card)
             self.cards.append(card)
-        for gone in kept.values():
-            remove_widget(gone)
+        for card in kept.values():
+            remove_widget(card)
         for before, after in pairwise(button for card in self.cards for button in card.buttons):
             QWidget.setTabOrder(before, after)
 
-    def set_whole(self, yes: bool) -> None:
-        """Be as high as all figures, for a page that scrolls as a whole."""
-        self._whole = yes
+    def set_whole(self, whole: bool) -> None:
+        """Make the panel as high as all figures if ``whole``, for a page that scrolls as a whole."""
+        self._whole = whole
         off = Qt.ScrollBarPolicy.ScrollBarAlwaysOff
-        self.setVerticalScrollBarPolicy(off if yes else Qt.ScrollBarPolicy.ScrollBarAsNeeded)
+        self.setVerticalScrollBarPolicy(off if whole else Qt.ScrollBarPolicy.ScrollBarAsNeeded)
         self.fit_width()
 
     def fit_width(self) -> None:
-        """Set the figures' width, reduced if this lets two of them fit side by side."""
-        bar = 0 if self._whole else self.verticalScrollBar().sizeHint().width()  # reserved: figures would flicker
-        width = min(self.width() - bar - _AROUND, MOST_WIDTH)
+        """Set the width of the figures, reduced if the first `_AT_ONCE` are then visible without scrolling."""
+        bar = (
+            0 if self._whole else self.verticalScrollBar().sizeHint().width()
+        )  # reserved, so that figures do not flicker
+        width = min(self.width() - bar - _FRAME_PX, MOST_WIDTH)
         first = [card.drawing for card in self.cards if card.drawing is not None][:_AT_ONCE]
         if first and not self._whole:
             heights = sum(drawing.heightForWidth(1000) for drawing in first) / 1000
-            frames = len(first) * (_AROUND - 4) + (len(first) - 1) * self._column.spacing()
+            frames = len(first) * (_FRAME_PX - 4) + (len(first) - 1) * self._column.spacing()
             width = min(width, max(int((self.height() - frames) / heights), LEAST_WIDTH))
         for card in self.cards:
             card.fit_width(max(width, 320))

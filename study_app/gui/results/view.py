@@ -1,4 +1,4 @@
-"""The results page: a study, the requests to the process that evaluates it, and the answers of that process."""
+"""The results page, and its requests to the process that evaluates studies."""
 
 import importlib.util
 import time
@@ -54,8 +54,8 @@ from study_app.store.merged import FOLDER, folders_of
 from study_app.workers.server import Crashed, Refused
 
 
-def _exclusions_at(study: Path) -> Path:
-    """Return the file of exclusions; for a merged study the folder of its sites, each with its own file."""
+def _exclusions_path(study: Path) -> Path:
+    """Return the file of exclusions or, for a merged study, the folder of its sites, each of which has such a file."""
     folders = folders_of(study)
     return StudyFolder(study).exclusions if "" in folders else study / FOLDER
 
@@ -63,7 +63,7 @@ def _exclusions_at(study: Path) -> Path:
 _STACKED_BELOW = 1160
 PANEL_PX, PANEL_WIDE_PX, WIDE_FROM = 400, 430, 1700
 STACKED_HEIGHT, EXCLUSIONS = 330, 360
-_REASON_SIGNS = 40
+_REASON_LETTERS = 40
 _EXTRAS: Final = (
     Extra("wide", "Wide table: one row per participant"),
     Extra("parquet", "Every table also as Parquet"),
@@ -72,11 +72,11 @@ _EXTRAS: Final = (
 )
 
 
-_LISTEN_MS: Final = 40
+_POLL_MS: Final = 40
 PATIENCE_S: Final = 0.3
-"""What takes longer than this says that it goes on."""
+"""The time after which the progress of a request is shown."""
 NO_SAV: Final = "Files for SPSS need the package pyreadstat: pip install 'liquid-study[analysis]'"
-_MISTAKE: Final = Trouble(
+_BUG: Final = Trouble(
     title="A bug in the program stopped the evaluation",
     sentence="The terminal shows the details.",
     button="Refresh",
@@ -93,7 +93,7 @@ _NONE_COMPLETE: Final = Trouble(
 )
 _HIDDEN: Final = "Conditions appear as codes. Tests, hypotheses and thresholds are hidden until you unblind the study."
 
-_Decided: TypeAlias = LeaveOut | TakeBack | OpenKey
+_Decision: TypeAlias = LeaveOut | TakeBack | OpenKey
 _REFUSALS: Final = {
     LeaveOut: "Nothing was excluded",
     TakeBack: "The exclusion still applies",
@@ -102,9 +102,9 @@ _REFUSALS: Final = {
 
 
 class ResultsPlace(Place):
-    """The results page: the studies, and requests to the process that reads and evaluates them while it is shown.
+    """The results page; while it is shown, a process reads and evaluates the chosen study.
 
-    Reports and tables are written by a separate process, so that nothing here waits. ``version_asked`` carries the
+    Another process writes reports and tables, so that the page never waits. ``version_asked`` carries the
     `SessionFacts` of a session with whose version the study should be compared.
 
     Parameters
@@ -130,11 +130,11 @@ class ResultsPlace(Place):
         self.reader: AnalysisClient | None = None
         self._writer: AnalysisClient | None = None
         self._orders: dict[int, Order] = {}
-        self._since_s = 0.0
-        self._going: Progress | None = None
+        self._sent_s = 0.0
+        self._progress: Progress | None = None
         self._redrawn: set[tuple[str, str]] = set()
         self._blocks = 0
-        self._listening = QTimer(self, interval=_LISTEN_MS)
+        self._listening = QTimer(self, interval=_POLL_MS)
         self._listening.timeout.connect(self._read_answers)
         self.study = Choice()
         self.study.setAccessibleName("Study")
@@ -174,11 +174,11 @@ class ResultsPlace(Place):
         self.sessions.rows.version_asked.connect(self.version_asked)
 
     def _lay_out(self) -> None:
-        self._chips_there = QWidget()
-        self._chips = hbox(spacing=8, margins=0, parent=self._chips_there)
+        self._chip_box = QWidget()
+        self._chips = hbox(spacing=8, margins=0, parent=self._chip_box)
         self._head = hbox(label("Results", "title"), self.study, STRETCH, spacing=12, margins=(SHADOW, 0, SHADOW, 0))
         add_parts(self._head, self.unblind, self.export, self.report)
-        self._below = hbox(margins=(SHADOW, 0, SHADOW, 0))
+        self._chip_row = hbox(margins=(SHADOW, 0, SHADOW, 0))
         self._left = QBoxLayout(QBoxLayout.Direction.TopToBottom)
         self._left.setSpacing(12 - 2 * SHADOW)
         add_parts(self._left, (self.sessions, 3), (self.exclusions, 1))
@@ -194,7 +194,7 @@ class ResultsPlace(Place):
         above.setAlignment(self._groups, Qt.AlignmentFlag.AlignLeft)
         add_parts(self._row, self._panel, (vbox(above, (self.figures, 1), spacing=0, margins=0), 1))
         inside = QWidget()
-        vbox(self._head, self._below, (self._row, 1), spacing=12, margins=(24, 20, 24, 18), parent=inside)
+        vbox(self._head, self._chip_row, (self._row, 1), spacing=12, margins=(24, 20, 24, 18), parent=inside)
         self.area = scrolled(inside)
         vbox(self.area, margins=0, parent=self)
 
@@ -213,15 +213,15 @@ class ResultsPlace(Place):
         self._update_view(drawing=None, testing=None)
 
     def show_view(self, view: ResultsView) -> None:
-        """Show a view; only changed parts are recreated."""
-        before, self.view = self.view, view
-        if view.studies != before.studies or view.chosen != before.chosen:
+        """Show a view; only changed parts are updated."""
+        previous, self.view = self.view, view
+        if view.studies != previous.studies or view.chosen != previous.chosen:
             self._show_studies()
-        if (view.sessions, view.without_sessions) != (before.sessions, before.without_sessions):
+        if (view.sessions, view.without_sessions) != (previous.sessions, previous.without_sessions):
             self.sessions.show_sessions(view.sessions, view.without_sessions)
-        if (view.left_out, view.proposed, view.rules) != (before.left_out, before.proposed, before.rules):
+        if (view.left_out, view.proposed, view.rules) != (previous.left_out, previous.proposed, previous.rules):
             self.exclusions.show_left_out(view.left_out, view.proposed, view.rules)
-        if view.groups != before.groups:
+        if view.groups != previous.groups:
             self._show_groups()
         self.hidden.setVisible(view.sealed is True and bool(view.figures))
         self._show_chips()
@@ -264,7 +264,7 @@ class ResultsPlace(Place):
         if self.view.sealed:
             chips.append(("neutral", "lock", "Blinded", "The condition names are sealed"))
         if self.view.opened:
-            opened, most = self.view.opened, 2 * _REASON_SIGNS
+            opened, most = self.view.opened, 2 * _REASON_LETTERS
             text = opened if len(opened) <= most else f"{opened[: most - 1].rstrip()}…"
             chips.append(("neutral", "eye", text, opened))
         if self.view.doubts:
@@ -292,10 +292,10 @@ class ResultsPlace(Place):
         self._open_dialog(SessionPage(self, self.theme, session, self._opener))
 
     def _open_participant(self, participant: str) -> None:
-        """Open a participant's first session, one in the figures if there is one."""
-        own = [session for session in self.view.sessions if session.participant == participant]
-        if own:
-            self._open_session(min(own, key=lambda session: (not session.is_counted, session.session)))
+        """Open a participant's first session, preferably one that is in the figures."""
+        sessions = [session for session in self.view.sessions if session.participant == participant]
+        if sessions:
+            self._open_session(min(sessions, key=lambda session: (not session.is_counted, session.session)))
 
     def _ask_leave_out(self, proposed: Exclusion | None) -> None:
         included = [session for session in self.view.sessions if session.excluded is None]
@@ -304,17 +304,17 @@ class ResultsPlace(Place):
 
         def leave_out() -> None:
             participant, session, trial = dialog.chosen
-            who_and_why = {"by": dialog.value("by"), "reason": dialog.value("reason"), "rule": dialog.rule}
-            decide(participant=participant, session=session, trial=trial, **who_and_why)
+            details = {"by": dialog.value("by"), "reason": dialog.value("reason"), "rule": dialog.rule}
+            decide(participant=participant, session=session, trial=trial, **details)
 
         dialog.accepted.connect(leave_out)
         self._open_dialog(dialog)
 
     def _ask_take_back(self, exclusion: Exclusion) -> None:
         dialog = take_back_question(self, self.theme, exclusion)
-        which = {"participant": exclusion.participant, "session": exclusion.session, "trial": exclusion.trial}
-        which |= {"rule": exclusion.rule_or_person} if not exclusion.excluded_at else {}
-        decide = partial(self._order_decision, "reversing the exclusion", TakeBack, **which)
+        subject = {"participant": exclusion.participant, "session": exclusion.session, "trial": exclusion.trial}
+        subject |= {"rule": exclusion.rule_or_person} if not exclusion.excluded_at else {}
+        decide = partial(self._order_decision, "reversing the exclusion", TakeBack, **subject)
         dialog.accepted.connect(lambda: decide(by=dialog.value("by"), reason=dialog.value("reason")))
         self._open_dialog(dialog)
 
@@ -371,7 +371,7 @@ class ResultsPlace(Place):
 
     @property
     def is_busy(self) -> bool:
-        """Whether a request is still running."""
+        """Whether a request is running."""
         return bool(self._orders) or self._writer is not None
 
     def show_results(self, results: Path) -> None:
@@ -381,34 +381,34 @@ class ResultsPlace(Place):
             self.read_studies()
 
     def read_studies(self) -> None:
-        """Reread the list of studies and the chosen study."""
+        """Read the list of studies and the chosen study again."""
         self._send_order(FindStudies(self.results), "looking for studies")
 
     def choose_study(self, folder: Path) -> None:
-        """Show this study the next time the page is entered."""
+        """Select a study, which is read when the page is entered."""
         self.show_view(ResultsView(studies=self.view.studies, chosen=folder))
 
-    def _send_order(self, order: Order, what: str) -> None:
+    def _send_order(self, order: Order, activity: str) -> None:
         if self.reader is None or not self.reader.works:
             if self.reader is not None:
                 self.reader.close()
             self.reader = self._start_worker()
             self._orders = {}
         self._orders[self.reader.order(order)] = order
-        self._since_s = time.perf_counter()
-        self._going = Progress(what, 0.0, stops=not isinstance(order, _Decided))
+        self._sent_s = time.perf_counter()
+        self._progress = Progress(activity, 0.0, stops=not isinstance(order, _Decision))
         self._listening.start()
 
     def _read_answers(self) -> None:
-        """Read the answers to the last request; show the activity if it takes long."""
+        """Read the answers to the requests; show the progress if they take long."""
         if self.reader is not None and self._orders:
             for number, answer in self.reader.answers():
                 self._handle_answer(number, answer)
-            if self._orders and time.perf_counter() - self._since_s > PATIENCE_S:
+            if self._orders and time.perf_counter() - self._sent_s > PATIENCE_S:
                 if self._blocks and len(self._redrawn) >= self._blocks:
-                    self._update_view(testing=self._going, drawing=None)
+                    self._update_view(testing=self._progress, drawing=None)
                 else:
-                    self._update_view(drawing=self._going, testing=None)
+                    self._update_view(drawing=self._progress, testing=None)
         self._read_writer_answers()
         if not self.is_busy:
             self._listening.stop()
@@ -426,15 +426,15 @@ class ResultsPlace(Place):
                 self._finish_order(order, newest=newest)
             case Refused():
                 del self._orders[number]
-                if newest or isinstance(order, _Decided):
+                if newest or isinstance(order, _Decision):
                     self._show_refusal(order, answer)
             case Crashed():
                 self._orders = {}
-                self._update_view(trouble=_MISTAKE, figures=(), drawing=None, testing=None)
+                self._update_view(trouble=_BUG, figures=(), drawing=None, testing=None)
             case Progress() if newest:
-                self._going = answer
+                self._progress = answer
             case StudiesFound() if newest:
-                self._take_studies(answer)
+                self._show_found_studies(answer)
             case SessionsFound() if newest:
                 self._take_sessions(answer)
             case ProposedExclusions() if newest:
@@ -460,7 +460,7 @@ class ResultsPlace(Place):
                 figures = [answer if figure.key == answer.key else figure for figure in self.view.figures]
                 self._update_view(figures=tuple(figures if answer.key in keys else [*figures, answer]))
 
-    def _take_studies(self, answer: StudiesFound) -> None:
+    def _show_found_studies(self, answer: StudiesFound) -> None:
         folders = [study.folder for study in answer.studies]
         chosen = self.view.chosen if self.view.chosen in folders else None
         if chosen is None and folders:
@@ -481,7 +481,7 @@ class ResultsPlace(Place):
             self._read_study(folder)
 
     def _read_study(self, folder: Path) -> None:
-        """Read a study; its current view is shown until then."""
+        """Read a study; its current view stays visible until then."""
         if folder != self.view.chosen:
             self.show_view(ResultsView(studies=self.view.studies, chosen=folder))
             self._blocks = 0
@@ -489,11 +489,11 @@ class ResultsPlace(Place):
         self._update_view(trouble=None, untested=False, listed=False)
         self._send_order(ReadStudy(folder), f"reading {folder.name}")
 
-    def _take_sessions(self, answer: SessionsFound) -> None:
+    def _show_found_sessions(self, answer: SessionsFound) -> None:
         facts = session_facts(answer.folder, answer.rows, answer.exclusions, {})
         facts.sort(key=lambda session: (not session.needs_care, session.participant, session.session))
         reveal = answer.reveal
-        figures = () if self.view.sealed and reveal is not None else self.view.figures  # they show codes
+        figures = () if self.view.sealed and reveal is not None else self.view.figures  # the old figures show codes
         self._update_view(
             figures=figures,
             sessions=tuple(facts),
@@ -501,13 +501,13 @@ class ResultsPlace(Place):
             left_out=answer.exclusions,
             proposed=(),
             rules=(),
-            exclusions_file=_exclusions_at(answer.folder),
+            exclusions_file=_exclusions_path(answer.folder),
             sealed=reveal is None,
             opened="" if reveal is None else unblinding_text(reveal),
         )
 
     def _finish_order(self, order: Order, *, newest: bool) -> None:
-        if isinstance(order, _Decided):
+        if isinstance(order, _Decision):
             self._read_study(order.folder)
         elif isinstance(order, ReadStudy) and newest:
             kept = tuple(figure for figure in self.view.figures if figure.key in self._redrawn)
@@ -515,9 +515,9 @@ class ResultsPlace(Place):
 
     def _show_refusal(self, order: Order, refused: Refused) -> None:
         sentence = f"{refused.sentence}."
-        if isinstance(order, _Decided):
+        if isinstance(order, _Decision):
             self.message.emit(_REFUSALS[type(order)], sentence)
-            self._read_study(order.folder)  # it may have changed meanwhile, and its reading was cancelled
+            self._read_study(order.folder)  # it may have changed, and the request cancelled its reading
         elif refused.stopped:
             all_drawn = self._blocks and len(self._redrawn) >= self._blocks
             trouble = (
@@ -560,15 +560,15 @@ class ResultsPlace(Place):
             self._update_view(trouble=None)
             self.read_studies()
 
-    def _order_decision(self, what: str, order: Callable[..., _Decided], **details: Any) -> None:
+    def _order_decision(self, activity: str, order: Callable[..., _Decision], **details: Any) -> None:
         if self.view.chosen is not None:
-            self._send_order(order(folder=self.view.chosen, **details), what)
+            self._send_order(order(folder=self.view.chosen, **details), activity)
             self.show_view(self.view)
 
-    def _start_writing(self, make: Callable[..., WriteTables | WriteReport], *details: Any) -> None:
+    def _start_writing(self, make_order: Callable[..., WriteTables | WriteReport], *details: Any) -> None:
         if self.view.chosen is not None:
             self._writer = self._start_worker()
-            self._writer.order(make(self.view.chosen, *details))
+            self._writer.order(make_order(self.view.chosen, *details))
             self._listening.start()
 
     def _stop_writing(self) -> None:
@@ -576,7 +576,7 @@ class ResultsPlace(Place):
             self._writer.stop()
 
     def _read_writer_answers(self) -> None:
-        """Show the writer's progress; end its process after the last answer."""
+        """Show the progress of the writing process, and end it after its last answer."""
         dialog = self.writing
         if self._writer is None:
             return
@@ -602,7 +602,7 @@ class ResultsPlace(Place):
             dialog.show_refused(f"{last.sentence}.")
 
     def _arrange(self) -> None:
-        """Put the figures below the sessions in a narrow window, and the chips below the heading if necessary."""
+        """Place the figures below the sessions in a narrow window, and the chips below the heading if necessary."""
         stacked = self.width() < _STACKED_BELOW
         down, right = QBoxLayout.Direction.TopToBottom, QBoxLayout.Direction.LeftToRight
         self._row.setDirection(down if stacked else right)
@@ -614,14 +614,14 @@ class ResultsPlace(Place):
         self.exclusions.setMaximumWidth(EXCLUSIONS if stacked else QWIDGETSIZE_MAX)
         self._left.setAlignment(self.exclusions, Qt.AlignmentFlag.AlignTop if stacked else Qt.AlignmentFlag(0))
         self.figures.set_whole(stacked)
-        self._head.removeWidget(self._chips_there)
-        self._below.removeWidget(self._chips_there)
+        self._head.removeWidget(self._chip_box)
+        self._chip_row.removeWidget(self._chip_box)
         room = self.width() - 48 - self._head.sizeHint().width()
         if sum(chip.sizeHint().width() + 8 for chip in self.chips) + 12 <= room:
-            self._head.insertWidget(2, self._chips_there)
+            self._head.insertWidget(2, self._chip_box)
         else:
-            self._below.addWidget(self._chips_there, 0, Qt.AlignmentFlag.AlignLeft)
-        self._chips_there.setVisible(bool(self.chips))
+            self._chip_row.addWidget(self._chip_box, 0, Qt.AlignmentFlag.AlignLeft)
+        self._chip_box.setVisible(bool(self.chips))
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)

@@ -1,1 +1,1 @@
-"""Sessions as rows of a table, wherever a window lists them."""
+"""The table of sessions and the page of a session, which several windows show."""

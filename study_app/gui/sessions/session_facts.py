@@ -1,4 +1,4 @@
-"""What is said of sessions: the rows of their tables, with chips and filters, and how much a session asks."""
+"""Facts about sessions: the rows of their tables, with chips and filters, and the extent of a session."""
 
 import contextlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -26,20 +26,19 @@ from study_app.store.versions import run_of
 
 Kind: TypeAlias = Literal["", "pilot", "simulated", "sample"]
 KINDS: dict[Kind, str] = {"": "Participants", "pilot": "Pilot", "simulated": "Simulated", "sample": "Sample"}
-"""What sessions are, with the words for a filter; simulated are rehearsals and sessions on simulated devices, but no
-pilots."""
+"""The kinds of sessions with their labels in a filter; "simulated" are rehearsals and sessions on simulated devices,
+except pilots."""
 SAMPLE = "sample-"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SessionFacts:
-    """A session as shown in a row.
+    """The facts about a session that its row shows.
 
-    ``status`` is the table's, or "running" if a program has the session open. ``excluded`` is the reason why the
-    analysis excludes it completely, otherwise None; ``lost`` counts recordings that could not be stored,
-    ``reconnected`` how often the failed device was reconnected, ``outlets_lost`` failed streams and ports. ``missing``
-    are the undelivered trials, None if all were delivered. ``group`` is "" without groups or while it is
-    sealed.
+    ``status`` is that of the table, or "running" if a program has the session open. ``excluded`` is the reason why the
+    whole session is excluded from the analysis, or None. ``lost`` counts recordings that could not be stored,
+    ``reconnected`` reconnections of the device, ``outlets_lost`` failed streams and ports. ``missing`` are the
+    undelivered trials, or None if all were delivered. ``group`` is "" without groups or while it is sealed.
     """
 
     participant: str
@@ -62,7 +61,7 @@ class SessionFacts:
 
     @property
     def version(self) -> str:
-        """The study's version from the session's receipt, read on first use; "" if there is none."""
+        """The study's version in the session's receipt, or ""."""
         run = run_of(SessionFolder(self.folder, self.participant, self.session).receipt)
         return "" if run is None else run.version
 
@@ -96,11 +95,11 @@ class SessionFacts:
 def sessions(results: Path, answers_of: Mapping[str, int]) -> tuple[SessionFacts, ...]:
     """Return the sessions in all study folders under ``results``: first those that need attention, then the newest.
 
-    ``answers_of`` returns the number of answers in a complete session of a study. Folders without a study are skipped.
+    ``answers_of`` maps studies to the number of answers in a complete session. Folders without a study are skipped.
     """
     facts: list[SessionFacts] = []
     for data in sorted(results.glob("*/data")):
-        with contextlib.suppress(StoreError):  # not a study folder, or unreadable: the commands report why
+        with contextlib.suppress(StoreError):  # not a study folder, or unreadable, which the commands report
             rows = participant_rows(StudyFolder(data.parent))
             facts += session_facts(data.parent, rows, _exclusions(data.parent), answers_of)
     return tuple(sorted(facts, key=lambda session: (not session.needs_care, -session.started.timestamp())))
@@ -109,21 +108,21 @@ def sessions(results: Path, answers_of: Mapping[str, int]) -> tuple[SessionFacts
 def session_facts(
     study: Path, rows: Iterable[Mapping[str, Any]], listed: Iterable[Exclusion], answers_of: Mapping[str, int]
 ) -> list[SessionFacts]:
-    """Return the facts about a study's sessions; ``listed`` are the exclusions from the analysis."""
+    """Return the facts about a study's sessions; ``listed`` are the study's exclusions from the analysis."""
     reasons = {
         (exclusion.participant, exclusion.session): exclusion.reason for exclusion in listed if exclusion.trial is None
     }
-    placed = [(row, session_in(study, row["participant"], int(row["session"]))) for row in rows]
+    located = [(row, session_in(study, row["participant"], int(row["session"]))) for row in rows]
     counts = [
         journal.count_events(session.journal, "recording_lost", "device_reconnected", "outlet_lost")
-        for _, session in placed
+        for _, session in located
     ]
     return [
         SessionFacts(
             participant=row["participant"],
             session=int(row["session"]),
             study=str(row["study"]),
-            started=_start_time(_beginning_of(row, session), session.path),
+            started=_start_time(_recorded_start(row, session), session.path),
             status="running" if row["status"] == "unfinished" and is_open(session.path) else row["status"],
             validity=row["validity"],
             answers=int(row["responses"] or 0),
@@ -138,7 +137,7 @@ def session_facts(
             group=row.get("group") or "",
             missing=_missing_trials(session) if row.get(TRIALS_MISSING.name) else None,
         )
-        for (row, session), (lost, reconnected, outlets_lost) in zip(placed, counts, strict=True)
+        for (row, session), (lost, reconnected, outlets_lost) in zip(located, counts, strict=True)
     ]
 
 
@@ -149,7 +148,7 @@ def _missing_trials(session: SessionFolder) -> MissingTrials | None:
     return None
 
 
-def _beginning_of(row: Mapping[str, Any], session: SessionFolder) -> object:
+def _recorded_start(row: Mapping[str, Any], session: SessionFolder) -> object:
     """Return the start time of a session; for a pilot played from a later step, the time of playing."""
     if row["pilot"] and row["simulated"] and row.get("resumed"):
         with contextlib.suppress(StoreError):
@@ -183,10 +182,10 @@ def start_time_text(started: datetime, now: datetime) -> str:
 
 
 _Name: TypeAlias = Literal["participant", "study", "started", "status", "validity", "answers", "version"]
-_Chipped: TypeAlias = tuple[Tone, str, str]
+_ChipState: TypeAlias = tuple[Tone, str, str]
 """Tone, icon and word of a chip."""
 
-_STATUS: dict[str, _Chipped] = {
+_STATUS: dict[str, _ChipState] = {
     "completed": ("ok", "check", "Complete"),
     "incomplete": ("warn", "warning", "Incomplete"),
     "running": ("accent", "play", "Running"),
@@ -196,13 +195,13 @@ _STATUS: dict[str, _Chipped] = {
     "broken": ("bad", "warning", "Fault"),
     "damaged": ("bad", "warning", "Damaged"),
 }
-VALIDITY: dict[str | None, _Chipped] = {
+VALIDITY: dict[str | None, _ChipState] = {
     "valid": ("ok", "check", "Valid"),
     "invalid": ("warn", "warning", "Out of limits"),
     None: ("neutral", "ring", "Open"),
 }
-LOST: _Chipped = ("warn", "warning", "Recording lost")
-_MISSING: _Chipped = ("warn", "warning", "Trials missing")
+LOST: _ChipState = ("warn", "warning", "Recording lost")
+_MISSING: _ChipState = ("warn", "warning", "Trials missing")
 
 
 LIMIT_WORDS: Mapping[str, tuple[str, str]] = {
@@ -214,17 +213,17 @@ LIMIT_WORDS: Mapping[str, tuple[str, str]] = {
     "withheld_share": ("proportion of the force held back", "%"),
     "targets_reached": ("targets reached (minimum)", "%"),
 }
-"""Of every measure that a limit judges: what it is, and its unit."""
+"""The description and unit of every measure that has a limit."""
 
 
 def broken_limit_text(measure: str, value: float, limit: float) -> str:
     """Return a sentence about a violated limit."""
-    what, unit = LIMIT_WORDS[measure]
-    return f"{what}: {value:.3g} {unit}, limit {limit:g} {unit}"
+    description, unit = LIMIT_WORDS[measure]
+    return f"{description}: {value:.3g} {unit}, limit {limit:g} {unit}"
 
 
 class Column(NamedTuple):
-    """A column: its content, its heading, and its share of the width; at least ``least`` px."""
+    """A column: its content, its heading, its share of the width, and its minimum width ``least`` [px]."""
 
     name: _Name
     heading: str
@@ -232,13 +231,13 @@ class Column(NamedTuple):
     least: int
 
 
-def status_chip(facts: SessionFacts) -> _Chipped:
-    """Return the chip about a session's end."""
+def status_chip(facts: SessionFacts) -> _ChipState:
+    """Return the chip with the status of a session."""
     return _STATUS.get(facts.status, ("neutral", "ring", facts.status.capitalize()))
 
 
-def validity_chip(facts: SessionFacts) -> _Chipped:
-    """Return the chip about a session's limits and recordings, or its exclusion."""
+def validity_chip(facts: SessionFacts) -> _ChipState:
+    """Return the chip with the validity of a session, or its exclusion."""
     if facts.excluded is not None:
         return "neutral", "cross", "Excluded"
     if facts.validity != "invalid" and (facts.missing or facts.lost):
@@ -260,14 +259,14 @@ def answers_text(facts: SessionFacts) -> str:
 
 
 def session_filter(text: str, status: str) -> Callable[[SessionFacts], bool]:
-    """Return a predicate: participant or group contain ``text`` and the state is ``status`` ("" for any).
+    """Return a predicate: whether participant or group contain ``text`` and the state is ``status`` ("" for any).
 
     ``status`` is one of `_STATUS`, "excluded", "invalid" or "lost".
     """
-    wanted = text.strip().lower()
+    search_text = text.strip().lower()
 
     def matches(facts: SessionFacts) -> bool:
-        if wanted not in facts.participant.lower() and wanted not in facts.group.lower():
+        if search_text not in facts.participant.lower() and search_text not in facts.group.lower():
             return False
         if status == "excluded":
             return facts.excluded is not None
@@ -308,7 +307,7 @@ def step_title(protocol: Protocol, step: PageStep | FormStep, language: str) -> 
 
 
 def _form_title(protocol: Protocol, form: str, language: str) -> str:
-    """Return the title of a form, or its id as words."""
+    """Return the title of a form or, without one, its ID as words."""
     title = protocol.questionnaires[form].title
     return form.replace("_", " ").capitalize() if title is None else protocol.text(title, language)
 
@@ -328,7 +327,7 @@ class Extent:
 
     @property
     def duration(self) -> str:
-        """The expected duration, as a range over the kinds of sessions."""
+        """The expected duration as text, as a range if the kinds of sessions differ."""
         return duration_range(min(self.expected_s), max(self.expected_s))
 
 

@@ -57,10 +57,10 @@ from study_app.store.tables import SessionRows, participant_row, row_of
 class TrialRecord:
     """One presentation of a trial.
 
-    ``broken`` has a sentence for each violated limit; ``valid`` is None if nothing was measured; ``excluded`` is the
-    reason for its exclusion from the analysis, otherwise None. ``unconfirmed`` are choices on a page that was left
-    before they were confirmed, as "item: value": they are in no table. ``lost`` is the reason why the recording could
-    not be stored, or "".
+    ``words`` names what was presented. ``broken`` has a sentence for each violated limit; ``valid`` is None if nothing
+    was measured. ``excluded`` is the reason for the exclusion from the analysis, or None. ``unconfirmed`` are answers,
+    as "item: value", on a page that was left before they were confirmed; no table contains them. ``lost`` is the reason
+    why the recording could not be stored, or "".
     """
 
     number: int
@@ -102,14 +102,18 @@ def read_record(folder: Path) -> SessionRecord:
     lines = open_events(journal.read(session.journal), key)
     if not lines:
         raise StoreError(f"{session.journal} is empty: the session has not begun")
-    listed = exclusions(study.path)
-    (facts,) = session_facts(study.path, row_of(session, key), listed, {})
-    own = tuple(exclusion for exclusion in listed if exclusion.what[:2] == (facts.participant, facts.session))
+    study_exclusions = exclusions(study.path)
+    (facts,) = session_facts(study.path, row_of(session, key), study_exclusions, {})
+    session_exclusions = tuple(
+        exclusion for exclusion in study_exclusions if exclusion.what[:2] == (facts.participant, facts.session)
+    )
     start = start_of(lines)
     rows = SessionRows(lines).trials
     last = lines[-1]
     verdict = last.within_limits if key is None and isinstance(last, SessionEnded) else None
-    trials = _trial_records(rows, lines, start.limits, own, verdict=verdict, codes=key.codes if key else {})
+    trials = _trial_records(
+        rows, lines, start.limits, session_exclusions, verdict=verdict, codes=key.codes if key else {}
+    )
     return SessionRecord(
         facts=facts,
         about=_about_text(lines, incidents_text(facts)),
@@ -127,7 +131,7 @@ def read_record(folder: Path) -> SessionRecord:
             for path in sorted(session.path.rglob("*"))
             if path.is_file()
         ),
-        left_out=own,
+        left_out=session_exclusions,
     )
 
 
@@ -139,9 +143,9 @@ def _limits_sentence(
     sealed: bool,
     verdict: bool | None = None,
 ) -> str:
-    """Return sentences on undelivered trials and on trials within the study's limits.
+    """Return sentences about undelivered trials and about trials within the study's limits.
 
-    ``verdict`` is the recorded one on all limits of a ``sealed`` session, None if it has not been recorded.
+    ``verdict`` is the recorded verdict on all limits of a ``sealed`` session, or None if none was recorded.
     """
     lost = f"{_missing_sentence(missing, excluded=excluded)} " if missing.count else ""
     repeated = sum(trial.outcome == UNDELIVERED for trial in trials)
@@ -152,11 +156,11 @@ def _limits_sentence(
         else ""
     )
     delivered = [trial for trial in trials if trial.outcome != UNDELIVERED]
-    return f"{lost}{again}{_judged_sentence(delivered, sealed=sealed, verdict=verdict)}"
+    return f"{lost}{again}{_within_limits_sentence(delivered, sealed=sealed, verdict=verdict)}"
 
 
 def _missing_sentence(missing: MissingTrials, *, excluded: bool) -> str:
-    """Return sentences on undelivered trials, with reasons, and whether the session is included."""
+    """Return sentences about undelivered trials, with reasons, and whether the session is included."""
     permitted = missing.limits.get(MISSING_PERCENT)
     states = f" The study allows up to {permitted:g} % of the trials to be missing." if permitted is not None else ""
     if missing.exceed:
@@ -165,7 +169,7 @@ def _missing_sentence(missing: MissingTrials, *, excluded: bool) -> str:
     return f"{missing}. These trials were not answered.{states}"
 
 
-def _judged_sentence(trials: Sequence[TrialRecord], *, sealed: bool, verdict: bool | None) -> str:
+def _within_limits_sentence(trials: Sequence[TrialRecord], *, sealed: bool, verdict: bool | None) -> str:
     judged = [trial for trial in trials if trial.valid is not None]
     outside = [trial for trial in judged if not trial.valid]
     if verdict is False and not outside:
@@ -193,14 +197,14 @@ def _trial_records(
     verdict: bool | None,
     codes: Codes,
 ) -> tuple[TrialRecord, ...]:
-    """Return the records of trials; which trial broke a limit is open if only the session's ``verdict`` is known."""
+    """Return the records of trials; if only the session's ``verdict`` is known, each trial's validity is open."""
     reasons = {exclusion.trial: exclusion.reason for exclusion in own}
     is_hidden = verdict is False and all(row["valid"] is not False for row in rows)
     answered: dict[tuple[int, int], int] = {}
     unconfirmed = progress_of(lines).unconfirmed
     for row in SessionRows(lines).responses:
-        which = (row["trial"], row["attempt"])
-        answered[which] = answered.get(which, 0) + (row["first_choice_s"] is not None)
+        presentation = (row["trial"], row["attempt"])
+        answered[presentation] = answered.get(presentation, 0) + (row["first_choice_s"] is not None)
     return tuple(
         TrialRecord(
             number=row["trial"],
@@ -219,30 +223,30 @@ def _trial_records(
     )
 
 
-def _choice_texts(given: Mapping[str, Answer]) -> tuple[str, ...]:
-    """Return answers as "item: value", in the order of the first answers."""
-    chosen = sorted(given.items(), key=lambda entry: entry[1].first_s or 0.0)
-    return tuple(f"{item}: {'cannot judge' if answer.value is None else answer.value}" for item, answer in chosen)
+def _choice_texts(answers: Mapping[str, Answer]) -> tuple[str, ...]:
+    """Return answers as "item: value", in the order in which they were first answers."""
+    in_order = sorted(answers.items(), key=lambda entry: entry[1].first_s or 0.0)
+    return tuple(f"{item}: {'cannot judge' if answer.value is None else answer.value}" for item, answer in in_order)
 
 
 def _row_note_texts(row: Mapping[str, Any]) -> list[str]:
     late = late_device_text(row)
-    said = [("recording lost", row["recording_lost"]), (late, late), ("marked", row["marked"])]
-    return [word for word, holds in said if holds] + (row["notes"] or "").splitlines()
+    notes = [("recording lost", row["recording_lost"]), (late, late), ("marked", row["marked"])]
+    return [text for text, applies in notes if applies] + (row["notes"] or "").splitlines()
 
 
 def _setting_text(row: Mapping[str, Any], codes: Codes) -> str:
-    """Return what a trial presented: "Part 1, L2", "Part 1, L2: thick" with opened ``codes``, "Practice, attempt 2"."""
+    """Return what a trial presented, with opened ``codes`` if any: "Part 1, L2", "Part 1, L2: thick, attempt 2"."""
     name = codes.get(row["block"], {}).get(row["code"])
     phase = f"Part {row['part']}" if row["part"] is not None else str(row["phase"]).capitalize()
     again = "" if row["attempt"] == 1 else f", attempt {row['attempt']}"
     return f"{phase}, {row['code']}{f': {name}' if name else ''}{again}"
 
 
-def _about_text(lines: Sequence[Event], happened: str) -> str:
+def _about_text(lines: Sequence[Event], incidents: str) -> str:
     start, row = start_of(lines), participant_row(lines)
     ended = row["session_ended_at"]
-    said = [
+    parts = [
         f"group {start.group}" if start.group is not None else "",
         f"device {start.device}",
         f"language {row['language']}",
@@ -250,26 +254,26 @@ def _about_text(lines: Sequence[Event], happened: str) -> str:
         f"seed {start.seed}",
         f"ended {_clock_time(ended)}" if ended else "not ended",
         counted(row["resumed"], "resume") if row["resumed"] else "",
-        happened,
+        incidents,
     ]
-    return capitalised("  ·  ".join(filter(None, said)))
+    return capitalised("  ·  ".join(filter(None, parts)))
 
 
-def _clock_time(written: str) -> str:
-    """Return a recorded time as hours and minutes of this computer's time zone."""
-    return f"{datetime.fromisoformat(written).astimezone():%H:%M}"
+def _clock_time(recorded: str) -> str:
+    """Return a recorded time as hours and minutes in the time zone of this computer."""
+    return f"{datetime.fromisoformat(recorded).astimezone():%H:%M}"
 
 
 def _note_texts(lines: Sequence[Event]) -> list[str]:
     trial, notes = None, []
     for line in lines:
-        if isinstance(line, TrialStarted):  # recordings of the trial before are reported later
+        if isinstance(line, TrialStarted):  # also for notes on its recording, which come later
             trial = line.trial
         if not isinstance(line, Note | Repeat):
             continue
         text = f"repeated: {line.reason}" if isinstance(line, Repeat) else line.text or "marked"
-        where = "before the first trial" if trial is None else f"trial {trial}"
-        notes.append(f"{_clock_time(line.at)}, {where}: {text}")
+        position = "before the first trial" if trial is None else f"trial {trial}"
+        notes.append(f"{_clock_time(line.at)}, {position}: {text}")
     return notes
 
 
@@ -279,7 +283,7 @@ _SIZE = (1040, 700)
 
 
 def _trial_cell(trial: TrialRecord, heading: str) -> dict[int, Any]:
-    """Return the values of a trial's cell under a heading, by their roles."""
+    """Return the values of the cell in a trial's row under a heading, by their roles."""
     chip = _trial_chip(trial)
     text = {
         "Trial": str(trial.number),
@@ -298,31 +302,31 @@ def _trial_cell(trial: TrialRecord, heading: str) -> dict[int, Any]:
 
 
 def _trial_chip(trial: TrialRecord) -> Any:
-    """Return the chip about a trial's limits, or its exclusion."""
+    """Return the chip with the validity of a trial, or its exclusion."""
     if trial.excluded is not None:
         return "neutral", "cross", "Excluded"
     return VALIDITY[None if trial.valid is None else "valid" if trial.valid else "invalid"]
 
 
 def _trial_limits_text(trial: TrialRecord) -> str:
-    """Return a line about a trial's limits."""
-    said = f"Trial {trial.number}: "
+    """Return a line about a trial's exclusion, limits, recording and unconfirmed answers."""
+    text = f"Trial {trial.number}: "
     if trial.excluded is not None:
-        said += f"excluded from the analysis ({trial.excluded}); "
+        text += f"excluded from the analysis ({trial.excluded}); "
     if trial.broken:
-        said += "; ".join(trial.broken) + "."
+        text += "; ".join(trial.broken) + "."
     else:
-        said += "whether it met the limits is not known yet." if trial.valid is None else "within all limits."
+        text += "whether it met the limits is not known yet." if trial.valid is None else "within all limits."
     if trial.lost:
-        said += f" The recording was lost: {trial.lost}."
+        text += f" The recording was lost: {trial.lost}."
     if trial.unconfirmed:
         answers = ", ".join(trial.unconfirmed)
-        said += f" These answers were chosen but not confirmed, so they are not in the tables: {answers}."
-    return said
+        text += f" These answers were chosen but not confirmed, so they are not in the tables: {answers}."
+    return text
 
 
 class SessionPage(Themed, QDialog):
-    """The complete record of one session, read in a thread; ``watched`` is the window of the last watched trial."""
+    """The dialog with the record of a session, which is read in a thread; ``watched`` is the last replay's window."""
 
     def __init__(self, parent: QWidget, theme: Theme, facts: SessionFacts, opener: Callable[[Path], object]) -> None:
         super().__init__(parent)
@@ -347,8 +351,8 @@ class SessionPage(Themed, QDialog):
         self.close_button = ActionButton("", "Close", role="primary", height=40)
         self._lay_out()
         self.trials.selectionModel().selectionChanged.connect(lambda *_changes: self._choose_trial())
-        for asks in (self.watch.clicked, self.trials.opened):
-            asks.connect(self._open_watch_window)
+        for signal in (self.watch.clicked, self.trials.opened):
+            signal.connect(self._open_watch_window)
         self.folder.clicked.connect(lambda: opener(facts.folder))
         self.close_button.clicked.connect(self.accept)
         for button in (self.watch, self.folder):
@@ -428,14 +432,14 @@ class SessionPage(Themed, QDialog):
         set_ink(self.trial, "warn" if trial.broken else "text2")
 
     def _open_watch_window(self) -> None:
-        from study_app.gui.watch.window import WatchWindow  # noqa: PLC0415 - pyqtgraph: only once it is needed
+        from study_app.gui.watch.window import WatchWindow  # noqa: PLC0415 - imports pyqtgraph, so only on demand
 
         if (trial := self.chosen) is not None:
-            self.watched = made = WatchWindow(
+            self.watched = window = WatchWindow(
                 self, self.theme, self.facts.folder, trial.number, attempt=trial.attempt, presented=trial.words
             )
-            made.finished.connect(made.deleteLater)
-            made.open()
+            window.finished.connect(window.deleteLater)
+            window.open()
 
 
 def _size_text(size: int) -> str:

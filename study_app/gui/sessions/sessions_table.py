@@ -1,4 +1,4 @@
-"""A table of sessions: who, which study, when, how it ended, whether it kept to the limits, how much of it is there."""
+"""The table of sessions: participant, study, start, status, validity and answers."""
 
 from collections.abc import Callable, Sequence
 from datetime import datetime
@@ -25,15 +25,15 @@ _ROLE = Qt.ItemDataRole
 
 
 def _session_cell(facts: SessionFacts, name: str, now: datetime) -> dict[int, Any]:
-    """Return the values of a session's cell in the named column, by their roles."""
+    """Return the values of a session's cell in the column ``name``, by their roles."""
     chip = {"status": status_chip, "validity": validity_chip}.get(name)
     incident = "device reconnected" if facts.reconnected else "outlet failed" if facts.outlets_lost else ""
     missing = facts.missing
     incident = missing.brief if missing else incident
     below = {"participant": facts.group, "status": incident, "study": facts.kind}.get(name, "")
     began = start_time_text(facts.started, now)
-    said = f"{facts.name}: began {began}, {answers_text(facts)} answers"
-    tip, face = ", ".join(filter(None, (said, str(missing or ""), incidents_text(facts)))), None
+    summary = f"{facts.name}: began {began}, {answers_text(facts)} answers"
+    tip, face = ", ".join(filter(None, (summary, str(missing or ""), incidents_text(facts)))), None
     match name:
         case "participant":
             text, face = facts.name, font("label", weight=600, scale=1.08)
@@ -61,10 +61,10 @@ def _session_cell(facts: SessionFacts, name: str, now: datetime) -> dict[int, An
 
 
 class SessionsTable(QWidget):
-    """The table of sessions, or a sentence in its place; ``opened`` carries the `SessionFacts` of a row.
+    """The table of sessions, or a sentence if there are none; ``opened`` carries the `SessionFacts` of a row.
 
-    ``version_asked`` carries those of the row whose version was clicked; ``chosen_changed`` is emitted when another
-    row, or none, is selected.
+    ``version_asked`` carries those of a row whose version was clicked; ``chosen_changed`` is emitted when another row,
+    or none, is selected.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ class SessionsTable(QWidget):
     def __init__(self, columns: Sequence[Column], none: str) -> None:
         super().__init__()
         self._names = [column.name for column in columns]
-        self._every: tuple[SessionFacts, ...] = ()
+        self._sessions: tuple[SessionFacts, ...] = ()
         self._matches: Callable[[SessionFacts], bool] = lambda _facts: True
         self._now = datetime.now().astimezone()
         headings: dict[str, str] = {column.name: column.heading for column in columns}
@@ -90,8 +90,8 @@ class SessionsTable(QWidget):
         self.table.opened.connect(lambda index: self.opened.emit(self.shown[index.row()]))
         self.table.clicked.connect(self._open_version)
         self.table.selectionModel().selectionChanged.connect(lambda *_changes: self.chosen_changed.emit())
-        self.model.modelReset.connect(self._show_whether_empty)
-        self._show_whether_empty()
+        self.model.modelReset.connect(self._update_visibility)
+        self._update_visibility()
 
     @property
     def shown(self) -> tuple[SessionFacts, ...]:
@@ -103,17 +103,17 @@ class SessionsTable(QWidget):
         return None if row is None else self.shown[row]
 
     def show_rows(self, sessions: Sequence[SessionFacts], now: datetime) -> None:
-        """Show these sessions as far as they match the filter, keeping the selection."""
-        self._every, self._now = tuple(sessions), now
+        """Show the sessions that match the filter, and keep the selection."""
+        self._sessions, self._now = tuple(sessions), now
         self.show_matching(self._matches)
 
     def show_matching(self, matches: Callable[[SessionFacts], bool]) -> None:
         """Show only matching sessions from now on."""
-        before, self._matches = self.chosen, matches
-        self.model.show(filter(matches, self._every))
-        places = [session.folder for session in self.shown]
-        if before is not None and before.folder in places:
-            self.table.selectRow(places.index(before.folder))
+        selected, self._matches = self.chosen, matches
+        self.model.show(filter(matches, self._sessions))
+        folders = [session.folder for session in self.shown]
+        if selected is not None and selected.folder in folders:
+            self.table.selectRow(folders.index(selected.folder))
         self.chosen_changed.emit()
 
     def open_chosen(self) -> None:
@@ -128,6 +128,6 @@ class SessionsTable(QWidget):
         if self._names[index.column()] == "version":
             self.ask_for_version()
 
-    def _show_whether_empty(self) -> None:
+    def _update_visibility(self) -> None:
         self.none.setVisible(not self.shown)
         self.table.setVisible(bool(self.shown))

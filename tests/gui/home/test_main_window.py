@@ -42,7 +42,7 @@ def test_one_begins_at_the_first_place_goes_by_the_rail_and_a_session_and_the_en
     assert (main.here, log) == ("home", ["enter home"])
     qtbot.mouseClick(main.rail.buttons["lab"], Qt.MouseButton.LeftButton)
     assert (main.here, log[1:]) == ("lab", ["leave home", "enter lab"])
-    assert [name for name, button in main.rail.buttons.items() if button.here] == ["lab"]
+    assert [name for name, button in main.rail.buttons.items() if button.is_current] == ["lab"]
     for narrow, words in ((True, "Dark"), (False, "Dark theme")):
         main.rail.set_narrow(narrow)
         assert (main.rail.switch.text(), main.rail.switch.accessibleName()) == (words, "Dark theme")
