@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from study_app.gui.display_check import missing_for_windows
+from study_app.gui.display_check import missing_window_library
 
-needs_window_system = pytest.mark.skipif(bool(missing_for_windows()), reason=missing_for_windows())
+needs_window_system = pytest.mark.skipif(bool(missing_window_library()), reason=missing_window_library())
 
 
 def _can_link() -> bool:

@@ -15,7 +15,7 @@ from contextlib import contextmanager
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from study_app.gui.display_check import naming_missing_library
+from study_app.gui.display_check import report_missing_library
 
 
 @contextmanager
@@ -42,7 +42,7 @@ def __getattr__(name: str) -> Any:
     """Load the main window or the session on first access: neither needs the other to open."""
     if name not in _MODULES:
         raise AttributeError(name)
-    with naming_missing_library(), _without_collections():
+    with report_missing_library(), _without_collections():
         return getattr(import_module(f"{__name__}.{_MODULES[name]}"), name)
 
 

@@ -122,7 +122,7 @@ def _write_report(study: Path, to: Path) -> list[str]:
 def _show_results(study: Path) -> int:
     """Open the program on the results and return its exit code; or print how to open it, and return 0."""
     from study_app.errors import DisplayError
-    from study_app.gui.display_check import check_display, missing_for_windows
+    from study_app.gui.display_check import check_display, missing_window_library
 
     platform = os.environ.get("QT_QPA_PLATFORM", "").partition(":")[0]
     try:
@@ -134,6 +134,6 @@ def _show_results(study: Path) -> int:
             return int(app.run_home_window(then=lambda visit: visit.show_study(study)))
         reason = f"QT_QPA_PLATFORM={platform} does not show windows"
     except DisplayError as error:
-        reason = missing_for_windows() or str(error)
+        reason = missing_window_library() or str(error)
     click.echo(f"The program was not opened: {reason}; open it later with: liquid-study")
     return 0

@@ -1,7 +1,7 @@
 """The windows of operator and participant.
 
-Windows show frozen values and emit signals; they open no file and compute no statistics. Read ``kit.fields`` (what is
-edited), ``kit.commands`` (actions) and ``theme.themed`` (colours) first, then a folder as an example, such as ``home``.
+Windows show immutable values and emit signals; they open no file and compute no statistics. Read ``kit.fields``
+(forms), ``kit.commands`` (actions) and ``theme.themed`` (colours) first, then a folder such as ``home``.
 
 Reading order: display, display_check, key_presses, theme; application, widgets; help, kit, participant,
 startup_window; devices, lab, settings, watch; sessions; home, operator, preflight, results.

@@ -1,4 +1,4 @@
-"""The one Qt application of this program, made when the first window is asked for."""
+"""The program's only Qt application, created when the first window is needed."""
 
 import ctypes
 import os
@@ -14,7 +14,7 @@ from study_app.gui.theme.icons import logo
 from study_app.gui.theme.theme import LIGHT
 
 _SWITCH_INTERVAL_S = 0.0005
-"""How long another thread keeps Python's lock from the windows' thread, which takes it again after each call of Qt."""
+"""How long another thread may keep the interpreter lock while the GUI thread waits for it after a Qt call."""
 
 
 def application_here() -> QApplication:
@@ -27,7 +27,7 @@ def application_here() -> QApplication:
     os.environ.setdefault(
         "MESA_SHADER_CACHE_DISABLE", "true"
     )  # its idle thread delays the program's exit by seconds under load
-    if sys.platform == "win32":  # else the taskbar shows Python's icon
+    if sys.platform == "win32":  # otherwise the taskbar shows Python's icon
         ctypes.windll.shell32.SetCurrentProcessExplicitAppUserModelID("LiquidStudy")
     QGuiApplication.setHighDpiScaleFactorRoundingPolicy(Qt.HighDpiScaleFactorRoundingPolicy.PassThrough)
     application = QApplication(["liquid-study"])

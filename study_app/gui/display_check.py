@@ -1,6 +1,6 @@
-"""Whether a window can be opened here, found out before Qt is asked: it would end the program without a word.
+"""Check whether a window can be opened before Qt is loaded: without a display, Qt aborts the program.
 
-Nothing in this file imports Qt.
+This module must not import Qt.
 """
 
 import ctypes
@@ -31,10 +31,10 @@ def check_display(environment: Mapping[str, str] = os.environ, platform: str = s
     """
     if platform != "linux":
         return
-    wanted = environment.get("QT_QPA_PLATFORM", "").partition(":")[0]
-    if wanted not in {"", "xcb"}:
+    plugin = environment.get("QT_QPA_PLATFORM", "").partition(":")[0]
+    if plugin not in {"", "xcb"}:
         return  # offscreen, wayland, vnc …: requested by name, so Qt reports its own errors
-    if wanted == "" and environment.get("WAYLAND_DISPLAY"):
+    if plugin == "" and environment.get("WAYLAND_DISPLAY"):
         return
     display = environment.get("DISPLAY", "")
     if not display:
@@ -46,10 +46,10 @@ def check_display(environment: Mapping[str, str] = os.environ, platform: str = s
     _connect_to_display(display)
 
 
-def missing_for_windows() -> str:
-    """Return the system library that Qt's X11 plugin lacks and its package, even without a display, or ""."""
+def missing_window_library() -> str:
+    """Return a message about the system library that Qt's X11 plugin lacks, or "". No display is needed."""
     try:
-        if _platform_is_linux():
+        if _is_linux():
             _load_plugin()
     except DisplayError as error:
         return str(error)
@@ -59,7 +59,7 @@ def missing_for_windows() -> str:
 def missing_library(error: OSError | ImportError) -> DisplayError:
     """Return the error about a system library that Qt could not load."""
     library = str(error).partition(":")[0]
-    if _platform_is_linux():
+    if _is_linux():
         return DisplayError(
             f"Qt cannot be loaded: {library} is missing on this system; on Debian or Ubuntu, run "
             f"sudo apt install {PACKAGES} ({_NEEDS_NO_DISPLAY})"
@@ -68,8 +68,8 @@ def missing_library(error: OSError | ImportError) -> DisplayError:
 
 
 @contextmanager
-def naming_missing_library() -> Iterator[None]:
-    """Name the missing system library if an import within the block needs one.
+def report_missing_library() -> Iterator[None]:
+    """Raise an import error of the block as a DisplayError that names the missing system library.
 
     Raises
     ------
@@ -82,13 +82,12 @@ def naming_missing_library() -> Iterator[None]:
         raise missing_library(missing) from missing
 
 
-def _platform_is_linux() -> bool:
-    """Return whether system libraries are Linux packages on this system."""
+def _is_linux() -> bool:
     return sys.platform == "linux"
 
 
 def _load_plugin() -> None:
-    """Load Qt's X11 plugin as Qt would, to find out which library is missing."""
+    """Load Qt's X11 plugin as Qt would; raise DisplayError if a library is missing."""
     package = importlib.util.find_spec("PySide6")
     if package is None or package.origin is None:
         raise DisplayError("PySide6 is not installed: reinstall liquid-study with pip")

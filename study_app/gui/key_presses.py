@@ -14,14 +14,16 @@ from PySide6.QtWidgets import QWidget
 
 RELEASE_MS: Final = 30  # a release is real unless a press with its time stamp follows within this time
 CLICK_MS: Final = 250  # time during which a new page ignores clicks
-_MOVING: Final = frozenset({
+_REPEATING_KEYS: Final = frozenset({
     Qt.Key.Key_Left, Qt.Key.Key_Right, Qt.Key.Key_Up, Qt.Key.Key_Down, Qt.Key.Key_PageUp, Qt.Key.Key_PageDown,
     Qt.Key.Key_Backspace, Qt.Key.Key_Delete,
 })  # fmt: skip
-_ONCE: Final = frozenset({Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_Escape, Qt.Key.Key_Tab, Qt.Key.Key_Backtab})
-"""Keys that are pressed once in text fields as well."""
+_SINGLE_KEYS: Final = frozenset(
+    {Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_Escape, Qt.Key.Key_Tab, Qt.Key.Key_Backtab}
+)
+"""Keys that do not repeat, even in text fields."""
 _SHIELD: Final = Qt.WidgetAttribute.WA_TransparentForMouseEvents
-_SHIFTING: Final = (
+_MODIFIERS: Final = (
     Qt.KeyboardModifier.ShiftModifier
     | Qt.KeyboardModifier.ControlModifier
     | Qt.KeyboardModifier.AltModifier
@@ -49,15 +51,15 @@ class KeyPresses(QObject):
         self._window: QWindow | None = None
         self._receivers: dict[int, QObject | None] = {}  # the delivered presses by key
         self._release: _Release | None = None  # the last release, until it is known to be real
-        self._sent: QKeyEvent | None = None  # the event that this filter is sending
-        self._settling = QTimer(self, singleShot=True, interval=RELEASE_MS)
-        # An overdue timer may come before a press that waits in the queue; a timer without a time comes after it.
-        self._settling.timeout.connect(lambda: QTimer.singleShot(0, self, self._deliver_if_due))
+        self._event_sent: QKeyEvent | None = None  # the event that this filter is sending
+        self._release_timer = QTimer(self, singleShot=True, interval=RELEASE_MS)
+        # An overdue timer may fire before a queued press; a zero timer fires after it.
+        self._release_timer.timeout.connect(lambda: QTimer.singleShot(0, self, self._deliver_if_due))
         application.focusWindowChanged.connect(self._watch_window)
         self._watch_window(application.focusWindow())
 
     def begin_page(self, page: QWidget) -> None:
-        """Ignore keys held and clicks made before ``page`` appeared; clicks for 250 ms."""
+        """Ignore keys that are still held from the previous page, and clicks within 250 ms."""
         self._receivers.clear()
         page.setAttribute(_SHIELD)
         unshield = QTimer(page, singleShot=True, interval=CLICK_MS)
@@ -66,19 +68,19 @@ class KeyPresses(QObject):
         QTimer.singleShot(0, unshield, unshield.start)  # once the page is painted
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        if not isinstance(event, QKeyEvent) or event is self._sent:
+        if not isinstance(event, QKeyEvent) or event is self._event_sent:
             return False
         if event.type() == QEvent.Type.KeyRelease:
-            return self._hold_back(event)
+            return self._hold_release(event)
         if event.type() not in {QEvent.Type.KeyPress, QEvent.Type.ShortcutOverride}:
             return False
         key = _physical_key(event)
-        repeats = event.isAutoRepeat() or self._is_repeat(key, event)
+        repeats = event.isAutoRepeat() or self._is_key_repeat(key, event)
         if not repeats:
             self._deliver_release()
         if event.type() == QEvent.Type.ShortcutOverride:
             if repeats:
-                event.accept()  # not a shortcut's
+                event.accept()  # so that no shortcut acts
             else:
                 self._receivers.pop(key, None)
             return repeats
@@ -97,7 +99,7 @@ class KeyPresses(QObject):
             window.installEventFilter(self)
         self._window = window
 
-    def _is_repeat(self, key: int, event: QKeyEvent) -> bool:
+    def _is_key_repeat(self, key: int, event: QKeyEvent) -> bool:
         release = self._release
         return release is not None and release.key == key and release.event.timestamp() == event.timestamp()
 
@@ -106,27 +108,27 @@ class KeyPresses(QObject):
         receiver = QGuiApplication.focusObject()
         if receiver is None or self._receivers.get(key) is not receiver:
             return
-        if event.key() in _MOVING or (event.key() not in _ONCE and _takes_text(receiver)):
-            self._send_event(window, _marked_repeat(event))
+        if event.key() in _REPEATING_KEYS or (event.key() not in _SINGLE_KEYS and _accepts_text(receiver)):
+            self._send_event(window, _as_repeat(event))
 
-    def _hold_back(self, event: QKeyEvent) -> bool:
-        """Hold a release until it is known to be real; pass on releases that no keyboard caused."""
+    def _hold_release(self, event: QKeyEvent) -> bool:
+        """Hold back a release until it is known to be real; pass on releases that no keyboard caused."""
         if event.isAutoRepeat():
             return True
         self._deliver_release()
         if event.nativeScanCode():
             self._release = _Release(_physical_key(event), event.clone())
-            self._settling.start()
+            self._release_timer.start()
             return True
         self.changed.emit(self._window, event)
         return False
 
     def _deliver_if_due(self) -> None:
-        if not self._settling.isActive():
+        if not self._release_timer.isActive():
             self._deliver_release()
 
     def _deliver_release(self) -> None:
-        """Deliver a release that turned out to be real."""
+        """Deliver the release that was held back, if any."""
         release, self._release = self._release, None
         if release is None:
             return
@@ -137,30 +139,30 @@ class KeyPresses(QObject):
             self._send_event(window, release.event)
 
     def _send_event(self, window: QObject, event: QKeyEvent) -> None:
-        self._sent = event
+        self._event_sent = event
         QGuiApplication.sendEvent(window, event)
-        self._sent = None
+        self._event_sent = None
 
 
 def key_presses() -> KeyPresses:
-    """Return the application's filter, creating it on first use."""
+    """Return the application's key filter, creating it on first use."""
     application = QGuiApplication.instance()
     assert isinstance(application, QGuiApplication)  # noqa: S101  # windows need one
     return application.findChild(KeyPresses) or KeyPresses(application)
 
 
 def ignores_clicks(page: QWidget) -> bool:
-    """Return whether ``page`` is so new that a click was meant for the previous page."""
+    """Return whether ``page`` is so new that a click must have been meant for the previous page."""
     return page.testAttribute(_SHIELD)
 
 
 def digit_of(event: QKeyEvent) -> int | None:
-    """Return the digit of a key, also in layouts that type digits with Shift; None for other keys."""
+    """Return the digit on a key, also in layouts that need Shift for digits; None for other keys."""
     if Qt.Key.Key_0 <= event.key() <= Qt.Key.Key_9:
         return event.key() - Qt.Key.Key_0
-    first = 2 if QGuiApplication.platformName() == "windows" else 10  # scan code of the key 1: PC, X11 and Wayland
-    place = event.nativeScanCode() - first
-    return (place + 1) % 10 if 0 <= place < 10 and not event.modifiers() & _SHIFTING else None
+    first_code = 2 if QGuiApplication.platformName() == "windows" else 10  # scan code of the key 1: PC; X11 and Wayland
+    position = event.nativeScanCode() - first_code
+    return (position + 1) % 10 if 0 <= position < 10 and not event.modifiers() & _MODIFIERS else None
 
 
 def _physical_key(event: QKeyEvent) -> int:
@@ -168,14 +170,14 @@ def _physical_key(event: QKeyEvent) -> int:
     return event.nativeScanCode() or -event.key()
 
 
-def _takes_text(receiver: QObject) -> bool:
+def _accepts_text(receiver: QObject) -> bool:
     return isinstance(receiver, QWidget) and receiver.testAttribute(Qt.WidgetAttribute.WA_InputMethodEnabled)
 
 
-def _marked_repeat(event: QKeyEvent) -> QKeyEvent:
-    made = QKeyEvent(
+def _as_repeat(event: QKeyEvent) -> QKeyEvent:
+    repeat = QKeyEvent(
         event.type(), event.key(), event.modifiers(), event.nativeScanCode(), event.nativeVirtualKey(),
         event.nativeModifiers(), event.text(), True, event.count(),
     )  # fmt: skip
-    made.setTimestamp(event.timestamp())
-    return made
+    repeat.setTimestamp(event.timestamp())
+    return repeat

@@ -1,4 +1,4 @@
-"""What is shown while a session is being made ready: what is going on, and a way back. Never a frozen window."""
+"""The window shown while a session starts, so that the program never looks frozen."""
 
 import time
 from collections.abc import Callable
@@ -36,40 +36,39 @@ class OpeningWindow(QWidget):
         self.setProperty("role", "window")
         self.setFixedSize(560, 260)
         self.step = label(_STEP, "body", "text2", wraps=True)
-        self.lasted = figures("", "label", "text2")
+        self.elapsed = figures("", "label", "text2")
         self.cancel = ActionButton("", "Cancel")
         self.cancel.clicked.connect(self.close)
-        bar = self._bar = QProgressBar()
-        bar.setRange(0, 0)
-        bar.setTextVisible(False)
-        bar.setFixedHeight(8)
+        self._bar = QProgressBar(textVisible=False)
+        self._bar.setRange(0, 0)
+        self._bar.setFixedHeight(8)
         head = hbox(Logo(40), (vbox(label(title, "card"), label(who, "label", "text2"), spacing=2), 1), spacing=14)
-        foot = hbox(self.cancel, STRETCH, self.lasted)
-        vbox(head, (self.step, 1), bar, foot, spacing=14, margins=(28, 24, 28, 24), parent=self)
-        self._now_s, self._since_s = now_s, now_s()
+        foot = hbox(self.cancel, STRETCH, self.elapsed)
+        vbox(head, (self.step, 1), self._bar, foot, spacing=14, margins=(28, 24, 28, 24), parent=self)
+        self._now_s, self._started_s = now_s, now_s()
         self._timer = QTimer(self)
         self._timer.timeout.connect(self._show_elapsed)
         self._timer.start(250)
         self._done = False
-        self._said = False
+        self._request_shown = False
         apply_theme(self, theme)
         give_role(self, QAccessible.Role.Window)
 
     def _show_elapsed(self) -> None:
-        seconds = self._now_s() - self._since_s
-        self.lasted.setText(clock_text(seconds))
-        if seconds > LONG_AFTER_S and not self._said:
+        seconds = self._now_s() - self._started_s
+        self.elapsed.setText(clock_text(seconds))
+        if seconds > LONG_AFTER_S and not self._request_shown:
             self.step.setText(FIRST_TIME)
 
     def show_compiled(self, share: float) -> None:
-        if not self._said:
+        if not self._request_shown:
             self.step.setText(FIRST_TIME)
         self._bar.setRange(0, 100)
         self._bar.setValue(round(100 * share))
 
     def show_line(self, line: str) -> None:
-        """Show the device's request in place of the progress."""
-        self._said = True
+        """Show what the device asks for, in place of the progress."""
+        self._request_shown = True
         self.step.setText(line)
 
     def finish(self) -> None:

@@ -7,7 +7,7 @@ import pytest
 
 from study_app.app.main_controller import MainController
 from study_app.app.session.preflight_controller import ComputerCheck
-from study_app.gui.preflight.window import OF_THE_COMPUTER
+from study_app.gui.preflight.window import COMPUTER_CHECK_NAMES
 from tests.compiled import needs_servo
 
 pytestmark = [pytest.mark.slow, needs_servo]
@@ -24,7 +24,7 @@ def test_the_machines_place_opens_it_and_it_measures_this_computer(visit: MainCo
     assert not check.window.back.isEnabled()
     qtbot.waitUntil(lambda: bool(check.window.rows), timeout=120_000)
     names = [row.check.name for row in check.window.rows]
-    assert names == [*OF_THE_COMPUTER, "Haptic devices", "Compiled code"]
+    assert names == [*COMPUTER_CHECK_NAMES, "Haptic devices", "Compiled code"]
     assert check.window.state.text().endswith("of 8 passed.")
     check.window.back.click()
     assert not check.window.back.isEnabled()

@@ -12,12 +12,12 @@ from PySide6.QtWidgets import QWidget
 
 from study_app.errors import DisplayError
 
-_FRAME_LOOKS_MS = (300, 1000, 3000)  # delay before measuring a window manager's frame around a new window
+_FRAME_CHECKS_MS = (300, 1000, 3000)  # when the window manager's frame around a new window is measured
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ScreenShown:
-    """A screen as reported by the system: sizes in logical pixels and, if known (else 0), in millimetres."""
+    """A screen as reported by the system: its size in logical pixels and in millimetres (0 if unknown)."""
 
     number: int
     name: str
@@ -87,47 +87,43 @@ def describe_screen(screen: QScreen) -> dict[str, Any]:
 
 
 def place_window(window: QWidget, screen: QScreen, *, corner: bool) -> None:
-    """Give ``window`` its size, at most the screen's, in the centre or the lower right corner.
+    """Place ``window`` in the centre or the lower right corner of a screen, no larger than the screen.
 
-    The system's frame is unknown before the window is shown, and on a busy machine for some time after; then the window
-    makes room for it.
+    The window manager's frame is known only some time after the window is shown; the window is then moved so that the
+    frame fits, too.
     """
-    room = screen.availableGeometry()
     window.setScreen(screen)
-    window.setGeometry(_rectangle_inside(window, room, corner=corner))
-    for after_ms in _FRAME_LOOKS_MS:
-        QTimer.singleShot(after_ms, window, partial(_make_room_for_frame, window, corner=corner))
+    window.setGeometry(_rectangle_inside(window, screen.availableGeometry(), corner=corner))
+    for after_ms in _FRAME_CHECKS_MS:
+        QTimer.singleShot(after_ms, window, partial(_fit_frame, window, corner=corner))
 
 
-def _make_room_for_frame(window: QWidget, *, corner: bool = False) -> None:
-    """Move ``window`` with its frame completely onto its screen, below its minimum size if necessary."""
-    room, outer, inner = window.screen().availableGeometry(), window.frameGeometry(), window.geometry()
-    if window.isFullScreen() or window.isMaximized() or room.contains(outer):
+def _fit_frame(window: QWidget, *, corner: bool = False) -> None:
+    """Move ``window`` and its frame completely onto its screen, reducing the minimum size if necessary."""
+    area, outer, inner = window.screen().availableGeometry(), window.frameGeometry(), window.geometry()
+    if window.isFullScreen() or window.isMaximized() or area.contains(outer):
         return
-    before, after = inner.topLeft() - outer.topLeft(), inner.bottomRight() - outer.bottomRight()
-    room = QRect(room.topLeft() + before, room.bottomRight() + after)
-    least = (window.minimumSize() - (outer.size() - inner.size())).expandedTo(
-        window.minimumSize().boundedTo(room.size())
+    top_left, bottom_right = inner.topLeft() - outer.topLeft(), inner.bottomRight() - outer.bottomRight()
+    area = QRect(area.topLeft() + top_left, area.bottomRight() + bottom_right)
+    smallest = (window.minimumSize() - (outer.size() - inner.size())).expandedTo(
+        window.minimumSize().boundedTo(area.size())
     )
-    if least.boundedTo(room.size()) != least:
-        return  # the screen is too small for it anyway
-    window.setMinimumSize(least)
-    window.setGeometry(_rectangle_inside(window, room, corner=corner))
+    if smallest.boundedTo(area.size()) != smallest:
+        return  # the window does not fit the screen even without a frame
+    window.setMinimumSize(smallest)
+    window.setGeometry(_rectangle_inside(window, area, corner=corner))
 
 
-def _rectangle_inside(window: QWidget, room: QRect, *, corner: bool) -> QRect:
-    """Return the rectangle of ``window`` in ``room``, from its upper left corner if it is larger."""
-    size = window.size().boundedTo(room.size()).expandedTo(window.minimumSize())
+def _rectangle_inside(window: QWidget, area: QRect, *, corner: bool) -> QRect:
+    """Return the rectangle of ``window`` in ``area``, from the area's upper left corner if the window is larger."""
+    size = window.size().boundedTo(area.size()).expandedTo(window.minimumSize())
     share = 1.0 if corner else 0.5
-    right, down = max(0, room.width() - size.width()), max(0, room.height() - size.height())
-    return QRect(room.topLeft() + QPoint(round(share * right), round(share * down)), size)
-
-
-# What Qt's window system needs on Debian and its relatives, beyond a minimal installation.
+    right, down = max(0, area.width() - size.width()), max(0, area.height() - size.height())
+    return QRect(area.topLeft() + QPoint(round(share * right), round(share * down)), size)
 
 
 _GL_RENDERER: Final = 0x1F01
-IN_SOFTWARE: Final = ("llvmpipe", "softpipe", "swrast", "swiftshader", "gdi generic", "software", "basic render")
+SOFTWARE_RENDERERS: Final = ("llvmpipe", "softpipe", "swrast", "swiftshader", "gdi generic", "software", "basic render")
 WITHOUT_OPENGL: Final = {"offscreen", "minimal", "vnc", "linuxfb"}
 
 
@@ -152,11 +148,11 @@ def opengl_renderer() -> str | None:
 def has_graphics_card() -> bool:
     """Return whether OpenGL uses a graphics card rather than software."""
     name = opengl_renderer()
-    return name is not None and not any(word in name.lower() for word in IN_SOFTWARE)
+    return name is not None and not any(word in name.lower() for word in SOFTWARE_RENDERERS)
 
 
-LEAD_NS: Final = 5_000_000  # time before a swap at which a frame is drawn: twice the tank's drawing time at 1080p
-STALE_REFRESHES: Final = 8  # refreshes without a swap after which the clock alone paces
+LEAD_NS: Final = 5_000_000  # how long before a swap a frame is drawn: twice the tank's drawing time at 1080p
+STALE_REFRESHES: Final = 8  # refreshes without a swap after which frames are timed by the clock
 _NS_PER_S: Final = 1_000_000_000
 LOCKED, BY_CLOCK = "synchronized with the screen's refresh", "timed by the computer's clock"
 
@@ -199,12 +195,12 @@ class Frames(QObject):
         self._timer.stop()
 
     def note_swap(self) -> None:
-        """Note a buffer swap: from now on, a frame is drawn shortly before each swap."""
+        """Record a buffer swap, and time the next frames so that each is drawn shortly before a swap."""
         self._swapped_ns = self._now_ns()
         aim_ns = self._swapped_ns - min(LEAD_NS, self.period_ns // 2)
         half_ns = self.period_ns // 2
         self._next_ns += (aim_ns - self._next_ns + half_ns) % self.period_ns - half_ns
-        while self._next_ns < self._drawn_ns + half_ns:  # the refresh that was just drawn is not drawn twice
+        while self._next_ns < self._drawn_ns + half_ns:  # the refresh that was just drawn must not be drawn twice
             self._next_ns += self.period_ns
         if self._timer.isActive():
             self._start_timer()

@@ -1,8 +1,7 @@
-"""Icons as painter paths on a 24 × 24 grid: drawn at the resolution of the device, in any colour.
+"""Icons as painter paths on a 24 × 24 grid, drawn at the resolution of the screen in any colour.
 
-A path is a line of words: ``M x y`` moves, ``L x y`` draws, ``C`` and ``Q`` curve, ``Z`` closes, ``O x y r`` is a
-circle, ``R x y w h r`` a rounded rectangle.
-A path after ``fill`` is filled instead of stroked.
+A path is a string of commands: ``M x y`` moves, ``L x y`` draws a line, ``C`` and ``Q`` draw curves, ``Z`` closes,
+``O x y r`` adds a circle and ``R x y w h r`` a rounded rectangle. After ``fill``, paths are filled instead of stroked.
 """
 
 from functools import cache
@@ -157,23 +156,23 @@ def icon_pixmap(name: str, colour: str, size: int = 20, ratio: float = 1.0, stro
 
 def icon(name: str, colour: str, size: int = 20) -> QIcon:
     """Return an icon for buttons and menus, sharp at every scaling from 100 to 300 %."""
-    made = QIcon()
+    scaled_icon = QIcon()
     for ratio in _RATIOS:
-        made.addPixmap(icon_pixmap(name, colour, size, ratio))
-    return made
+        scaled_icon.addPixmap(icon_pixmap(name, colour, size, ratio))
+    return scaled_icon
 
 
 def logo(size: int, background: str, ink: str) -> QIcon:
     """Return the window icon: a drop on a rounded square."""
-    made = QIcon()
+    window_icon = QIcon()
     for side in (size, 2 * size, 4 * size):
         pixmap = QPixmap(QSize(side, side))
         pixmap.fill(Qt.GlobalColor.transparent)
         painter = QPainter(pixmap)
         draw_logo(painter, QRectF(0, 0, side, side), background, ink)
         painter.end()
-        made.addPixmap(pixmap)
-    return made
+        window_icon.addPixmap(pixmap)
+    return window_icon
 
 
 def draw_logo(painter: QPainter, rect: QRectF, background: str, ink: str) -> None:

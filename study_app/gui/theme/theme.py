@@ -1,8 +1,8 @@
-"""Fonts, palettes, spacing and the style sheet: every colour of every window, by its role.
+"""Fonts, palettes, spacing and the style sheet of every window.
 
-No widget names a colour by its number. The values are computed, not chosen by eye: contrast by WCAG 2.2 (tested),
-distances between states and between traces for normal, protan, deutan and tritan eyes by CIEDE2000. A state is always
-colour **and** icon **and** word.
+Widgets select colours by role, never by value. The values are computed: the contrast satisfies WCAG 2.2 (tested), and
+states and traces differ by CIEDE2000 distances in normal, protan, deutan and tritan vision. A state is always shown by
+colour, icon and word.
 """
 
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ TypeRole: TypeAlias = Literal[
 
 @dataclass(frozen=True, slots=True)
 class Type:
-    """A step of the type scale: size [logical px], weight, and tabular figures."""
+    """A step of the type scale: its size [logical px], weight, and whether figures have equal widths."""
 
     size: float
     weight: int
@@ -41,7 +41,7 @@ TYPE: dict[TypeRole, Type] = {
     "label": Type(13, 500),
     "small": Type(12, 400),
     "key": Type(11, 600),
-    # the participant's
+    # the participant's pages
     "instruction": Type(30, 500),
     "statement": Type(16, 400),
     "cell": Type(16, 500, tabular=True),
@@ -68,12 +68,14 @@ def font(role: TypeRole, *, scale: float = 1.0, weight: int | None = None, tabul
     scale : float
         Size factor, for pages that grow with their window.
     weight, tabular : int, bool, optional
-        Override those of the role: 400, 500, 600 or 700; tabular figures.
+        Weight (400, 500, 600 or 700) and tabular figures, if they differ from those of the role.
     """
     step = TYPE[role]
-    chosen = step.weight if weight is None else weight
+    chosen_weight = step.weight if weight is None else weight
     return QFont(
-        _shared_font(max(1, round(step.size * scale)), chosen, tabular=step.tabular if tabular is None else tabular)
+        _shared_font(
+            max(1, round(step.size * scale)), chosen_weight, tabular=step.tabular if tabular is None else tabular
+        )
     )
 
 
@@ -81,13 +83,13 @@ def font(role: TypeRole, *, scale: float = 1.0, weight: int | None = None, tabul
 def _shared_font(size_px: int, weight: int, *, tabular: bool) -> QFont:
     """Return a shared font; copy it before changing it."""
     load_fonts()
-    made = QFont(FAMILIES)
-    made.setPixelSize(size_px)
-    made.setWeight(QFont.Weight(weight))
-    made.setHintingPreference(QFont.HintingPreference.PreferNoHinting)
+    shared = QFont(FAMILIES)
+    shared.setPixelSize(size_px)
+    shared.setWeight(QFont.Weight(weight))
+    shared.setHintingPreference(QFont.HintingPreference.PreferNoHinting)
     if tabular:
-        made.setFeature(QFont.Tag("tnum"), 1)
-    return made
+        shared.setFeature(QFont.Tag("tnum"), 1)
+    return shared
 
 
 __all__ = [
@@ -96,13 +98,13 @@ __all__ = [
 ]  # fmt: skip
 
 Tone: TypeAlias = Literal["ok", "warn", "bad", "accent", "neutral"]
-"""The tone of a message."""
+"""The tone of a message or state, which selects its colour."""
 
 GRID = 4
 SPACE = (4, 8, 12, 16, 24, 32, 40)
 RADIUS_CONTROL = 8
 RADIUS_CARD = 12
-SHADOW = 3  # of a card, within its rectangle
+SHADOW = 3  # the width of a card's shadow, within its rectangle [px]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -180,7 +182,7 @@ PARTICIPANT = Theme(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TankColours:
-    """The tank's own colours: a cold grey, the same for every liquid, so that they do not reveal it."""
+    """The colours of the tank: cold greys that are the same for every liquid, so that they do not reveal it."""
 
     water_light: str = "#2F6079"
     glass: str = "#CFE6F2"
@@ -189,7 +191,7 @@ class TankColours:
     lit: str = "#F4FBFF"
     dim: str = "#A9C4D4"
     shadow: str = "#06131C"
-    tail_old: str = "#4E97C9"  # the lab's alone: participants never see a tail
+    tail_old: str = "#4E97C9"  # only in the lab: participants never see a tail
     tail: str = "#F4FBFF"
     wake: str = "#8FD0F5"
 
@@ -200,11 +202,10 @@ TANK = TankColours()
 def stylesheet(theme: Theme) -> str:
     """Return the Qt style sheet of a window; fonts are set by widgets through `font`, never here.
 
-    Dynamic properties: a QPushButton is outlined, ``role="primary"`` filled, ``role="danger"`` outlined in bad,
-    ``role="plain"`` without an edge, ``role="stop"`` the force stop; a QFrame is a card with ``role="card"``; a QLabel
-    takes ``role`` text2, text3, ok, warn, bad or accent, and is text3 within a disabled widget named "earlier"; fields
-    and buttons are low with ``dense="true"``; the edge of a field is accent with ``state="changed"`` and bad with
-    ``state="refused"``.
+    Dynamic properties select rules. A QPushButton is outlined by default, filled with ``role="primary"``, outlined in
+    bad with ``"danger"``, without an edge with ``"plain"``, and the force stop with ``"stop"``. A QFrame is a card with
+    ``role="card"``. A QLabel has the colour of its ``role``: text2, text3, ok, warn, bad or accent. Fields and buttons
+    are compact with ``dense="true"``. The edge of a field is accent with ``state="changed"``, bad with ``"refused"``.
     """
     t = theme
     return "\n".join(
@@ -221,7 +222,7 @@ def stylesheet(theme: Theme) -> str:
             f"QWidget[role='bar'], QWidget[role='header'] {{ border-bottom: 1px solid {t.border}; }}",
             f"QWidget[role='rail'] {{ border-right: 1px solid {t.border}; }}",
             f"QWidget[role='rule'] {{ background: {t.border}; }}",
-            *(f"QWidget[role='{it} tint'] {{ background: {getattr(t, it + '_bg')}; }}" for it in ("bad", "warn")),
+            *(f"QWidget[role='{tone} tint'] {{ background: {getattr(t, tone + '_bg')}; }}" for tone in ("bad", "warn")),
             f"QWidget[role$='tint'] {{ border-radius: {RADIUS_CARD}px; margin: 0 {SHADOW}px; }}",
             f"QWidget#earlier QLabel:disabled {{ color: {t.text3}; }}",
             "QListWidget { background: transparent; border: none; outline: none; }",

@@ -1,4 +1,4 @@
-"""How the theme of a window reaches what the style sheet does not: parts that paint themselves, marks, selections."""
+"""Apply a theme to a window, including the widgets that the style sheet does not reach."""
 
 from PySide6.QtCore import QEvent, Qt
 from PySide6.QtGui import QColor, QPalette
@@ -8,7 +8,7 @@ from study_app.gui.theme.theme import LIGHT, Theme, stylesheet
 
 
 class Themed:
-    """A widget that paints itself in the ``theme`` of its window; outside of one it is light."""
+    """A widget that paints itself in the theme of its window, or in the light one if the window has none."""
 
     @property
     def theme(self) -> Theme:
@@ -16,7 +16,7 @@ class Themed:
 
 
 class Coloured(Themed):
-    """A widget that keeps colours between paintings: ``apply_theme`` sets those of another theme."""
+    """A widget that stores colours between paint events; `apply_theme` sets them when the theme changes."""
 
     _applied: Theme | None = None
 
@@ -25,23 +25,23 @@ class Coloured(Themed):
 
     def changeEvent(self, event: QEvent) -> None:
         super().changeEvent(event)  # type: ignore[misc]  # of the widget
-        if event.type() == QEvent.Type.StyleChange and (given := _theme_of(self)) not in {None, self._applied}:
-            self._applied = given
+        if event.type() == QEvent.Type.StyleChange and (theme := _theme_of(self)) not in {None, self._applied}:
+            self._applied = theme
             self.apply_theme(self.theme)
 
 
-def _theme_of(part: object) -> Theme | None:
-    """Return the theme of a part's window; parents in between may be objects that PySide must not wrap."""
-    while isinstance(part, QWidget):
-        window = part.window()
+def _theme_of(widget: object) -> Theme | None:
+    """Return the theme of a widget's window, skipping parents in between, which PySide may be unable to wrap."""
+    while isinstance(widget, QWidget):
+        window = widget.window()
         if (theme := getattr(window, "given_theme", None)) is not None:
             return theme
-        part = window.parentWidget()
+        widget = window.parentWidget()
     return None
 
 
 def apply_theme(window: QWidget, theme: Theme) -> None:
-    """Apply ``theme`` to ``window`` and all its parts, including those that are added later."""
+    """Apply ``theme`` to ``window`` and all its widgets, including those that are added later."""
     window.given_theme = theme  # type: ignore[attr-defined]
     window.setPalette(_palette(theme))
     window.setStyleSheet(stylesheet(theme))
@@ -49,8 +49,8 @@ def apply_theme(window: QWidget, theme: Theme) -> None:
 
 
 def _palette(theme: Theme) -> QPalette:
-    """Return the palette for parts that style sheets do not reach: check marks, arrows, selections."""
-    made = QPalette()
+    """Return the palette for what style sheets do not reach: check marks, arrows, selections."""
+    palette = QPalette()
     group = QPalette.ColorRole
     for role, colour in (
         (group.Window, theme.window),
@@ -67,34 +67,34 @@ def _palette(theme: Theme) -> QPalette:
         (group.Mid, theme.ctl),
         (group.Dark, theme.ctl),
     ):
-        made.setColor(role, QColor(colour))
-    return made
+        palette.setColor(role, QColor(colour))
+    return palette
 
 
-def give_ground(part: QWidget, role: str) -> None:
-    """Let the style sheet paint a part's background according to its ``role``."""
-    part.setProperty("role", role)
-    part.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
+def give_ground(widget: QWidget, role: str) -> None:
+    """Let the style sheet paint a widget's background according to ``role``."""
+    widget.setProperty("role", role)
+    widget.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
 
 
-def name_scroll_bars(whole: QWidget) -> None:
-    """Give a part's scroll bars an accessible name, which Qt does not."""
-    for bar in whole.findChildren(QScrollBar):
+def name_scroll_bars(widget: QWidget) -> None:
+    """Give the scroll bars in a widget an accessible name, which Qt does not."""
+    for bar in widget.findChildren(QScrollBar):
         bar.setAccessibleName("Scroll bar")
 
 
-def remove_widget(part: QWidget) -> None:
-    """Remove a part from its window permanently.
+def remove_widget(widget: QWidget) -> None:
+    """Remove a widget from its window and delete it.
 
-    It is hidden first, because its former layout may be about to show it, and would then show it as a window.
+    It is hidden first, because a pending show by its former layout would open it as a window of its own.
     """
-    part.hide()
-    part.setParent(None)
-    part.deleteLater()
+    widget.hide()
+    widget.setParent(None)
+    widget.deleteLater()
 
 
 def replace_inside(area: QScrollArea, inside: QWidget) -> None:
-    """Replace the content of ``area``; the old content is deleted later, since one of its buttons may be pressed."""
+    """Replace the content of ``area``. The old content is deleted later, because its button may be the caller."""
     old = area.takeWidget()
     area.setWidget(inside)
     if old is not None:
