@@ -319,8 +319,8 @@ NEW_SESSION: Actions = {
         lambda dialog: dialog.editors["session"].show_value(1),
         text("editors.participant.control", "P007"),
     ),
-    "next session number": clicked("ways.0"),
-    "another id": in_turn(lambda dialog: dialog.editors["session"].show_value(1), clicked("ways.1")),
+    "next session number": clicked("suggestions.0"),
+    "another id": in_turn(lambda dialog: dialog.editors["session"].show_value(1), clicked("suggestions.1")),
     "begun by Enter": lambda dialog: QTest.keyClick(dialog.editors["participant"].control, Qt.Key.Key_Return),
 }
 HELP: Actions = {

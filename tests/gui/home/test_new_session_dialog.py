@@ -115,11 +115,11 @@ def test_a_used_id_offers_its_next_session_and_a_new_participant(opened, results
         participant.control.setText("P001")
         session.show_value(1)
         assert not made.begin.isEnabled()
-        assert [button.text() for button in made.ways] == ["Session 4 of P001", "New participant P002"]
-        made.ways[way].click()
+        assert [button.text() for button in made.suggestions] == ["Session 4 of P001", "New participant P002"]
+        made.suggestions[way].click()
         assert (participant.value, session.value) == expected
         assert made.begin.isEnabled()
-        assert not made.ways[0].isVisible()
+        assert not made.suggestions[0].isVisible()
 
 
 def test_a_results_folder_is_said_to_be_inside_or_outside_the_workspace(opened, tmp_path, monkeypatch):

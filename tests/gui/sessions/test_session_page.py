@@ -12,8 +12,8 @@ from study_app.gui.sessions.session_facts import sessions
 from study_app.gui.sessions.session_page import (
     SessionPage,
     TrialRecord,
-    _judged_sentence,
     _limits_sentence,
+    _within_limits_sentence,
     read_record,
 )
 from study_app.gui.theme.theme import LIGHT
@@ -121,7 +121,7 @@ def test_a_page_says_what_each_trial_has_and_why_a_session_cannot_be_read(qtbot,
 def test_no_page_names_a_condition_of_a_sealed_study(study):
     record = read_record(next(iter(StudyFolder(study).sessions())).path)
     assert record.limits == "All 4 measured trials met the study's limits."
-    unjudged = [_judged_sentence((), sealed=sealed, verdict=None) for sealed in (True, False)]
+    unjudged = [_within_limits_sentence((), sealed=sealed, verdict=None) for sealed in (True, False)]
     assert [sentence.endswith("will be checked after unblinding.") for sentence in unjudged] == [True, False]
     text = repr(record)
     protocol = load("demo")
