@@ -1,1 +1,1 @@
-"""A session in windows: start-up, bridge, frame budget, endings."""
+"""A session in its windows: start-up, pre-flight, the connection with the windows, and playback."""

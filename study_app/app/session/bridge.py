@@ -1,9 +1,9 @@
-"""Where Qt drives a session: frames poll the runner, windows' signals become events, its news becomes views.
+"""The connection of a session with its windows: frames poll the runner, signals become events, changes become views.
 
-A frame is drawn first and at once; what else is to be shown is drawn in the time until the next.
+The tank is drawn first in each frame; other parts are drawn in the time until the next frame.
 
-Whatever fails in here ends in zero force: the force is stopped first, then the failure is written down and shown to the
-operator. Nothing of it reaches the participant but a calm page.
+After any failure, zero force is sent first; then the failure is recorded and shown to the operator. The participant
+sees only a calm page.
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ if TYPE_CHECKING:
     from study_app.store.sessions import Recorder, SessionStore
     from study_app.video.sources import Videos
 
-_TRACES_S = 0.030  # every second frame of 60 a second, every fifth of 144
+_TRACES_S = 0.030  # every second frame at 60 Hz, every fifth at 144 Hz
 _TILES_S = 0.5
 _END_SHOWN_MS = 5000
 SCREEN_SETTLES_MS = 500  # a window manager may briefly put a window on another screen
@@ -94,7 +94,7 @@ log = logging.getLogger(__name__)
 
 
 class WatchedJournal:
-    """Forwards everything to the store, and updates ``progress`` with each written line."""
+    """A journal that forwards all calls to the store, and updates ``progress`` with each written line."""
 
     def __init__(self, store: JournalPort, progress: Progress, clock: Callable[[], float]) -> None:
         self.progress = progress
@@ -102,7 +102,7 @@ class WatchedJournal:
         self._clock = clock
 
     def append(self, event: journal_events.Event, *, t_s: float | None = None, waits: bool = True) -> None:
-        """Write an event to the journal (StoreError: nothing has changed)."""
+        """Write an event to the journal. Raise StoreError, with nothing changed, if that fails."""
         self._store.append(event, t_s=t_s, waits=waits)
         self.progress.process_line(replace(event, t_s=self._clock() if t_s is None else t_s))
 
@@ -118,7 +118,7 @@ class WatchedJournal:
         self._store.write_tables()
 
     def finish(self, status: str, reason: str = "") -> None:
-        """Close the session (StoreError: the last table or line could not be written; the session counts as ended)."""
+        """Close the session. Raise StoreError if the last table or line could not be written; the session has ended."""
         try:
             self._store.finish(status, reason)
         finally:
@@ -132,12 +132,12 @@ class WatchedJournal:
 class Parts:
     """The parts of a session, except its windows.
 
-    ``session`` is the constant part of the operator's view; ``key`` is block → code → condition or track and ``secret``
-    the sealed key's nonce, never shown; ``start`` is the point of resumption. ``aim_m`` returns the target of hand or
-    pointer [m, hand frame]; ``point_to`` and ``press`` forward the mouse, None if the device is not the mouse;
-    ``hand_for`` makes the simulated hand for a page, None with a real hand. ``outlets`` send its events to other
-    programs; ``videos`` are those of the study, None if it shows none. ``reconnect`` reopens a failed device or video,
-    with the servo at zero force; it may take minutes.
+    ``session`` is the constant part of the operator's view. ``key`` maps blocks and codes to conditions or tracks, and
+    ``secret`` is the sealed key's nonce; both are never shown. ``start`` is the point of resumption. ``aim_m`` returns
+    the target of hand or pointer [m, hand frame]. ``point_to`` and ``press`` forward the mouse, and are None for other
+    devices. ``hand_for`` creates the simulated hand for a page, and is None with a real hand. ``outlets`` send events
+    to other programs; ``videos`` are those of the study, or None. ``reconnect`` reopens a failed device or video, with
+    the servo at zero force; it may take minutes.
     """
 
     session: Session
@@ -162,8 +162,8 @@ class SessionBridge(QObject):
     """Runs one session in two windows.
 
     ``done`` is emitted once, when the session is over and its windows can be closed; ``diagnose_asked`` when the
-    operator requests a diagnosis of the device, with the force off and the session paused. ``forces`` is None in a
-    double-blind study, so that no force is processed.
+    operator has requested a diagnosis of the device, with the force off and the session paused. ``forces`` is None in
+    a double-blind study, in which no force is processed.
 
     Parameters
     ----------
@@ -181,7 +181,7 @@ class SessionBridge(QObject):
         self.participant = participant
         self.operator = operator
         self.strip = participant.strip if isinstance(participant.strip, Strip) else None
-        self._called = False
+        self._has_raised_operator = False
         study = parts.session.protocol
         self.health = ServoHealth(parts.servo.rate_hz, refresh_hz)
         self.forces = Forces(study.device.force_limit_n) if study.study.blinding == "single" else None
@@ -194,14 +194,14 @@ class SessionBridge(QObject):
             ports = replace(ports, settled=parts.recorder.end_without_waiting)
         if parts.videos is not None:
             ports = replace(ports, video=parts.videos.source)
-        self._leaves = False
+        self._leaves_at_end = False
         self.runner = Runner(
             parts.session.protocol, parts.session.schedule, parts.key, ports, parts.language, parts.start, parts.secret
         )
         self.reconnecting = Background(self, refusals=Exception)
         self._reconnection = ""  # the progress of the reconnection, or why it failed
         self._hand: Hand | None = None
-        self._gone = False
+        self._has_left = False
         self._stalled: str | None = None
         self._lost = False
         self.uncaught = UncaughtExceptions(self._handle_uncaught)
@@ -239,7 +239,7 @@ class SessionBridge(QObject):
         return self.frames.pacing
 
     def present(self, page: Page) -> None:
-        """Show a page to the participant; a port of the runner."""
+        """Show a page to the participant; the runner calls this."""
         self.participant.show_page(page)
         self._hand = self.parts.hand_for(page) if self.parts.hand_for is not None else None
         tank, videos = self.participant.tank, self.parts.videos
@@ -263,14 +263,14 @@ class SessionBridge(QObject):
         self.show_tiles()
 
     def leave_without_asking(self) -> None:
-        """Send zero force and close the windows without a question; the session can be resumed."""
+        """Send zero force and close the windows without asking; the session can be resumed."""
         self.parts.servo.stop_force()
-        if not self._gone and not self.runner.finished:
+        if not self._has_left and not self.runner.finished:
             self._pause_trial()
         self._leave_session()
 
     def watch_screens(self) -> None:
-        """Pause when a screen is removed and both windows end up on the same one, until one is added."""
+        """Pause when a screen is removed and the participant's window covers the operator's, until one is added."""
         for window in (self.participant, self.operator):
             window.windowHandle().screenChanged.connect(
                 lambda _screen: QTimer.singleShot(SCREEN_SETTLES_MS, self, self._check_screens)
@@ -282,7 +282,12 @@ class SessionBridge(QObject):
         """Whether the participant's window covers the operator's, and with it the force stop."""
         participant, operator = self.participant, self.operator
         shared = participant.screen().name() == operator.screen().name()
-        return shared and self.strip is None and participant.isFullScreen() and not (self._gone or self.runner.finished)
+        return (
+            shared
+            and self.strip is None
+            and participant.isFullScreen()
+            and not (self._has_left or self.runner.finished)
+        )
 
     @guarded_session_slot
     def _check_screens(self) -> None:
@@ -300,15 +305,15 @@ class SessionBridge(QObject):
             self.operator.bring_forward()
 
     def _refuses_resumption(self) -> bool:
-        """Return whether the session cannot be resumed because one window covers the other, and report it."""
-        if refused := self._covers_operator:
+        """Return whether the session cannot be resumed because one window covers the other; if so, report it."""
+        if covers := self._covers_operator:
             self.operator.bring_forward()
             self.operator.show_message(*_SCREEN_REMOVED)
-        return refused
+        return covers
 
     @guarded_session_slot
     def _pause_trial(self) -> None:
-        """Pause, so that the journal records the current trial as interrupted."""
+        """Pause the session, so that the journal records the current trial as interrupted."""
         self._post_event(PauseRequested(self._now(), "program"))
 
     def fail(self, error: BaseException) -> None:
@@ -316,12 +321,12 @@ class SessionBridge(QObject):
         self.parts.servo.stop_force()
         first = not self.trouble
         raised, error = error, explain_error(error)
-        what = str(error) if isinstance(error, StudyError) else f"{type(error).__name__}: {error}"
+        message = str(error) if isinstance(error, StudyError) else f"{type(error).__name__}: {error}"
         if not first:
             return
-        self.trouble, self.failure = what, error
-        log.error("the session failed: %s", what, exc_info=_unexpected_error(raised))
-        traceback.clear_frames(raised.__traceback__)  # frames may hold a painter, and Qt would then paint no window
+        self.trouble, self.failure = message, error
+        log.error("the session failed: %s", message, exc_info=_unexpected_error(raised))
+        traceback.clear_frames(raised.__traceback__)  # a painter that a frame keeps alive would block Qt's painting
         try:
             if not self.runner.finished:
                 self.runner.post(broken(self._now(), error))
@@ -330,23 +335,23 @@ class SessionBridge(QObject):
             log.error("and could not be recorded: %s", second)  # noqa: TRY400 - one line, the first has the trace
 
     def _handle_uncaught(self, error: BaseException) -> bool:
-        """Handle an unhandled exception; return whether it only affected painting of the operator's window."""
+        """Handle an uncaught exception; return whether it only affected the painting of the operator's window."""
         frame = None if error.__traceback__ is None else error.__traceback__.tb_frame
         if frame is None or not isinstance(error, Exception) or frame.f_code.co_name not in PAINTING:
-            paints_here = False
+            is_operator_painting = False
         else:
             parts = (self.participant, *self.participant.findChildren(QWidget))  # also of plug-ins
             kinds = {kind for part in parts for kind in type(part).__mro__}
             methods = (unwrap(vars(kind)[name]) for kind in kinds for name in PAINTING if name in vars(kind))
-            paints_here = all(getattr(method, "__code__", None) is not frame.f_code for method in methods)
-        (self.operator.report_failure if paints_here else self.fail)(error)
-        return paints_here
+            is_operator_painting = all(getattr(method, "__code__", None) is not frame.f_code for method in methods)
+        (self.operator.report_failure if is_operator_painting else self.fail)(error)
+        return is_operator_painting
 
     @guarded_session_slot
-    def _report_thread_failure(self, what: str) -> None:
-        """Log that a thread has ended with an exception, and tell the operator."""
-        self.operator.show_message("Part of the program has stopped", f"{what}. All answers have been kept.")
-        self.record_note(f"a program thread stopped unexpectedly: {what}")
+    def _report_thread_failure(self, description: str) -> None:
+        """Record that a thread has ended with an exception, and tell the operator."""
+        self.operator.show_message("Part of the program has stopped", f"{description}. All answers have been kept.")
+        self.record_note(f"a program thread stopped unexpectedly: {description}")
 
     def _now(self) -> float:
         return self.parts.clock()
@@ -355,13 +360,13 @@ class SessionBridge(QObject):
         self.runner.post(event)
 
     def draw_frame(self) -> None:
-        """Draw the tank, then as much of the rest as fits before the next frame."""
+        """Draw the tank, then the parts for which there is time before the next frame."""
         self._draw_tank()
         self.budget.run_due_tasks(self.frames.next_ns)
 
     @guarded_session_slot
     def _draw_tank(self) -> None:
-        """Read the device and draw the tank with the trial's visual delay."""
+        """Poll the runner, draw the tank with the trial's visual delay, and read the device."""
         self.runner.poll()
         view = self.runner.view(self.parts.servo.now_ns())
         if view is not None:
@@ -397,7 +402,7 @@ class SessionBridge(QObject):
 
     @guarded_session_slot
     def show_forces(self) -> None:
-        """Draw the newest forces if the operator may see them."""
+        """Draw the newest forces, if the operator may see them."""
         if self.forces is not None:
             self.operator.show_forces(self.forces, self.parts.servo.now_ns())
 
@@ -408,30 +413,30 @@ class SessionBridge(QObject):
         self._show_view()
 
     def _show_changes(self) -> None:
-        """Show the new state; at the end raise the operator's window above the participant's."""
+        """Show the new state of the session; at its end, raise the operator's window above the participant's."""
         if (stalled := self.runner.stalled) != self._stalled:
             self._stalled = stalled
             log.warning("the disk accepts data again" if stalled is None else f"the session waits: {stalled}")
-        lost, before = self.runner.state.lost_device, self._lost
+        lost, was_lost = self.runner.state.lost_device, self._lost
         self._lost = lost
-        if lost and not before:
+        if lost and not was_lost:
             log.info(DEVICE_FAILED, ServoFault(self.runner.cause))
         self._show_view()
-        if self.runner.finished and self._leaves:
+        if self.runner.finished and self._leaves_at_end:
             QTimer.singleShot(0, self, self._leave_session)
         elif self.runner.finished and self.participant.isFullScreen():
             ended = self.parts.journal.progress.reached_end
-            said = ended and isinstance(self.parts.session.schedule.steps[-1], PageStep)  # a study's last page
-            QTimer.singleShot(0 if said else _END_SHOWN_MS, self.operator, self.operator.bring_forward)
+            has_last_page = ended and isinstance(self.parts.session.schedule.steps[-1], PageStep)
+            QTimer.singleShot(0 if has_last_page else _END_SHOWN_MS, self.operator, self.operator.bring_forward)
 
     def _show_view(self) -> None:
         view = self.view()
         self.operator.show_view(view)
         if self.strip is not None:
             self.strip.show_view(view)
-            if view.state == "trouble" and not self._called:
+            if view.state == "trouble" and not self._has_raised_operator:
                 self.operator.bring_forward()
-            self._called = view.state == "trouble"
+            self._has_raised_operator = view.state == "trouble"
 
     def view(self) -> OperatorView:
         parts, stalled = self.parts, self.runner.stalled
@@ -465,10 +470,10 @@ class SessionBridge(QObject):
             self._post_event(event)
 
     @guarded_session_slot
-    def _handle_request(self, what: str, details: tuple[Any, ...]) -> None:
-        """Carry out an operator's request; zero force comes before anything that may fail or wait for the disk."""
+    def _handle_request(self, request: str, details: tuple[Any, ...]) -> None:
+        """Carry out a request of the operator; zero force precedes whatever may fail or wait for the disk."""
         post = self._post_event
-        match what:
+        match request:
             case "stop":
                 self._stop_force()
             case "resume" if self._refuses_resumption():
@@ -484,7 +489,7 @@ class SessionBridge(QObject):
                 post(RepeatRequested(self._now(), reason))
             case "note" | "mark":
                 (text,) = details or ("",)
-                post(Note(self._now(), what, text))
+                post(Note(self._now(), request, text))
             case "end":
                 status, reason = details
                 post(EndRequested(self._now(), status, reason))
@@ -493,9 +498,9 @@ class SessionBridge(QObject):
             case "reconnect":
                 self._reconnect()
             case "failed":
-                what, error = details
-                log.error("part of the operator's window stopped working: %s", what, exc_info=error)
-                self.record_note(f"part of the operator's window stopped working: {what}")
+                message, error = details
+                log.error("part of the operator's window stopped working: %s", message, exc_info=error)
+                self.record_note(f"part of the operator's window stopped working: {message}")
             case "page":
                 self.participant.bring_forward()
             case "close":
@@ -507,7 +512,7 @@ class SessionBridge(QObject):
         self._post_event(ForceStopped(self._now(), "operator"))
 
     def _request_diagnosis(self) -> None:
-        """Send zero force, pause, and have the device diagnosed."""
+        """Send zero force, pause the session, and request a diagnosis of the device."""
         self.parts.servo.stop_force()
         try:
             if not self.runner.finished:
@@ -524,7 +529,7 @@ class SessionBridge(QObject):
             self._show_view()
 
     def record_note(self, text: str) -> None:
-        """Write a note to the journal; after the session's end do nothing."""
+        """Write a note to the journal, unless the session has ended."""
         if not self.runner.finished:
             self._post_event(Note(self._now(), "note", text))
 
@@ -559,14 +564,14 @@ class SessionBridge(QObject):
             self.parts.press(buttons)
 
     def _close_window(self) -> None:
-        """Close the operator's window after the session; before, send zero force and ask; leave if asked again."""
+        """Close the operator's window, or during the session send zero force and ask; the second time, leave it."""
         if self.runner.finished:
             if self.runner.stalled is not None:
-                self._post_event(WriteRetried(self._now()))  # the end is not written, and the next attempt is due later
+                self._post_event(WriteRetried(self._now()))  # try once more to write the end of the session
             self._leave_session()
             return
-        if self.runner.ending:  # as soon as the recordings are on the disk
-            self._leaves = True
+        if self.runner.ending:  # leave as soon as the recordings are on the disk
+            self._leaves_at_end = True
             self.operator.hide()
             return
         self.parts.servo.stop_force()
@@ -577,9 +582,9 @@ class SessionBridge(QObject):
         self._post_event(ForceStopped(self._now(), "operator"))
 
     def _leave_session(self) -> None:
-        if self._gone:
+        if self._has_left:
             return
-        self._gone = True
+        self._has_left = True
         self.frames.stop()
         self._thread_priority.restore()
         self._awake.end()
@@ -594,24 +599,24 @@ class SessionBridge(QObject):
         self.operator.hide()
         self.done.emit()
         for part in (self.participant, self.operator, self):
-            part.deleteLater()  # delete the objects in this thread, never in a collection of another one
+            part.deleteLater()  # in this thread, since another might collect them
 
 
 def _unexpected_error(error: BaseException) -> BaseException | None:
-    """Return the error if the log needs its traceback, None if its message explains it."""
+    """Return the error if the log needs its traceback, or None if its message suffices."""
     return None if isinstance(error, StudyError) else error
 
 
 def make_operator_window(chosen: NewSession, protocol: Protocol, rig: Rig, theme: Theme) -> OperatorWindow:
-    """Return the operator's window, which is not shown yet."""
-    described = descriptor_of(chosen.device)
+    """Return the operator's window, not yet shown."""
+    descriptor = descriptor_of(chosen.device)
     return OperatorWindow(
         protocol.study.name,
         lateness_limit_s=protocol.limits.lateness_ms / 1000,
         reach_m=max(rig.device.workspace_m),
-        pointer=described.pointer,
-        felt=described.kind != "seen",
-        stop_button=described.stop_button,
+        pointer=descriptor.pointer,
+        felt=descriptor.kind != "seen",
+        stop_button=descriptor.stop_button,
         force_limit_n=protocol.device.force_limit_n if protocol.study.blinding == "single" else None,
         theme=theme,
     )
@@ -626,11 +631,11 @@ def make_participant_window(
     photodiode: bool,
     in_step: bool = True,
 ) -> ParticipantWindow:
-    """Return the participant's window, which is not shown yet.
+    """Return the participant's window, not yet shown.
 
-    ``clock`` gives the session's time [s] once the session is on the disk; ``shares_screen`` tells whether the
-    operator's window is on the same screen, ``text_scale`` is the minimum scale of text, ``photodiode`` adds a corner
-    of the tank for one, ``in_step`` permits drawing in step with the screen.
+    ``clock`` returns the session's time [s], ``shares_screen`` tells whether the operator's window is on the same
+    screen, ``text_scale`` is the minimum scale of text, ``photodiode`` adds a corner for a photodiode to the tank, and
+    ``in_step`` permits drawing in step with the screen.
     """
     return ParticipantWindow(
         words(chosen.language),
@@ -646,7 +651,7 @@ def make_participant_window(
 
 
 def session_plan(chosen: NewSession, protocol: Protocol, store: SessionStore) -> tuple[Protocol, Schedule, Start]:
-    """Return protocol and schedule of a session that is on the disk, and where it begins or resumes."""
+    """Return the protocol and schedule of a session on the disk, and the point where it begins or resumes."""
     protocol = store.as_recorded(protocol)
     protocol = session_protocol(StudyFolder(chosen.results), protocol, chosen.participant, chosen.session)
     schedule, start = begun_schedule(protocol, start_of(store.lines), store.key), FIRST
@@ -670,11 +675,11 @@ def connect_windows(
 ) -> SessionBridge:
     """Connect both windows to the session; the caller shows them and starts the bridge.
 
-    ``plan`` has protocol, schedule and start; ``refresh_hz`` is the frame rate. ``videos`` are open.
+    ``plan`` is the result of `session_plan`, ``refresh_hz`` the frame rate. ``videos`` must be open.
     """
     clock, device, servo = store.clock.seconds, rig.device, rig.servo
     journal = WatchedJournal(store, progress_of(open_events(store.lines, store.key)), clock)
-    described = descriptor_of(chosen.device)
+    descriptor = descriptor_of(chosen.device)
     protocol, schedule, start = plan
     hand = hand_of(device)
     parts = Parts(
@@ -691,9 +696,9 @@ def connect_windows(
         reconnect=_make_reconnect(rig, videos),
         videos=videos,
         aim_m=_make_position_reader(hand, servo),
-        point_to=getattr(device, "point_to", None) if described.pointer else None,
-        press=getattr(device, "press", None) if described.pointer else None,
-        hand_for=_make_hand_for_page(hand, chosen, clock) if hand is not None and described.moves_by_itself else None,
+        point_to=getattr(device, "point_to", None) if descriptor.pointer else None,
+        press=getattr(device, "press", None) if descriptor.pointer else None,
+        hand_for=_make_hand_for_page(hand, chosen, clock) if hand is not None and descriptor.moves_by_itself else None,
     )
     return SessionBridge(parts, participant, operator, refresh_hz=refresh_hz or 60.0)
 
@@ -701,30 +706,30 @@ def connect_windows(
 def show_windows(
     bridge: SessionBridge, screens: Callable[[], tuple[QScreen, QScreen]], *, played: bool = False
 ) -> Iterator[None]:
-    """Show both windows on their screens, one after the other; for a played session only the participant's.
+    """Show the windows on their screens, one after the other; for a ``played`` session, only the participant's.
 
     ``screens`` returns the participant's and the operator's screen; it is called in each step.
 
     Raises
     ------
     DisplayError
-        A screen was removed after the windows were made, so that the participant's would cover the force stop.
+        A screen was removed, so that the participant's window would cover the force stop.
     """
     if not played:
-        shown_on, operated_on = screens()
-        place_window(bridge.operator, operated_on, corner=shown_on is operated_on)
+        participant_screen, operator_screen = screens()
+        place_window(bridge.operator, operator_screen, corner=participant_screen is operator_screen)
         bridge.operator.show()
         yield
-    shown_on, operated_on = screens()
-    if shown_on is operated_on and bridge.strip is None:
+    participant_screen, operator_screen = screens()
+    if participant_screen is operator_screen and bridge.strip is None:
         raise DisplayError("a screen was disconnected while the session was opening; start the session again")
-    bridge.participant.open_on(shown_on)
+    bridge.participant.open_on(participant_screen)
     if not played:
         bridge.watch_screens()
 
 
 def _make_reconnect(rig: Rig, videos: Videos | None) -> Callable[[], dict[str, Any]]:
-    """Return a function that reopens the failed part: device and servo, or videos."""
+    """Return a function that reopens what has failed: device and servo, or videos."""
 
     def reconnect() -> dict[str, Any]:
         if videos is None or rig.servo.fault is not None:
@@ -737,7 +742,7 @@ def _make_reconnect(rig: Rig, videos: Videos | None) -> Callable[[], dict[str, A
 
 
 def _session_facts(chosen: NewSession, protocol: Protocol, schedule: Schedule, rig: Rig) -> Session:
-    described = descriptor_of(chosen.device)
+    descriptor = descriptor_of(chosen.device)
     return Session(
         protocol=protocol,
         schedule=schedule,
@@ -746,8 +751,8 @@ def _session_facts(chosen: NewSession, protocol: Protocol, schedule: Schedule, r
         expected_s=expected_duration_s(protocol),
         answers_of=orders_of(protocol).answers,
         lateness_limit_s=protocol.limits.lateness_ms / 1000,
-        device_name=described.title,
-        device_icon=described.icon,
+        device_name=descriptor.title,
+        device_icon=descriptor.icon,
         device_rows=(
             ("Priority", str(rig.servo.describe()["priority"]).partition(" (")[0]),
             *_calibration_rows(rig.device),
@@ -756,15 +761,15 @@ def _session_facts(chosen: NewSession, protocol: Protocol, schedule: Schedule, r
 
 
 def _calibration_rows(device: Device) -> tuple[tuple[str, str], ...]:
-    """Return the rows about the calibration of a device, empty if it cannot be calibrated."""
-    used = device.describe().get("calibration")
-    if used is None:
+    """Return the rows about the calibration of a device; none if it cannot be calibrated."""
+    calibration = device.describe().get("calibration")
+    if calibration is None:
         return ()
-    return (("Calibration", f"of {used['measured']}" if isinstance(used, dict) else "none"),)
+    return (("Calibration", f"of {calibration['measured']}" if isinstance(calibration, dict) else "none"),)
 
 
 def _make_position_reader(hand: HandOrders | None, servo: Servo) -> Callable[[], Vector]:
-    """Return a function for the hand's position, or a simulated hand's aim, since its lag would reveal the liquid."""
+    """Return a function for the hand's position or, since lag would reveal the liquid, a simulated hand's aim."""
     if hand is not None:
         return lambda: hand.aim_m
 
@@ -778,10 +783,10 @@ def _make_position_reader(hand: HandOrders | None, servo: Servo) -> Callable[[],
 def _make_hand_for_page(
     hand: HandOrders, chosen: NewSession, clock: Callable[[], float]
 ) -> Callable[[Page], Hand | None]:
-    """Return a function that makes the simulated hand of a page; on pages without a task the hand rests."""
+    """Return a function that creates the simulated hand of a page; on pages without a task, the hand rests."""
     draw = stream(chosen.seed, f"run/{chosen.participant}/hand").random
 
-    def hand_on(page: Page) -> Hand | None:
+    def hand_for_page(page: Page) -> Hand | None:
         if not isinstance(page, TaskPage):
             hand.rest()
         elif page.interval is None or not page.interval.resting:
@@ -790,4 +795,4 @@ def _make_hand_for_page(
             rest_hand(page.task, hand)
         return None
 
-    return hand_on
+    return hand_for_page

@@ -1,8 +1,8 @@
 """One session, from the operator's choices to the closed journal.
 
-However a session's windows go away (its end, Ctrl+C, a signal, a failure in here), the servo is stopped with zero force
-and the journal is closed. Only the operator's "End session" writes an end; every other session stays unfinished and can
-be resumed. Nothing is created on the disk before device and servo are ready.
+However a session's windows close (its end, Ctrl+C, a signal, a failure), the servo is stopped with zero force and the
+journal is closed. Only the operator's "End session" writes an end; every other session stays unfinished and can be
+resumed. Nothing is created on the disk before device and servo are ready.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import threading
 import traceback
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, suppress
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -67,12 +68,12 @@ if TYPE_CHECKING:
 
 
 def load_windows() -> None:
-    """Load modules and versions that the session's windows need while the opening window is shown."""
+    """Import the modules that the session's windows need, while the opening window is shown."""
     import study_app.app.session.bridge  # noqa: PLC0415
     import study_app.app.session.preflight_controller  # noqa: PLC0415
     import study_app.gui.devices  # noqa: PLC0415
     import study_app.store.receipt  # noqa: PLC0415
-    import study_app.store.recordings  # noqa: PLC0415 - and pyarrow, which the recorder needs
+    import study_app.store.recordings  # noqa: PLC0415 - with pyarrow, which the recorder needs
 
     study_app.store.receipt.versions()
 
@@ -83,8 +84,8 @@ NOT_EXAMINED = ("There is nothing to diagnose", "Diagnostics are not available f
 class LiveSession(QObject):
     """One session from the operator's choices to the closed journal.
 
-    ``over`` is emitted once; then ``code`` is the exit code and ``error`` the unhandled error, if any. With ``asks``
-    the operator sees the pre-flight results and decides whether to begin. The session waits for ``compilation``.
+    ``over`` is emitted once, at the end; then ``code`` is the exit code and ``error`` the error, if any. With ``asks``,
+    the operator sees the pre-flight checks and decides whether to begin. The session waits for ``compilation``.
     """
 
     over = Signal()
@@ -107,7 +108,7 @@ class LiveSession(QObject):
         self._compilation = compilation
         self.preflight: Preflight | None = None
         self.theme = theme
-        self.settings, self._unread = settings_here()
+        self.settings, self._settings_problem = settings_here()
         self.code = 0
         self.error: StudyError | None = None
         self.bridge: SessionBridge | None = None
@@ -120,7 +121,7 @@ class LiveSession(QObject):
         self._closed = False
         self._ending = threading.Event()
         self._steps: Iterator[None] | None = None
-        self._windows: list[QWidget] = []  # until the bridge has them
+        self._windows: list[QWidget] = []  # until the bridge owns them
         self.patience_s = OPENING_PATIENCE_S
         self._opening = Background(self)
         self._opening.done.connect(self._show_preflight_or_windows)
@@ -128,12 +129,12 @@ class LiveSession(QObject):
         self._compiled.connect(self._show_compiled, Qt.ConnectionType.QueuedConnection)
 
     def open(self) -> None:
-        """Show the opening window and prepare device and servo; an error closes the session and emits ``over``."""
+        """Show the opening window, and prepare device and servo in the background."""
         self._run_step(self._show_note)
 
     def _show_note(self) -> None:
-        if self._unread and self._progress is not None:
-            self._progress(self._unread)
+        if self._settings_problem and self._progress is not None:
+            self._progress(self._settings_problem)
         self.note = OpeningWindow(f"Preparing {Path(self.chosen.source).stem}", self.chosen.who, theme=self.theme)
         self.note.cancelled.connect(self.cancel)
         place_window(self.note, self.note.screen(), corner=False)
@@ -146,7 +147,7 @@ class LiveSession(QObject):
 
     @property
     def is_opening(self) -> bool:
-        """Whether device and servo are being prepared, even if the session was cancelled in the meantime."""
+        """Whether device and servo are being prepared, even if the session was cancelled meanwhile."""
         return self._opening.busy
 
     def wait(self, patience_s: float = OPENING_PATIENCE_S) -> None:
@@ -166,17 +167,17 @@ class LiveSession(QObject):
             self._close_everything()
 
     def _prepare_rig(self) -> Ready | Exception:
-        """Compile, open, start and measure in a separate thread; return the parts, or the exception."""
+        """Compile, open, start and measure the device; return the parts, or the exception. Called in a thread."""
         rig: Rig | None = None
         outlets: Outlets | None = None
         videos: Videos | None = None
         try:
             load_windows()
-            from study_app.haptics.kernels import following_compilation  # noqa: PLC0415 - the compiler: only in this thread
+            from study_app.haptics.kernels import following_compilation  # noqa: PLC0415 - imports the compiler
 
             study = self.chosen.read_protocol()
             check_choices(self.chosen, study)
-            if not self.chosen.device_options:  # which may name a port that the probe does not search
+            if not self.chosen.device_options:  # they may name a port that the probe does not search
                 check_connected(self.chosen.device)
             settings = study_settings(study, self.chosen.tremor(), self.chosen.device_options)
             if self._compilation is not None:
@@ -186,44 +187,43 @@ class LiveSession(QObject):
                 outlets = None if self.chosen.played else open_outlets(self.settings, rig.servo, study.study.blinding)
                 videos = unopened_videos(self.chosen, study, self.settings.camera, rig)
                 facts = measure_rig(rig, self.chosen, videos, sleep=self._ending.wait)
-                made = Ready(rig, facts, outlets=outlets, videos=videos)
+                ready = Ready(rig, facts, outlets=outlets, videos=videos)
             if not self._closed:
-                gc.freeze()  # keep the loaded objects out of the windows' thread's collections
+                gc.freeze()  # so that collections in the GUI thread skip the loaded objects
         except Exception as error:  # noqa: BLE001 - handed over: a thread has no caller to raise it to
             with suppress(Exception):  # the first error is the cause
                 _close_all(rig, videos, outlets)
             return error
-        return made
+        return ready
 
-    def _show_preflight_or_windows(self, made: object) -> None:
-        """Show the pre-flight window, or claim the session on the disk and open its windows at once."""
-        if isinstance(made, Ready):
-            self.rig, self._outlets, self._videos = made.rig, made.outlets, made.videos
+    def _show_preflight_or_windows(self, outcome: object) -> None:
+        """Show the pre-flight window, or open the windows of the session at once."""
+        if isinstance(outcome, Ready):
+            self.rig, self._outlets, self._videos = outcome.rig, outcome.outlets, outcome.videos
         if self._closed:
             self._close_rig()
             self.deleteLater()
             return
-        if self._asks and isinstance(made, Ready):
-            ready = made
-            self._run_step(lambda: self._show_preflight(ready))
+        if self._asks and isinstance(outcome, Ready):
+            self._run_step(partial(self._show_preflight, outcome))
         else:
-            self._open_windows(made)
+            self._open_windows(outcome)
 
-    def _open_windows(self, made: object) -> None:
-        """Open the windows step by step; other events are handled between the steps."""
-        if self._steps is None or not isinstance(made, Ready):
-            self._steps = self.open_windows(made)
+    def _open_windows(self, ready: object) -> None:
+        """Open the windows step by step, with other events handled between the steps."""
+        if self._steps is None or not isinstance(ready, Ready):
+            self._steps = self.open_windows(ready)
             self._run_step(self._run_next_step)
 
     def _run_next_step(self) -> None:
-        """Run the next step, unless the session was closed meanwhile."""
+        """Run the next step of opening the windows, unless the session was closed meanwhile."""
         if not self._closed and self._steps is not None and next(self._steps, self) is None:
             QTimer.singleShot(
                 1, self, lambda: self._run_step(self._run_next_step)
-            )  # 0 ms may be the same iteration of the loop
+            )  # 0 ms might run it in the same iteration of the loop
 
     def _run_step(self, step: Callable[[], None]) -> None:
-        """Run a step towards the first page; an error closes the session in the proper order."""
+        """Run a step of the start-up; an error closes the session."""
         try:
             step()
         except Exception as raised:  # noqa: BLE001 - reported; open parts must be closed in order
@@ -235,38 +235,38 @@ class LiveSession(QObject):
                 self.code = BUG
             self._close_everything()
 
-    def _show_preflight(self, made: Ready) -> None:
-        """Show the results of the checks to the operator, who starts the session."""
-        from study_app.app.session.preflight_controller import Preflight  # noqa: PLC0415 - pyqtgraph: only once it is needed
+    def _show_preflight(self, ready: Ready) -> None:
+        """Show the results of the checks to the operator, who may start the session."""
+        from study_app.app.session.preflight_controller import Preflight  # noqa: PLC0415 - imports pyqtgraph
 
         study, who = self.chosen.read_protocol(), self.chosen.who
-        asked = Preflight(self.chosen, study, made, lambda: self.chosen_screens()[0], who, self.theme)
-        asked.started.connect(self._open_windows)
-        asked.failed.connect(self._open_windows)
-        asked.cancelled.connect(self.cancel)
-        self.preflight = asked
+        preflight = Preflight(self.chosen, study, ready, lambda: self.chosen_screens()[0], who, self.theme)
+        preflight.started.connect(self._open_windows)
+        preflight.failed.connect(self._open_windows)
+        preflight.cancelled.connect(self.cancel)
+        self.preflight = preflight
         self._close_note()
-        asked.open()
+        preflight.open()
 
-    def open_windows(self, made: object) -> Iterator[None]:
-        """Continue with the prepared parts, or raise the error; each step up to a yield takes a few frames."""
-        if not isinstance(made, Ready):
-            raise made if isinstance(made, Exception) else TypeError(made)
-        from study_app.app.session import bridge  # noqa: PLC0415 - pyqtgraph: only once it is needed
+    def open_windows(self, ready: object) -> Iterator[None]:
+        """Open the windows with the prepared parts, or raise the error; each step up to a yield takes a few frames."""
+        if not isinstance(ready, Ready):
+            raise ready if isinstance(ready, Exception) else TypeError(ready)
+        from study_app.app.session import bridge  # noqa: PLC0415 - imports pyqtgraph
 
-        chosen, rig = self.chosen, made.rig
+        chosen, rig = self.chosen, ready.rig
         source = chosen.read_source()
         protocol = parse(source, chosen.source)
-        shown_on, operated_on = self.chosen_screens()
-        shares_screen, rate_hz = shown_on is operated_on, shown_on.refreshRate()
-        text_scale = text_scale_on(self.settings, shown_on)
-        results = preflight_checks(made.facts_with(rate_hz, shown_on.devicePixelRatio()), protocol)
+        participant_screen, operator_screen = self.chosen_screens()
+        shares_screen, rate_hz = participant_screen is operator_screen, participant_screen.refreshRate()
+        text_scale = text_scale_on(self.settings, participant_screen)
+        results = preflight_checks(ready.facts_with(rate_hz, participant_screen.devicePixelRatio()), protocol)
         if self._progress is not None:
             for check in results:
                 self._progress(str(check))
         if reason := refusal_reasons(results):
             raise SessionError(f"the session did not start: {reason}")
-        screens = described_screens(self.settings, shown_on, operated_on)
+        screens = described_screens(self.settings, participant_screen, operator_screen)
         yield
         operator = bridge.make_operator_window(chosen, protocol, rig, self.theme)
         self._windows.append(operator)
@@ -279,23 +279,23 @@ class LiveSession(QObject):
             photodiode=self.settings.photodiode,
         )
         self._windows.append(participant)
-        yield  # none until the bridge exists: it leaves the session in order
-        parts = made.masking, made.outlets, made.videos
+        yield  # the last before the bridge, which can close the session in order
+        parts = ready.masking, ready.outlets, ready.videos
         store = self._store = open_store(chosen, protocol, source, rig, screens, *parts)
         if not chosen.played:
-            with suppress(StoreError):  # only the designer's comparisons need the copy
+            with suppress(StoreError):  # the copy is only for comparisons in the designer
                 keep_content(source)
         self._crash_trace = CrashTrace(store.folder.crash)
         store.append(journal_events.Preflight(checks=[check.entry for check in results]))
         plan = bridge.session_plan(chosen, protocol, store)
         self.bridge = bridge.connect_windows(
-            chosen, plan, store, rig, operator, participant, refresh_hz=rate_hz, videos=made.videos
+            chosen, plan, store, rig, operator, participant, refresh_hz=rate_hz, videos=ready.videos
         )
         self._windows.clear()
         self.bridge.done.connect(self._finish_session)
         self.bridge.diagnose_asked.connect(self.diagnose)
         yield
-        self.bridge.start()  # before the windows are shown: a session that has not begun accepts no requests
+        self.bridge.start()  # before the windows are shown, since only a begun session accepts requests
         yield
         yield from bridge.show_windows(self.bridge, self.chosen_screens, played=chosen.played)
         self._close_note()
@@ -306,15 +306,15 @@ class LiveSession(QObject):
         return 0.0 if self._store is None else self._store.clock.seconds()
 
     def chosen_screens(self) -> tuple[QScreen, QScreen]:
-        """Return the participant's and the operator's screens, as chosen or as set for this machine."""
+        """Return the participant's and the operator's screen, as chosen or as set for this machine."""
         chosen = self.chosen.screen
         return choose_screens(chosen if chosen is not None else screen_number(self.settings))
 
     def diagnose(self) -> None:
         """Open the diagnosis of the device above the operator's window; the bridge has stopped the force."""
-        from study_app.gui.devices import open_diagnosis  # noqa: PLC0415 - the note comes before it
+        from study_app.gui.devices import open_diagnosis  # noqa: PLC0415 - after the opening window is shown
 
-        assert self.bridge is not None  # noqa: S101 - the window that asks exists
+        assert self.bridge is not None  # noqa: S101 - its window has asked
         name = self.chosen.device
         device = descriptor_of(name)
         if device.doctor is None:
@@ -338,13 +338,13 @@ class LiveSession(QObject):
             self.bridge.show_device_line(line)
 
     def _finish_session(self) -> None:
-        """Close the session after its windows; keep the error that ended it for the caller."""
+        """Close the session after its windows, and store the error that ended it, if any."""
         assert self.bridge is not None  # noqa: S101 - the sender exists
         self.theme = self.bridge.operator.theme
         if (proof := self.bridge.parts.journal.fingerprint) and self._store is not None:
-            tell = self._progress or logging.getLogger(__name__).info
-            tell(f"session fingerprint (also in the study's fingerprints.txt): {proof}")
-            write_proof(self._store.place.study_folder, tell)
+            report = self._progress or logging.getLogger(__name__).info
+            report(f"session fingerprint (also in the study's fingerprints.txt): {proof}")
+            write_proof(self._store.place.study_folder, report)
         if self._progress is not None and self._store is not None:
             status, folder = self.bridge.parts.journal.progress.ended, self._store.folder.path
             self._progress(f"session {status}: {folder}" if status else f"session not finished: {folder}")
@@ -356,7 +356,7 @@ class LiveSession(QObject):
         self._close_everything()
 
     def cancel(self) -> None:
-        """Cancel the session if it is not on the disk yet; later it is ended in its windows."""
+        """Cancel the session if it is not on the disk yet; a later one is ended in its windows."""
         if self._store is None:
             self.code = CANCELLED
             self._close_everything()
@@ -368,10 +368,10 @@ class LiveSession(QObject):
         self._closed = True
         self._ending.set()
         if self.bridge is None:
-            unfreeze_garbage()  # a bridge does this when it leaves
+            unfreeze_garbage()  # otherwise the bridge does this
         try:
             with ExitStack() as closing:
-                closing.callback(self._close_rig)  # even where a window cannot be closed
+                closing.callback(self._close_rig)  # even if a window cannot be closed
                 closing.callback(self._close_preflight)
                 closing.callback(self._close_note)
                 for window in self._windows:
@@ -381,7 +381,7 @@ class LiveSession(QObject):
                     self.bridge.leave_without_asking()  # no window stays open without its session
         except StudyError as error:
             self.error = self.error or error  # the first error is the cause
-        except Exception:  # noqa: BLE001 - printed; listeners of the end must be notified
+        except Exception:  # noqa: BLE001 - printed, since ``over`` must be emitted
             traceback.print_exc()
             self.code = BUG
         self.over.emit()
@@ -395,15 +395,17 @@ class LiveSession(QObject):
             note.deleteLater()
 
     def _close_preflight(self) -> None:
-        asked, self.preflight = self.preflight, None
-        if asked is not None:
-            asked.close()
+        preflight, self.preflight = self.preflight, None
+        if preflight is not None:
+            preflight.close()
 
     def _close_rig(self) -> None:
         rig, self.rig = self.rig, None
         bridge = self.bridge
-        if bridge is not None and not bridge.reconnecting.wait(self.patience_s):  # it ends now that this is closed
-            rig = None  # its thread keeps the rig, at zero force, until the program ends
+        if bridge is not None and not bridge.reconnecting.wait(
+            self.patience_s
+        ):  # a reconnection ends once the session is closed
+            rig = None  # the thread keeps the rig, at zero force, until the program ends
         store, self._store = self._store, None
         outlets, self._outlets = self._outlets, None
         crash_trace, self._crash_trace = self._crash_trace, None
@@ -412,7 +414,7 @@ class LiveSession(QObject):
 
 
 def _close_all(rig: Rig | None, *parts: SessionStore | CrashTrace | Outlets | Videos | None) -> None:
-    """Send zero force, then close the parts in this order, even if one fails."""
+    """Send zero force, then close the parts in order, even if one fails."""
     with ExitStack() as closing:
         for part in reversed(parts):
             if part is not None:
@@ -445,17 +447,17 @@ def run(
     Parameters
     ----------
     protocol : file or name of a protocol
-    participant, session, operator : participant's id, session number, operator's id
-    seed : default: drawn, shown and recorded
-    device, language : default: the mouse, the protocol's first language
+    participant, session, operator : the participant's ID, the session number, the operator's initials
+    seed : by default drawn at random, shown and recorded
+    device, language : by default the mouse, and the protocol's first language
     device_options : values of the device's options, by name
     windowed, screen : where the participant's window opens; screens count from 1
-    results : the study's folder; default: ``results/<study>`` in the workspace, for pilots ``results/<study>-pilot``
-    pilot : a trial run in a framed window, marked and stored apart from participants' data
-    row_of : the replaced participant, whose order and place in the group the session gets; default: none
-    group : the participant's pre-existing group; default, if there is an earlier session: the recorded one
+    results : the study's folder; by default ``results/<study>`` in the workspace, or ``results/<study>-pilot``
+    pilot : whether this is a pilot, in a framed window, marked and stored apart from participants' data
+    row_of : the replaced participant, whose order and position in the group the session uses
+    group : the participant's pre-existing group; by default the one recorded in an earlier session
     recordings : whether every tick of the servo and every frame of a trial is recorded
-    progress : called with the lines of the pre-flight, before the first page
+    progress : called with the lines of the pre-flight checks, before the first page
 
     Raises
     ------
@@ -502,26 +504,26 @@ def resume(
     screen: int | None = None,
     progress: Callable[[str], object] | None = None,
 ) -> int:
-    """Continue an interrupted session; return the exit code when its windows are closed.
+    """Resume an interrupted session; return the exit code when its windows are closed.
 
     A rehearsed session continues as a rehearsal, without windows.
 
     Parameters
     ----------
-    protocol : file or name of its protocol; default: searched for among the available ones
-    device : default: the device of its start
+    protocol : file or name of the protocol; by default searched for among the available ones
+    device : by default the device with which the session began
     device_options, operator, windowed, screen, progress : as for ``run``
 
     Raises
     ------
     StudyError
-        It cannot be resumed (finished, changed protocol, open elsewhere), or device or servo failed meanwhile.
+        The session cannot be resumed (finished, changed protocol, open elsewhere), or device or servo failed.
     """
     folder = Path(session_folder)
     session = locate_session(folder)[1]
     refuse_never_begun(session)
     if is_rehearsal(receipt.read(session.receipt)):
-        from study_app.session.simulated import rehearsal  # noqa: PLC0415 - the compiler: only once it is needed
+        from study_app.session.simulated import rehearsal  # noqa: PLC0415 - imports the compiler
 
         rehearsal.resume_rehearsal(folder, protocol=protocol)
         return 0
@@ -539,7 +541,7 @@ def resume(
 
 
 def run_session(chosen: NewSession, progress: Callable[[str], object] | None) -> int:
-    """Open a session's windows and return when they are closed."""
+    """Run a session in its windows; return the exit code when they are closed, or raise the session's error."""
     application_here()
     live = LiveSession(chosen, LIGHT, progress)
     loop = QEventLoop()

@@ -1,9 +1,8 @@
-"""Play from here: a pilot of the draft from the shown step on, with the simulated hand or a device.
+"""Playback in the study designer: a pilot of the draft from the shown step on, with the simulated hand or a device.
 
-The pilot goes on by itself after the skipped steps, and is over where it is stopped. The researcher is participant and
-operator. Holding Esc in any window, "Stop playing" above the page where all windows share a screen, closing the
-participant's window and every failure end the force first, then the session, then the window; the journal has an end
-unless the disk took none.
+The steps before are skipped, and the pilot ends where it is stopped. The researcher is both participant and operator.
+Holding Esc in any window, "Stop playing", closing the participant's window and every failure stop the force first, then
+end the session, then close the window.
 """
 
 import logging
@@ -21,7 +20,7 @@ from PySide6.QtWidgets import QApplication
 
 from study_app.app.failures import BUG, Patience
 from study_app.app.session.live_session import LiveSession
-from study_app.designer import header as shown
+from study_app.designer import header as notices
 from study_app.designer.controller import DesignerController
 from study_app.designer.header import Notice, PlayDevices
 from study_app.designer.participant.playable import NotPlayableError, Playable, StepPosition, part_to_play
@@ -45,7 +44,7 @@ _STOPPED: Final = "stopped during playback in the study designer"
 
 
 class PlayedSession(LiveSession):
-    """A session that is played from the designer; ``over`` is emitted once, as for every session."""
+    """A session that is played from the designer, without the operator's window."""
 
     _shown = False
 
@@ -55,7 +54,7 @@ class PlayedSession(LiveSession):
 
     def open_windows(self, made: object) -> Iterator[None]:
         yield from super().open_windows(made)
-        assert self.bridge is not None  # noqa: S101 - just made
+        assert self.bridge is not None  # noqa: S101 - just created
         self._shown = True
         participant, runner = self.bridge.participant, self.bridge.runner
         participant.installEventFilter(self)
@@ -73,7 +72,7 @@ class PlayedSession(LiveSession):
         return None if self.bridge is None else self.bridge.parts.journal.progress.ended
 
     def stop(self) -> None:
-        """Send zero force, end the session and close its window; cancel it if it has not begun."""
+        """Send zero force, end the session and close its window; or cancel a session that has not begun."""
         bridge = self.bridge
         if self._closed:
             return
@@ -84,7 +83,7 @@ class PlayedSession(LiveSession):
         try:
             if not bridge.runner.finished:
                 bridge.runner.post(EndRequested(bridge.parts.clock(), "aborted", _STOPPED))
-        except StudyError as error:  # it stays unfinished
+        except StudyError as error:  # the session stays unfinished
             log.warning("the played session does not have an end: %s", error)
         finally:
             bridge.leave_without_asking()
@@ -105,7 +104,7 @@ class PlayedSession(LiveSession):
             QTimer.singleShot(_END_SHOWN_MS, self, self._leave_session)
 
     def _stop_later(self) -> None:
-        """Stop after the current event, which may be the window's own."""
+        """Stop after the current event, which the window may still be handling."""
         QTimer.singleShot(0, self, self.stop)
 
     def _leave_session(self) -> None:
@@ -114,7 +113,7 @@ class PlayedSession(LiveSession):
 
 
 _SIMULATED: Final = "scripted"
-_LOOK_S: Final = 0.01
+_POLL_S: Final = 0.01
 FOLDER: Final = "liquid-study-play-"
 _OUTCOMES: Final = {
     "completed": "completed",
@@ -127,7 +126,7 @@ _OUTCOMES: Final = {
 
 @dataclass(slots=True)
 class _Pilot:
-    """A played part: its temporary folder, and its session once it runs."""
+    """A pilot: the played part of the study, its temporary folder, and its session once that runs."""
 
     what: Playable
     device: str
@@ -139,7 +138,7 @@ class _Pilot:
 class Playing(QObject):
     """Plays the open study, one pilot at a time; ``kept`` carries the study folder of a pilot that was kept.
 
-    ``where`` returns the preview's position; None is the first step that shows the selected element.
+    ``where`` returns the preview's position, or None for the first step that shows the selected element.
 
     Parameters
     ----------
@@ -156,8 +155,8 @@ class Playing(QObject):
         self.kept.connect(designer.runs.read_in_background)
         self.device = _SIMULATED
         self.pilot: _Pilot | None = None
-        self._asked: Playable | None = None
-        self._left: list[PlayedSession] = []
+        self._part_to_play: Playable | None = None
+        self._opening: list[PlayedSession] = []
         self._preparing = Background(self)
         self._preparing.done.connect(self._start_pilot)
         header = place.header
@@ -179,7 +178,7 @@ class Playing(QObject):
         self._show_devices()
 
     def play(self) -> None:
-        """Play from here, unless a part of the rest is faulty; ask before a device is used."""
+        """Play from the shown step, unless the study has problems from there on; ask before a device is used."""
         self.place.flush()
         self.editing.leave_entries()
         opened = self.editing.opened
@@ -188,24 +187,24 @@ class Playing(QObject):
         study = opened.study
         try:
             playable_part = part_to_play(study, opened.selected, self.where())
-        except NotPlayableError as refused:
+        except NotPlayableError as error:
             names = {str(problem): row.name for problem, row in zip(study.problems, fault_rows(study), strict=True)}
-            named = (replace(problem, place=names.get(str(problem), problem.place)) for problem in refused.problems)
-            self._show_notice(shown.refusal_notice(tuple(map(str, named))))
+            named = (replace(problem, place=names.get(str(problem), problem.place)) for problem in error.problems)
+            self._show_notice(notices.refusal_notice(tuple(map(str, named))))
             return
-        self._asked = playable_part
+        self._part_to_play = playable_part
         if self.device == _SIMULATED:
             self._prepare_pilot()
         else:
             has_force = descriptor_of(self.device).kind == "felt"
-            self._show_notice(shown.device_question(title_of(self.device), playable_part.words, has_force=has_force))
+            self._show_notice(notices.device_question(title_of(self.device), playable_part.words, has_force=has_force))
 
     def stop(self) -> None:
-        """Stop the pilot: zero force first."""
+        """Stop the pilot, with zero force first."""
         if self.pilot is not None and self.pilot.session is not None:
             self.pilot.session.stop()
         elif self._preparing.busy:
-            self.pilot = None  # `_start_pilot` deletes its folder once nothing is written there
+            self.pilot = None  # `_start_pilot` deletes its folder once the preparation has ended
             self._show_notice(None)
         elif self.pilot is not None and self.pilot.choices is None:  # a bug ended its preparation
             self._delete_data()
@@ -227,9 +226,9 @@ class Playing(QObject):
     # pilots
 
     def _prepare_pilot(self) -> None:
-        """Simulate the steps before the first shown one, in the background."""
+        """Simulate the skipped steps in the background."""
         self._delete_data()
-        part, self._asked = self._asked, None
+        part, self._part_to_play = self._part_to_play, None
         if part is None:
             return
         try:
@@ -241,10 +240,10 @@ class Playing(QObject):
             return
         pilot = self.pilot = _Pilot(part, self.device, folder)
         self._preparing.run(lambda: _prepare_session(pilot))
-        self._show_notice(shown.playing_notice(part.words, title_of(pilot.device)))
+        self._show_notice(notices.playing_notice(part.words, title_of(pilot.device)))
 
-    def _start_pilot(self, made: tuple[_Pilot, NewSession | StudyError]) -> None:
-        pilot, choices = made
+    def _start_pilot(self, outcome: tuple[_Pilot, NewSession | StudyError]) -> None:
+        pilot, choices = outcome
         if pilot is not self.pilot:  # it was stopped meanwhile
             _remove_folder(pilot.folder)
             self.place.header.play.show_playing(self.is_under_way)
@@ -264,13 +263,13 @@ class Playing(QObject):
         if pilot is None or pilot.session is None:
             return
         session, pilot.session = pilot.session, None
-        self._left = [earlier for earlier in (*self._left, session) if earlier.is_opening]
+        self._opening = [earlier for earlier in (*self._opening, session) if earlier.is_opening]
         if session.error is not None:
             self.place.message.emit("Playback was stopped", f"{session.error}.")
         elif session.code == BUG:
             self.place.message.emit("A bug in the program stopped the pilot", "The terminal shows the details.")
         if session.has_begun:
-            self._show_notice(shown.ended_notice(pilot.what.words, _OUTCOMES.get(session.status or "", "stopped")))
+            self._show_notice(notices.ended_notice(pilot.what.words, _OUTCOMES.get(session.status or "", "stopped")))
         else:
             self._delete_data()
             self._show_notice(None)
@@ -279,36 +278,36 @@ class Playing(QObject):
         pilot = self.pilot
         if pilot is None or pilot.choices is None or pilot.session is not None:
             return
-        to = kept_pilot_folder(self.editing.results, pilot.what.protocol.study.name)
+        target = kept_pilot_folder(self.editing.results, pilot.what.protocol.study.name)
         try:
-            copy_folder(pilot.choices.results, to)
+            copy_folder(pilot.choices.results, target)
         except StudyError as error:
             self.place.message.emit("The pilot was not saved", f"{error}.")
             return
-        with suppress(StoreError):  # only the tab Changes needs the copy
+        with suppress(StoreError):  # the copy is only for the tab Changes
             keep_content(pilot.what.source)
         self._delete_data()
-        self._show_notice(shown.kept_notice(to.name))
-        self.kept.emit(to)
+        self._show_notice(notices.kept_notice(target.name))
+        self.kept.emit(target)
 
     def end_by_signal(self, number: int) -> None:
         if self.pilot is not None and self.pilot.session is not None:
             self.pilot.session.end_by_signal(number)
 
     def end(self, patience: Patience) -> None:
-        """Stop, wait for devices that are being opened, and delete the pilot's data."""
+        """Stop the pilot, wait for devices that are being opened, and delete the pilot's data."""
         self.stop()
         while self._preparing.busy and patience.left_s > 0:
             QApplication.processEvents()
-            time.sleep(_LOOK_S)
-        for session in self._left:
+            time.sleep(_POLL_S)
+        for session in self._opening:
             session.wait(patience.left_s)
         self._delete_data()
 
     def _discard_pilot(self) -> None:
         self.stop()
         self._delete_data()
-        self._asked = None
+        self._part_to_play = None
         self._show_notice(None)
 
     def _delete_data(self) -> None:
@@ -327,7 +326,7 @@ class Playing(QObject):
 
 
 def _prepare_session(pilot: _Pilot) -> tuple[_Pilot, NewSession | StudyError]:
-    """Return the choices of a session that starts at the pilot's first step, or the error."""
+    """Create a session from the pilot's first step on; return the pilot, and the session's choices or the error."""
     part, study = pilot.what, pilot.what.protocol.study
     file = pilot.folder / f"{study.name}.toml"
     start = SessionStart(

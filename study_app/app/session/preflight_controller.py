@@ -1,4 +1,4 @@
-"""What is measured before a session, the question whether to begin, and the check of a computer without a session."""
+"""The checks before a session and the decision to begin, and the check of a computer without a session."""
 
 import threading
 from collections.abc import Callable, Iterable
@@ -38,11 +38,11 @@ from study_app.store.files import StudyFolder, locate_session
 from study_app.store.journals import journal
 from study_app.store.journals.journal_events import start_of
 
-_LOOK_MS = 100
+_POLL_MS = 100
 PATIENCE_S = 10.0
 
 
-class Asked(NamedTuple):
+class SceneQuestion(NamedTuple):
     """A scene to appraise: its liquid, and the fastest stroke in it."""
 
     liquid: str
@@ -51,14 +51,16 @@ class Asked(NamedTuple):
 
 
 class Appraisal:
-    """Cost of the most expensive scene of a study, and error of the least accurate; scenes are appraised in turn.
+    """The cost of a study's most expensive scene and the error of its least accurate one, measured by a process.
 
-    ``velocity_errors`` are those of `Measurements`, None if the device's dynamics are known. ``withheld`` is the share
-    of each liquid's force that is withheld in the fastest stroke on a device of these ``dynamics``, once all are known.
-    ``delivery`` is the predicted loss of a simulated participant, requested ``last``.
+    ``velocity_errors`` are those of `Measurements`, or None if the device's dynamics are known. ``withheld`` is the
+    share of each liquid's force that is withheld in the fastest stroke on a device with ``dynamics``, once all scenes
+    are appraised. ``delivery`` is the predicted loss of trials of a simulated participant, which is requested ``last``.
     """
 
-    def __init__(self, scenes: Iterable[Asked], dynamics: Dynamics, last: DeliveryQuestion | None = None) -> None:
+    def __init__(
+        self, scenes: Iterable[SceneQuestion], dynamics: Dynamics, last: DeliveryQuestion | None = None
+    ) -> None:
         self._waiting = list(scenes)
         self._last = last
         self.dynamics = dynamics
@@ -78,18 +80,18 @@ class Appraisal:
         return (not self._waiting and self._last is None) or not self.appraiser.works
 
     def read_answers(self) -> bool:
-        """Read the available answers; return whether there were any."""
-        news = False
+        """Read the available answers; return whether a result has changed."""
+        has_news = False
         for number, answer in self.appraiser.answers():
             if number != self._asked or self.is_over:
                 continue
             if isinstance(answer, Costs):
                 self.tick_s = max(self.tick_s or 0.0, answer.tick_ns * 1e-9)
-                news = True
+                has_news = True
                 continue
             if not self._waiting:
                 self.delivery = answer if isinstance(answer, PredictedDelivery) else None
-                self._last, news = None, True
+                self._last, has_news = None, True
                 continue
             self._errors_n.append(answer.force_n if isinstance(answer, Errors) else None)
             if isinstance(answer, Errors) and answer.velocity is not None:
@@ -99,8 +101,8 @@ class Appraisal:
                 self._shares[liquid] = max(answer.withheld, self._shares.get(liquid, 0.0))
             self._request_next()
             if not self._waiting:
-                self.error_n, self.withheld, news = _largest_error_n(self._errors_n), self._shares, True
-        return news
+                self.error_n, self.withheld, has_news = _largest_error_n(self._errors_n), self._shares, True
+        return has_news
 
     def _request_next(self) -> None:
         if self._waiting:
@@ -114,10 +116,10 @@ class Appraisal:
 
 
 class Preflight(QObject):
-    """Shows the window before a session, repeats measurements on request, and emits the decision once.
+    """Shows the pre-flight window, repeats measurements on request, and emits the operator's decision once.
 
-    The rig is owned by the caller; the servo ticks at rest meanwhile, and ``failed`` is emitted when it stops itself or
-    the participant's screen is removed. ``screen`` returns that screen: see ``choose_screens``.
+    The caller owns the rig, whose servo runs at rest meanwhile. ``failed`` is emitted if the servo stops itself or the
+    participant's screen is removed. ``screen`` returns that screen (see ``choose_screens``).
     """
 
     started = Signal(object)
@@ -136,12 +138,12 @@ class Preflight(QObject):
         super().__init__()
         self._chosen, self._protocol, self._ready, self._screen = chosen, protocol, ready, screen
         self._who = who
-        self._goes_on = _resumption_rows(chosen, protocol)
+        self._resumption = _resumption_rows(chosen, protocol)
         self.measuring = Background(self)
-        self.measuring.done.connect(self._use_measurements)
+        self.measuring.done.connect(self._apply_measurements)
         self.measuring.failed.connect(self.failed)
         self._ending = threading.Event()
-        self.appraisal = _appraisal(protocol, ready.facts)
+        self.appraisal = _start_appraisal(protocol, ready.facts)
         self.window = PreflightWindow(
             protocol.limits.lateness_ms * 1e3, asks_masking=descriptor_of(chosen.device).kind == "felt", theme=theme
         )
@@ -152,7 +154,7 @@ class Preflight(QObject):
         self._outlets_shown = ready.outlet_statuses
         self._timer = QTimer(self)
         self._timer.timeout.connect(self._watch_servo_and_screen)
-        self._timer.start(_LOOK_MS)
+        self._timer.start(_POLL_MS)
 
     def open(self) -> None:
         self._show_checks()
@@ -160,7 +162,7 @@ class Preflight(QObject):
         self.window.show()
 
     def close(self) -> None:
-        """Close window and processes; wait for a measurement, which uses the servo."""
+        """Close window and process, and wait for a running measurement, which uses the servo."""
         self._timer.stop()
         self._ending.set()
         self.appraisal.close()
@@ -171,9 +173,9 @@ class Preflight(QObject):
 
     @property
     def _facts(self) -> Measurements:
-        appraisal, shown_on = self.appraisal, self._screen()
+        appraisal, screen = self.appraisal, self._screen()
         return replace(
-            self._ready.facts_with(shown_on.refreshRate(), shown_on.devicePixelRatio()),
+            self._ready.facts_with(screen.refreshRate(), screen.devicePixelRatio()),
             tick_s=appraisal.tick_s,
             withheld=appraisal.withheld,
             delivery=appraisal.delivery,
@@ -183,7 +185,7 @@ class Preflight(QObject):
     def _show_checks(self) -> None:
         try:
             facts = self._facts
-        except StudyError as error:  # the screen is gone
+        except StudyError as error:  # the screen was removed
             self._timer.stop()
             self.failed.emit(error)
             return
@@ -191,13 +193,13 @@ class Preflight(QObject):
         error_n, now = self.appraisal.error_n, datetime.now().astimezone()
         asked_error = error_n is not None or not self.appraisal.is_over
         planned = planned_rows(self._protocol, now, error_n, asked_error=asked_error)
-        results, rows = preflight_checks(facts, self._protocol), (*self._goes_on, *planned)
+        results, rows = preflight_checks(facts, self._protocol), (*self._resumption, *planned)
         self.window.show_view(
             PreflightView(self._protocol.study.name, self._who, facts, results, rows, busy=self.measuring.busy)
         )
 
     def _watch_servo_and_screen(self) -> None:
-        """Check servo and screen, which may be unplugged, and read the appraiser's answers."""
+        """Check that servo and screen are still available, and read the appraiser's answers."""
         try:
             self._ready.rig.servo.check()
             self._screen()
@@ -205,7 +207,7 @@ class Preflight(QObject):
             self._timer.stop()
             self.failed.emit(error)
             return
-        if self._ready.outlet_statuses != self._outlets_shown:  # a recording program was connected
+        if self._ready.outlet_statuses != self._outlets_shown:  # such as a recording program that connected
             self._show_checks()
         if self._appraised:
             return
@@ -220,11 +222,11 @@ class Preflight(QObject):
             self.measuring.run(lambda: measure_rig(ready.rig, self._chosen, ready.videos, sleep=sleep))
             self._show_checks()
 
-    def _use_measurements(self, facts: Measurements) -> None:
+    def _apply_measurements(self, facts: Measurements) -> None:
         self._ready = replace(self._ready, facts=facts)
-        if _dynamics(facts, self._protocol) != self.appraisal.dynamics:  # the delay decides how much force is withheld
+        if _dynamics(facts, self._protocol) != self.appraisal.dynamics:  # the withheld force depends on the delay
             self.appraisal.close()
-            self.appraisal, self._appraised = _appraisal(self._protocol, facts), False
+            self.appraisal, self._appraised = _start_appraisal(self._protocol, facts), False
         self._show_checks()
 
     def _accept(self) -> None:
@@ -233,22 +235,23 @@ class Preflight(QObject):
         self.started.emit(replace(self._ready, facts=facts, masking=masking))
 
 
-def _appraisal(protocol: Protocol, facts: Measurements) -> Appraisal:
-    """Return the appraisal of a study on the measured device."""
+def _start_appraisal(protocol: Protocol, facts: Measurements) -> Appraisal:
+    """Start the appraisal of a study on the measured device."""
     return Appraisal(study_scenes(protocol), _dynamics(facts, protocol), DeliveryQuestion(protocol, facts.delay_ticks))
 
 
 def _resumption_rows(chosen: NewSession, protocol: Protocol) -> tuple[tuple[str, str], ...]:
-    """Return the rows that say where a session resumes and what is kept; empty for a new one."""
+    """Return the rows about where a session resumes and what is kept; none for a new session."""
     if chosen.resumes is None:
         return ()
-    own = session_protocol(StudyFolder(chosen.results), protocol, chosen.participant, chosen.session)
+    protocol = session_protocol(StudyFolder(chosen.results), protocol, chosen.participant, chosen.session)
     lines = journal.read(locate_session(chosen.resumes)[1].journal)
-    return resumed_rows(own, begun_schedule(own, start_of(lines), read_key(chosen.results)), lines)
+    schedule = begun_schedule(protocol, start_of(lines), read_key(chosen.results))
+    return resumed_rows(protocol, schedule, lines)
 
 
 def _largest_error_n(errors_n: list[float | None]) -> float | None:
-    """Return the largest error [N]; None if one is unknown, since it may be the largest."""
+    """Return the largest error [N], or None if one is unknown, since that may be the largest."""
     known = [error for error in errors_n if error is not None]
     return max(known, default=None) if len(known) == len(errors_n) else None
 
@@ -260,18 +263,18 @@ def _dynamics(facts: Measurements, protocol: Protocol) -> Dynamics:
     return facts.dynamics._replace(delay_s=facts.delay_ticks / protocol.device.rate_hz)
 
 
-def study_scenes(protocol: Protocol) -> tuple[Asked, ...]:
-    """Return the study's one-liquid scenes without duplicates, with the fastest stroke of their tasks."""
-    scenes: dict[Scene, Asked] = {}
+def study_scenes(protocol: Protocol) -> tuple[SceneQuestion, ...]:
+    """Return the study's scenes with a single liquid, without duplicates, each with the fastest stroke in it."""
+    scenes: dict[Scene, SceneQuestion] = {}
     for block in protocol.blocks.values():
         stroke = protocol.tasks[block.task].fastest_stroke(protocol.device.workspace_m)
         for condition in protocol.conditions_in(block.id):
             scene = protocol.scene_for(condition)
             if len(scene.liquids) != 1:
                 continue
-            before = scenes.get(scene)
-            if before is None or stroke.speed_mps > before.stroke.speed_mps:
-                scenes[scene] = Asked(scene.liquids[0].id, scene, stroke)
+            known = scenes.get(scene)
+            if known is None or stroke.speed_mps > known.stroke.speed_mps:
+                scenes[scene] = SceneQuestion(scene.liquids[0].id, scene, stroke)
     return tuple(scenes.values())
 
 
@@ -280,7 +283,7 @@ STUDY = "demo"
 
 
 class ComputerCheck(QObject):
-    """Measures in the background on request of its window, and shows the results."""
+    """Runs the checks of this computer in the background, and shows the results in its window."""
 
     _compiled = Signal(float)
 
@@ -301,7 +304,7 @@ class ComputerCheck(QObject):
         self._background.run(self._run_checks)
 
     def _run_checks(self) -> tuple[Check, ...]:
-        from study_app.devices.registry import backends  # noqa: PLC0415 - the compiler: only in this thread
+        from study_app.devices.registry import backends  # noqa: PLC0415 - imports the compiler
         from study_app.devices.rig import open_rig, study_settings  # noqa: PLC0415
         from study_app.haptics.kernels import CACHE, following_compilation  # noqa: PLC0415
         from study_app.protocol.load import load  # noqa: PLC0415
@@ -325,7 +328,7 @@ class ComputerCheck(QObject):
         return computer_checks(facts, study, backends(), cache=CACHE, compiled=counter.compiled)
 
     def _close(self) -> None:
-        """Delete the object once the measurement has ended, since its thread still uses it."""
+        """Delete this object and its window, after a running measurement, which uses them."""
         self._closed = True
         if not self._background.busy:
             self.window.deleteLater()

@@ -347,7 +347,7 @@ def test_every_signal(make: Any, name: str, blinding: str, pytestconfig: Any, ca
             one.getMessage() for one in caplog.records if one.levelno >= logging.WARNING or one.msg == DEVICE_FAILED
         ]
         calls.setdefault(step, []).append(", ".join(map(words_of, world.done)))
-        if isValid(bridge) and not bridge._gone and name in VIEWS:
+        if isValid(bridge) and not bridge._has_left and name in VIEWS:
             words = view_words(bridge.view())
             views += [(step, words)] if not views or words != views[-1][1] else []
         lines += [
@@ -355,7 +355,7 @@ def test_every_signal(make: Any, name: str, blinding: str, pytestconfig: Any, ca
             *map(str, world.done),
             *(f"log {one.levelname} {one.getMessage()}" for one in caplog.records if one.levelno >= logging.WARNING),
         ]
-        if isValid(bridge) and not bridge._gone:
+        if isValid(bridge) and not bridge._has_left:
             after = [*paged(bridge.participant.page), *value_lines(bridge.view(), "view"), f"trouble: {bridge.trouble}"]
             lines += (f"# {line}" for line in changed(before, after))
             before = after
