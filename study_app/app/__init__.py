@@ -1,8 +1,7 @@
-"""The composition root, where device, servo, store, session, analysis and windows meet.
+"""The composition root, which connects device, servo, store, session, analysis and windows.
 
-``main_controller`` owns the main window and makes its places, two of which take long to load;
-``session.live_session`` begins or resumes a session and runs it to the closed journal, ``session.bridge`` between its
-two windows; read these first.
+Read first: ``main_controller`` owns the main window and creates its pages; ``session.live_session`` begins or resumes a
+session and runs it until the journal is closed; ``session.bridge`` connects the session with its two windows.
 
 Reading order: awake, compilation, timing; failures; lab_controller, session; delay_session, main_controller.
 
@@ -19,15 +18,15 @@ from study_app.gui.display_check import report_missing_library
 
 
 @contextmanager
-def _without_collections() -> Iterator[None]:
-    """Import without garbage collection, which takes a tenth of the start-up time and frees nothing."""
-    before = gc.isenabled()
+def _collection_disabled() -> Iterator[None]:
+    """Disable garbage collection during imports, where it takes a tenth of the start-up time and frees nothing."""
+    was_enabled = gc.isenabled()
     gc.disable()
     try:
         yield
         gc.freeze()
     finally:
-        if before:
+        if was_enabled:
             gc.enable()
 
 
@@ -39,10 +38,10 @@ _MODULES = {"run_home_window": "main_controller", "run": "session.live_session",
 
 
 def __getattr__(name: str) -> Any:
-    """Load the main window or the session on first access: neither needs the other to open."""
+    """Import the main window or the session on first access, since neither needs the other."""
     if name not in _MODULES:
         raise AttributeError(name)
-    with report_missing_library(), _without_collections():
+    with report_missing_library(), _collection_disabled():
         return getattr(import_module(f"{__name__}.{_MODULES[name]}"), name)
 
 

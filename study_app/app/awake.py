@@ -7,20 +7,23 @@ from pathlib import Path
 from typing import Any, Final
 
 _REASON: Final = "a session is running"
-CONTINUOUS, SYSTEM, DISPLAY = 0x80000000, 0x1, 0x2  # of SetThreadExecutionState
-USER_INITIATED, LATENCY_CRITICAL, SCREEN_ON = 0x00FFFFFF, 0xFF00000000, 1 << 40  # of NSProcessInfo's activities
+CONTINUOUS, SYSTEM, DISPLAY = 0x80000000, 0x1, 0x2  # flags of SetThreadExecutionState
+USER_INITIATED, LATENCY_CRITICAL, SCREEN_ON = 0x00FFFFFF, 0xFF00000000, 1 << 40  # options of NSProcessInfo's activities
 _CONNECTION: Final = "liquid-study-awake"
-_PATIENCE_MS: Final = 1000  # with a desktop that does not answer
+_PATIENCE_MS: Final = 1000  # timeout for a desktop that does not answer
 
 
 class Awake:
-    """Prevents sleep between `begin` and `end`; where the system does not offer this, nothing happens."""
+    """Prevents sleep between `begin` and `end`, if the system supports this."""
 
     def __init__(self) -> None:
         self._activity: int | None = None
 
     def begin(self) -> bool:
-        """Keep screen and computer awake; return whether the system agreed. Windows wants both calls in one thread."""
+        """Keep screen and computer awake; return whether that succeeded.
+
+        On Windows, `begin` and `end` must be called in the same thread.
+        """
         if sys.platform == "win32":
             return _set_execution_state(CONTINUOUS | SYSTEM | DISPLAY)
         if sys.platform == "darwin":
@@ -36,9 +39,9 @@ class Awake:
             _send(_process_info(), "endActivity:", ctypes.c_void_p(self._activity))
             self._activity = None
         elif sys.platform == "linux":
-            from PySide6.QtDBus import QDBusConnection  # noqa: PLC0415 - loaded by sessions alone
+            from PySide6.QtDBus import QDBusConnection  # noqa: PLC0415 - only sessions need it
 
-            QDBusConnection.disconnectFromBus(_CONNECTION)  # the service forgets programs that leave the bus
+            QDBusConnection.disconnectFromBus(_CONNECTION)  # which ends the inhibition
 
 
 def _set_execution_state(state: int) -> bool:
@@ -47,11 +50,11 @@ def _set_execution_state(state: int) -> bool:
 
 
 def _inhibit_screen_saver() -> bool:
-    """Ask the desktop's service (GNOME, KDE, Xfce …) to inhibit blanking, as long as the connection lasts."""
+    """Ask the desktop's service (GNOME, KDE, Xfce …) not to blank the screen as long as the connection lasts."""
     runtime = os.environ.get("XDG_RUNTIME_DIR", "")
     if "DBUS_SESSION_BUS_ADDRESS" not in os.environ and not (runtime and Path(runtime, "bus").exists()):
         return False
-    from PySide6.QtDBus import QDBus, QDBusConnection, QDBusMessage  # noqa: PLC0415 - loaded by sessions alone
+    from PySide6.QtDBus import QDBus, QDBusConnection, QDBusMessage  # noqa: PLC0415 - only sessions need it
 
     bus = QDBusConnection.connectToBus(QDBusConnection.BusType.SessionBus, _CONNECTION)
     name = "org.freedesktop.ScreenSaver"
@@ -62,7 +65,7 @@ def _inhibit_screen_saver() -> bool:
 
 
 def _begin_activity() -> int | None:
-    """Begin an activity without App Nap and idle sleep (macOS; never run); return the object to end it with."""
+    """Begin an activity without App Nap and idle sleep (macOS; untested); return the object that ends it."""
     reason = _send(_class("NSString"), "stringWithUTF8String:", ctypes.c_char_p(_REASON.encode()))
     options = ctypes.c_uint64(USER_INITIATED | LATENCY_CRITICAL | SCREEN_ON)
     activity = _send(_process_info(), "beginActivityWithOptions:reason:", options, ctypes.c_void_p(reason))
@@ -76,16 +79,16 @@ def _process_info() -> int | None:
 def _class(name: str) -> int | None:
     library = _objective_c()
     library.objc_getClass.restype = ctypes.c_void_p
-    found: int | None = library.objc_getClass(name.encode())
-    return found
+    address: int | None = library.objc_getClass(name.encode())
+    return address
 
 
-def _send(receiver: int | None, message: str, *given: Any) -> int | None:
-    """Send a message to an object of Objective-C and return the object that it returns."""
+def _send(receiver: int | None, message: str, *arguments: Any) -> int | None:
+    """Send a message to an Objective-C object; return the resulting object."""
     library = _objective_c()
     library.sel_registerName.restype = library.objc_msgSend.restype = ctypes.c_void_p
     selector = ctypes.c_void_p(library.sel_registerName(message.encode()))
-    result: int | None = library.objc_msgSend(ctypes.c_void_p(receiver), selector, *given)
+    result: int | None = library.objc_msgSend(ctypes.c_void_p(receiver), selector, *arguments)
     return result
 
 

@@ -1,4 +1,4 @@
-"""Compilation of the force model in the background, from the first window on."""
+"""Compilation of the force model in the background, while the main window is open."""
 
 import logging
 import threading
@@ -9,12 +9,12 @@ from PySide6.QtCore import QObject, QTimer
 
 from study_app.session.compile_worker import CompilationClient, start_compilation
 
-_READ_EVERY_MS: Final = 200
+_POLL_MS: Final = 200
 log = logging.getLogger(__name__)
 
 
 class Compilation(QObject):
-    """Compiles in a process of its own; a session that begins meanwhile waits for it."""
+    """Compiles the force model in a separate process, for which a session waits that begins meanwhile."""
 
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(parent)
@@ -22,11 +22,11 @@ class Compilation(QObject):
         self._client: CompilationClient | None = None
         self._ended = threading.Event()
         self._ended.set()
-        self._timer = QTimer(self, interval=_READ_EVERY_MS)
-        self._timer.timeout.connect(self._read)
+        self._timer = QTimer(self, interval=_POLL_MS)
+        self._timer.timeout.connect(self._read_answers)
 
     def start(self) -> None:
-        """Compile, unless that was done before or cannot be stored."""
+        """Start compiling, unless the result exists or cannot be stored."""
         try:
             self._client = start_compilation()
         except OSError as error:
@@ -36,8 +36,8 @@ class Compilation(QObject):
             self._timer.start()
 
     def wait(self, progress: Callable[[float], object], is_cancelled: Callable[[], bool]) -> None:
-        """Wait in another thread until it has ended, or the caller is cancelled; report the fraction done (0 to 1)."""
-        while not is_cancelled() and not self._ended.wait(_READ_EVERY_MS / 1e3):
+        """Wait, in another thread, until it has ended or is cancelled; report the fraction done (0 to 1)."""
+        while not is_cancelled() and not self._ended.wait(_POLL_MS / 1e3):
             progress(self.share)
 
     def close(self) -> None:
@@ -47,10 +47,10 @@ class Compilation(QObject):
             self._client.close()
         self._ended.set()
 
-    def _read(self) -> None:
+    def _read_answers(self) -> None:
         assert self._client is not None  # noqa: S101 - the timer starts with it
         for _, answer in self._client.answers():
             if isinstance(answer, float):
                 self.share = answer
-            else:  # done; or refused or ended, and then the session compiles
+            else:  # done, or failed; then the session compiles
                 self.close()

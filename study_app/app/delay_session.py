@@ -1,7 +1,7 @@
-"""A session of delays, held to see how well they are kept: the real windows, servo, store and recordings, no person.
+"""A session without a participant that measures visual delays, with real windows, servo, store and recordings.
 
-Nothing of a session is left out or done twice: trials reach for targets with the scripted hand, and what is reported is
-read from the recordings and tables that a session leaves.
+It runs exactly as other sessions do: in its trials the scripted hand reaches for targets, and the measurements are read
+from the session's recordings.
 """
 
 import tempfile
@@ -108,30 +108,30 @@ delay_error_ms = 25
 
 
 def study_of_delays(seconds: float) -> bytes:
-    """Return a protocol with a trial of this duration for each delay in turn."""
+    """Return a protocol with a trial of ``seconds`` for each delay."""
     names = [f"delay{1e3 * delay_s:.0f}" for delay_s in DELAYS_S]
     conditions = "".join(
         f'\n[conditions.{name}]\nliquid = "water"\ndelay_ms = {1e3 * delay_s:g}\n'
         for name, delay_s in zip(names, DELAYS_S, strict=True)
     )
-    listed = ", ".join(f'"{name}"' for name in names)
-    return _STUDY.format(conditions=conditions, seconds=seconds, names=listed).encode()
+    quoted_names = ", ".join(f'"{name}"' for name in names)
+    return _STUDY.format(conditions=conditions, seconds=seconds, names=quoted_names).encode()
 
 
 def measure_delays(
     seconds: float, load: LoadName, *, progress: Callable[[str], object] = lambda _line: None
 ) -> Delayed:
-    """Show each delay for ``seconds`` on virtual screens, and on the real one if there is one; return the measurements.
+    """Measure each delay for ``seconds`` on virtual screens, and on the real one if there is one.
 
     Parameters
     ----------
-    load : in addition to a run with the participant's window only, a run with "gui": the operator's window plotting;
-        "gui+cpu": and a busy process on every core; "none": no further run
+    load : the load of a second run, after one with only the participant's window: "gui" is the operator's window,
+        "gui+cpu" adds a busy process on every core, "none" means no second run
 
     Raises
     ------
     StudyError
-        The seconds are out of range, or the session broke.
+        ``seconds`` is out of range, or the session failed.
     DisplayError
         No window can be opened here.
     """
@@ -150,13 +150,13 @@ def measure_delays(
                     tempfile.TemporaryDirectory() as folder,
                     busy_cores() if background == "gui+cpu" else nullcontext(),
                 ):
-                    shown.extend(_Showing(Path(folder), seconds, refresh_hz, background).run())
+                    shown.extend(_DelayRun(Path(folder), seconds, refresh_hz, background).run())
                 progress(f"{shown[-1].screen}, {BESIDE[background]}")
     return Delayed(machine_here(), seconds, _SIZE_PX, tuple(shown))
 
 
-class _Showing:
-    """One session of all delays on one screen; without a rate on the real one."""
+class _DelayRun:
+    """A session with all delays on a virtual screen of ``refresh_hz``, or on the real one if that is None."""
 
     def __init__(self, folder: Path, seconds: float, refresh_hz: float | None, load: LoadName) -> None:
         self._refresh_hz, self._load = refresh_hz, load
@@ -229,7 +229,7 @@ class _Showing:
 
         bridge.runner.on_change(follow)
         with ending_on_signals(end):
-            QApplication.processEvents()  # show the windows before the first trial, as after a text page
+            QApplication.processEvents()  # show the windows before the first trial begins
             bridge.start()
             loop.exec()
         QApplication.processEvents()
@@ -249,14 +249,14 @@ class _Showing:
 
 
 FRAME_MS, TRACE_MS, TILES_MS = 16, 33, 500
-_HEARTBEAT_MS = 100  # Python handles Ctrl+C only while it runs; Qt waits outside Python
+_HEARTBEAT_MS = 100  # how often Python code runs, which lets Python handle Ctrl+C
 _LONGEST_FRAME_TICKS = 100
 
 _T = TypeVar("_T")
 
 
 class WindowsThread(QObject):
-    """The GUI thread and its event loop; with a load both windows of a session are open meanwhile.
+    """The GUI thread and its event loop; with a load, both windows of a session are open meanwhile.
 
     Raises
     ------
@@ -264,48 +264,51 @@ class WindowsThread(QObject):
         No window can be opened here, although the load requires one.
     """
 
-    _asked = Signal(object)
+    _call_requested = Signal(object)
 
     def __init__(self, load: LoadName) -> None:
         super().__init__()
         paints = load != "none"
         self._application = application_here() if paints else QCoreApplication.instance() or QCoreApplication([])
         self._painting = _Painting() if paints else None
-        self._asked.connect(self._call, Qt.ConnectionType.QueuedConnection)
+        self._call_requested.connect(self._call, Qt.ConnectionType.QueuedConnection)
 
     @property
     def frames(self) -> int:
         return self._painting.frames if self._painting is not None else 0
 
     def during(self, work: Callable[[], _T]) -> _T:
-        """Run ``work`` in another thread while this one runs the event loop; return its result or raise its error."""
-        loop, heart = QEventLoop(), QTimer()
-        heart.timeout.connect(lambda: None)
-        heart.start(_HEARTBEAT_MS)
+        """Run ``work`` in another thread while this one runs the event loop; return the result or raise the error."""
+        loop, heartbeat = QEventLoop(), QTimer()
+        heartbeat.timeout.connect(lambda: None)
+        heartbeat.start(_HEARTBEAT_MS)
         with collecting_in_this_thread(), ThreadPoolExecutor(1, thread_name_prefix="timing") as thread:
             if self._painting is not None:
                 self._painting.open_windows()
             future = thread.submit(work)
-            future.add_done_callback(lambda _future: self._asked.emit(loop.quit))
+            future.add_done_callback(lambda _future: self._call_requested.emit(loop.quit))
             try:
                 loop.exec()
             finally:
                 wait((future,))
-                heart.stop()
+                heartbeat.stop()
                 if self._painting is not None:
                     self._painting.close_windows()
         return future.result()
 
     def timer(self, period_ms: int, count: int, fire: Callable[[], object]) -> int:
-        """Call ``fire`` from a precise Qt timer; return the start time [ns]. ``work`` calls this from its thread."""
-        fired: Future[int] = Future()
-        self._asked.emit(partial(self._start_timer, period_ms, count, fire, fired))
-        return fired.result()
+        """Call ``fire`` ``count`` times from a precise Qt timer; return its start time [ns].
 
-    def _call(self, asked: Callable[[], object]) -> None:
-        asked()
+        It must be called from another thread, such as by the ``work`` of `during`.
+        """
+        started: Future[int] = Future()
+        self._call_requested.emit(partial(self._start_timer, period_ms, count, fire, started))
+        return started.result()
 
-    def _start_timer(self, period_ms: int, count: int, fire: Callable[[], object], fired: Future[int]) -> None:
+    def _call(self, function: Callable[[], object]) -> None:
+        function()
+
+    def _start_timer(self, period_ms: int, count: int, fire: Callable[[], object], started: Future[int]) -> None:
         timer, left, start_ns = QTimer(self, timerType=Qt.TimerType.PreciseTimer), count, time.perf_counter_ns()
 
         def tick() -> None:
@@ -315,20 +318,20 @@ class WindowsThread(QObject):
                 fire()
             except Exception as error:  # noqa: BLE001 - passed on to the caller
                 timer.stop()
-                fired.set_exception(error)
+                started.set_exception(error)
             else:
                 if left <= 0:
                     timer.stop()
-                    fired.set_result(start_ns)
+                    started.set_result(start_ns)
 
         timer.timeout.connect(tick)
         timer.start(period_ms)
 
 
 class _Painting(QObject):
-    """Both windows of a session, painting as in a trial: the ball 60 times a second, the hand's traces 30 times.
+    """Both windows of a session, which paint as in a trial: the ball 60 times a second, the traces 30 times.
 
-    They show a separate servo in virtual time, so that their work does not depend on what is being timed.
+    They show a separate servo in virtual time, so that their work does not depend on the measured servo.
     """
 
     def __init__(self) -> None:
@@ -347,7 +350,7 @@ class _Painting(QObject):
         self.health = ServoHealth(self._servo.rate_hz)
         self.participant, self.operator = self._make_windows()
         self.participant.painted.connect(self._count_frame)
-        self._began_ns = 0
+        self._started_ns = 0
         self._timers = [
             self._make_timer(FRAME_MS, self._draw_frame),
             self._make_timer(TRACE_MS, lambda: self.operator.show_traces(self.health, self._servo.now_ns() * 1e-9)),
@@ -356,15 +359,17 @@ class _Painting(QObject):
 
     def _make_windows(self) -> tuple[ParticipantWindow, OperatorWindow]:
         protocol = load("rek2024")
-        shown_on, operated_on = choose_screens(None)
+        participant_screen, operator_screen = choose_screens(None)
         operator = OperatorWindow(
             "timing",
             lateness_limit_s=protocol.limits.lateness_ms / 1000,
             reach_m=max(protocol.device.workspace_m) / 2,
             pointer=False,
         )
-        participant = ParticipantWindow(words("en"), clock=time.perf_counter, windowed=shown_on is operated_on)
-        place_window(operator, operated_on, corner=shown_on is operated_on)
+        participant = ParticipantWindow(
+            words("en"), clock=time.perf_counter, windowed=participant_screen is operator_screen
+        )
+        place_window(operator, operator_screen, corner=participant_screen is operator_screen)
         task = Explore(kind="explore", min_s=0.0, max_s=3600.0, instruction="Measuring the timing of the servo.")
         self._page = TaskPage(
             trial=1,
@@ -380,12 +385,12 @@ class _Painting(QObject):
         self.operator.show()
         self.participant.open_on(choose_screens(None)[0])
         self.participant.show_page(self._page)
-        self._began_ns = time.perf_counter_ns()
+        self._started_ns = time.perf_counter_ns()
         for timer in self._timers:
             timer.start()
 
     def close_windows(self) -> None:
-        """Close the windows in the thread that made them."""
+        """Close the windows, in the thread that created them."""
         for timer in self._timers:
             timer.stop()
         self._rig.stop()
@@ -402,10 +407,10 @@ class _Painting(QObject):
         return timer
 
     def _draw_frame(self) -> None:
-        """Advance the hand by the time since the last frame and draw it."""
+        """Advance the servo by the time since the last frame, and draw the hand."""
         now_ns = self._servo.now_ns()
-        behind = (time.perf_counter_ns() - self._began_ns) // 1_000_000 - now_ns // 1_000_000
-        self._servo.advance(int(min(max(behind, 1), _LONGEST_FRAME_TICKS)))
+        behind_ms = (time.perf_counter_ns() - self._started_ns) // 1_000_000 - now_ns // 1_000_000
+        self._servo.advance(int(min(max(behind_ms, 1), _LONGEST_FRAME_TICKS)))
         self.health.add_samples(self._reader.read())
         position_m, shown_ns = self._servo.telemetry.position_at(self._servo.now_ns())
         self.health.add_hand_position(self._servo.now_ns() * 1e-9, position_m)

@@ -1,4 +1,4 @@
-"""How the program ends when something fails: exceptions in slots and threads, signals, crashes."""
+"""The handling of failures: exceptions in slots, painting and threads, signals, crashes."""
 
 import contextlib
 import faulthandler
@@ -26,7 +26,7 @@ from study_app.haptics.runtime.grants import allow_suspension, refuse_suspension
 
 log = logging.getLogger(__name__)
 
-PAINTING: Final = ("paintEvent", "paint")  # of widgets; of items of a scene
+PAINTING: Final = ("paintEvent", "paint")  # painting methods of widgets, and of items and delegates
 
 
 class UncaughtExceptions:
@@ -34,7 +34,7 @@ class UncaughtExceptions:
 
     Parameters
     ----------
-    handle : called with each exception; if it returns False, the ``previous`` hook is called, too
+    handle : called with each exception; if it returns False, the previous hook is called as well
     """
 
     def __init__(self, handle: Callable[[BaseException], bool]) -> None:
@@ -60,10 +60,10 @@ class UncaughtExceptions:
 
 
 def guard_painting() -> None:
-    """Pass every exception of a painting method to ``sys.excepthook``, in all existing widget and item classes.
+    """Wrap the painting methods of all widget and item classes, so that exceptions go to ``sys.excepthook`` at once.
 
-    Otherwise Qt continues painting other parts while the exception is pending; PySide6 6.12 then loses references to
-    their methods until the process ends by a segmentation fault.
+    Otherwise Qt continues to paint other widgets while the exception is pending; PySide6 6.12 then loses references to
+    their methods, until the process ends with a segmentation fault.
     """
     kinds: list[type] = [QWidget, QGraphicsItem, QStyledItemDelegate]
     while kinds:
@@ -72,24 +72,27 @@ def guard_painting() -> None:
         for name in PAINTING:
             method = vars(kind).get(name)
             if isinstance(method, FunctionType) and not hasattr(method, "__wrapped__"):
-                setattr(kind, name, _reporting_exceptions(method))
+                setattr(kind, name, _report_exceptions(method))
 
 
-def _reporting_exceptions(method: Callable[..., None]) -> Callable[..., None]:
+def _report_exceptions(method: Callable[..., None]) -> Callable[..., None]:
     @wraps(method)
-    def painted(*arguments: object) -> None:
+    def paint(*arguments: object) -> None:
         try:
             method(*arguments)
         except Exception as error:  # noqa: BLE001 - the hook decides
-            # No name holds the traceback: it would hold this frame, and with it a painter that Qt waits for.
+            # The traceback must not be stored: it would keep this frame alive, and with it a painter that Qt waits for.
             error.__traceback__ = error.__traceback__ and error.__traceback__.tb_next
             sys.excepthook(type(error), error, error.__traceback__)
 
-    return painted
+    return paint
 
 
 class ThreadExceptions(QObject):
-    """Replaces ``threading.excepthook`` while installed; ``ended`` carries, in its own thread, what ended a thread."""
+    """Replaces ``threading.excepthook`` while installed; ``ended`` carries a description of the exception.
+
+    The signal is emitted in the thread of this object.
+    """
 
     ended = Signal(str)
     _ended = Signal(str)
@@ -105,11 +108,11 @@ class ThreadExceptions(QObject):
     def remove(self) -> None:
         threading.excepthook = self._previous
 
-    def _handle_exception(self, what: threading.ExceptHookArgs) -> None:
-        """Log the exception, in the thread that it ended."""
-        name = what.thread.name if what.thread is not None else "unknown"
-        log.error("the thread %r ended: %s", name, what.exc_value, exc_info=what.exc_value)
-        self._ended.emit(f"{name}: {what.exc_type.__name__}: {what.exc_value}")
+    def _handle_exception(self, arguments: threading.ExceptHookArgs) -> None:
+        """Log the exception; called in the thread that it has ended."""
+        name = arguments.thread.name if arguments.thread is not None else "unknown"
+        log.error("the thread %r ended: %s", name, arguments.exc_value, exc_info=arguments.exc_value)
+        self._ended.emit(f"{name}: {arguments.exc_type.__name__}: {arguments.exc_value}")
 
 
 class Failing(Protocol):
@@ -123,20 +126,20 @@ _P = ParamSpec("_P")
 
 
 def guarded(slot: Callable[Concatenate[_F, _P], None]) -> Callable[Concatenate[_F, _P], None]:
-    """Decorate a slot so that an exception in it ends with zero force."""
+    """Decorate a slot so that an exception calls ``fail``, which sends zero force."""
 
     @wraps(slot)
     def run(self: _F, /, *arguments: _P.args, **named: _P.kwargs) -> None:
         try:
             slot(self, *arguments, **named)
-        except Exception as error:  # noqa: BLE001 - zero force comes first, after any of them
+        except Exception as error:  # noqa: BLE001 - any exception requires zero force
             self.fail(error)
 
     return run
 
 
 def guarded_session_slot(slot: Callable[Concatenate[_F, _P], None]) -> Callable[Concatenate[_F, _P], None]:
-    """Decorate a slot like `guarded`, but ignore events that arrive too late (`SessionError`)."""
+    """Decorate a slot like `guarded`, but log and ignore events that arrive too late (`SessionError`)."""
 
     @wraps(slot)
     def run(self: _F, /, *arguments: _P.args, **named: _P.kwargs) -> None:
@@ -149,10 +152,10 @@ def guarded_session_slot(slot: Callable[Concatenate[_F, _P], None]) -> Callable[
 
 
 class CrashTrace:
-    """Let `faulthandler` write to ``path`` until `close`, which removes an empty file.
+    """Makes `faulthandler` write to ``path`` until `close`, which removes an empty file.
 
-    The trace has names of source files and functions and line numbers, but no values. Sessions run without it if the
-    file cannot be opened. A resumed session appends to the file.
+    The trace contains source files, functions and line numbers, but no values. If the file cannot be opened, there is
+    no trace. A resumed session appends to the file.
     """
 
     def __init__(self, path: Path) -> None:
@@ -179,14 +182,14 @@ class CrashTrace:
 
 CANCELLED = 130  # exit codes
 BUG = 1
-_HEARTBEAT_MS = 100  # the longest delay before Python handles a signal
-BY_SIGNAL_S = 2.0  # the longest wait for threads when a signal ends the program; the force is zero before
-OPENING_PATIENCE_S = 20.0  # the longest wait for a device that is being opened
-_HANG_UP = 1  # the number of SIGHUP, for a log-off on any system
+_HEARTBEAT_MS = 100  # maximum delay before Python handles a signal
+BY_SIGNAL_S = 2.0  # maximum wait for threads when a signal ends the program, after zero force
+OPENING_PATIENCE_S = 20.0  # maximum wait for a device that is being opened
+_HANG_UP = 1  # the number of SIGHUP, which represents a log-off on every system
 
 
 class Patience:
-    """A common time limit for several waits [s]."""
+    """A time limit [s] that several waits share."""
 
     def __init__(self, seconds: float) -> None:
         self._until_s = time.perf_counter() + seconds
@@ -208,39 +211,39 @@ def log_off_signal() -> SignalInstance:
 def ending_on_signals(end: Callable[[int], None]) -> Iterator[None]:
     """Call ``end`` once, with the signal's number, on Ctrl+C, a request to terminate or a log-off.
 
-    Signals are handled in the event loop. A log-off waits only for ``end``. Ctrl-Z is ignored, since a force would
-    continue.
+    Signals are handled in the event loop. A log-off waits only for ``end``. Ctrl+Z is ignored, since the force would
+    continue while the program is suspended.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    heard: list[int] = []
+    received: list[int] = []
 
-    def hear(number: int, _frame: object) -> None:
-        if not heard:
-            heard.append(number)
+    def handle(number: int, _frame: object) -> None:
+        if not received:
+            received.append(number)
             disable_collection()
             QTimer.singleShot(0, lambda: end(number))
 
     def log_off(manager: QSessionManager) -> None:
         manager.setRestartHint(QSessionManager.RestartHint.RestartNever)
-        if not heard:
-            heard.append(_HANG_UP)
+        if not received:
+            received.append(_HANG_UP)
             disable_collection()
             end(_HANG_UP)
 
-    before = {number: signal.signal(number, hear) for number in ENDING_SIGNALS}
+    previous_handlers = {number: signal.signal(number, handle) for number in ENDING_SIGNALS}
     logging_off = log_off_signal()
-    refuse_suspension(heard)
+    refuse_suspension(received)
     logging_off.connect(log_off, Qt.ConnectionType.DirectConnection)
-    heart = QTimer()
-    heart.timeout.connect(lambda: None)  # Python handles signals only while it runs; Qt waits outside Python
-    heart.start(_HEARTBEAT_MS)
+    heartbeat = QTimer()
+    heartbeat.timeout.connect(lambda: None)  # runs Python code, which lets Python handle signals
+    heartbeat.start(_HEARTBEAT_MS)
     try:
         yield
     finally:
-        heart.stop()
-        allow_suspension(heard)
+        heartbeat.stop()
+        allow_suspension(received)
         logging_off.disconnect(log_off)
-        for number, handler in before.items():
+        for number, handler in previous_handlers.items():
             signal.signal(number, handler)

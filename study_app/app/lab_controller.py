@@ -1,7 +1,7 @@
-"""The liquid lab: where its place, a device's servo, the edits and their cost meet.
+"""The controller of the liquid lab, which connects its page, a device with its servo, the edits and their cost.
 
-Nothing of it acts on the hand once the place is left: leaving it, closing the window, an exception in a slot or in
-painting, all end in zero force first, then the servo, then the device.
+The device exerts force only while the page is shown. Leaving it, closing the window and an exception in a slot or in
+painting all send zero force first, then stop the servo and close the device.
 """
 
 from __future__ import annotations
@@ -42,16 +42,16 @@ _SMALLEST_N = 0.001
 
 
 def _cost_rows(costs: Costs) -> tuple[CostRow, ...]:
-    """Return the cost of each part of a tick, the most expensive first, then the absent parts with the reasons."""
-    rows = [CostRow(NAMED[it.effect].label, it.ns) for it in costs.effects if it.ns is not None]
+    """Return the costs of a tick's parts, the most expensive first, then the absent parts with the reasons."""
+    rows = [CostRow(NAMED[cost.effect].label, cost.ns) for cost in costs.effects if cost.ns is not None]
     rows.append(CostRow("Servo alone", costs.rest_ns))
-    absent = (CostRow(NAMED[it.effect].label, None, it.why) for it in costs.effects if it.ns is None)
+    absent = (CostRow(NAMED[cost.effect].label, None, cost.why) for cost in costs.effects if cost.ns is None)
     return (*sorted(rows, key=lambda row: -(row.ns or 0.0)), *absent)
 
 
 def _error_rows(errors: Errors) -> tuple[ErrorRow, ...]:
     """Return the differences between a setting's force and its definition."""
-    without = ", ".join(NAMED[it].label.lower() for it in errors.left_out)
+    without = ", ".join(NAMED[effect].label.lower() for effect in errors.left_out)
     share = f"{errors.wake:.0e}".replace("e-0", "e−").replace("e-", "e−") if errors.wake else "0"
     wake, force = "no wake" if errors.wake is None else share, "no drag"
     if errors.force_n is not None:
@@ -67,8 +67,8 @@ def _error_rows(errors: Errors) -> tuple[ErrorRow, ...]:
 log = logging.getLogger(__name__)
 
 
-class _Prices:
-    """The measured cost and error of the felt setting."""
+class _Measurements:
+    """The cost and error of the felt setting, measured by a separate process."""
 
     def __init__(self, make_appraiser: Callable[[], AppraisalClient]) -> None:
         self._make = make_appraiser
@@ -83,14 +83,14 @@ class _Prices:
         self._asked, self.costs, self.errors, self.waits = -1, None, None, False
 
     def request(self, scene: Scene) -> None:
-        """Request cost and error of a setting; `read_answers` reads the answers."""
+        """Request the cost and error of a setting, which `read_answers` receives."""
         self.discard_answers()
         if self._appraiser is not None and not self._appraiser.works:
             self.close()
         if self._appraiser is None:
             try:
                 self._appraiser = self._make()
-            except OSError as error:  # no process could be started: the lab works without costs
+            except OSError as error:  # the lab works without costs if the process cannot be started
                 log.info("the appraisal failed: %s", error)
                 return
         self._asked, self.waits = self._appraiser.order(Question(scene)), True
@@ -113,14 +113,14 @@ class _Prices:
 
 
 PATIENCE_S = 20.0
-STARTS_AFTER_MS = 150  # opening a device holds Python's lock for long, so the lab is laid out and painted first
+STARTS_AFTER_MS = 150  # opening a device holds the interpreter lock for long, so the lab is painted first
 
 
 class LabOpening(QObject):
-    """Opens the requested device, and closes one that is no longer requested.
+    """Opens the requested device in the background, and closes it if it is no longer requested.
 
-    ``opened`` carries a `Live` whose servo runs at rest; ``failed`` the exception; ``said`` an instruction of the
-    device while it is opened.
+    ``opened`` carries a `Live` whose servo runs at rest, ``failed`` an exception, and ``said`` an instruction of the
+    device while it is being opened.
 
     Parameters
     ----------
@@ -136,33 +136,33 @@ class LabOpening(QObject):
         super().__init__()
         self._open_live = open_live
         self._options = options
-        self._wanted: str | None = None
+        self._requested: str | None = None
         self._cancelled = threading.Event()
         self._began_s = 0.0
         self._start = delayed_call(self, STARTS_AFTER_MS, self._start_opening)
         self._background = Background(self)
-        self._background.done.connect(self._hand_over_device)
+        self._background.done.connect(self._deliver_outcome)
 
     @property
     def busy_with(self) -> str | None:
         """The name of the device that is being opened, or None."""
-        return self._wanted
+        return self._requested
 
     @property
     def elapsed_s(self) -> float:
         """The time since the device began to open [s]; 0 if none is being opened."""
-        return time.perf_counter() - self._began_s if self._background.busy and self._wanted is not None else 0.0
+        return time.perf_counter() - self._began_s if self._background.busy and self._requested is not None else 0.0
 
     def request_device(self, name: str) -> None:
         """Open a device; cancel one that is still being opened."""
         self.cancel()
-        self._wanted = name
+        self._requested = name
         if not self._background.busy:
             self._start.start()
 
     def cancel(self) -> None:
-        """Cancel the request: the device is closed as soon as it is open."""
-        self._wanted = None
+        """Cancel the request; a device that is being opened is closed once it is open."""
+        self._requested = None
         self._start.stop()
         self._cancelled.set()
 
@@ -172,45 +172,45 @@ class LabOpening(QObject):
         QCoreApplication.sendPostedEvents()
 
     def _start_opening(self) -> None:
-        assert self._wanted is not None  # noqa: S101 - called only with a request
+        assert self._requested is not None  # noqa: S101 - called only with a request
         self._cancelled, self._began_s = threading.Event(), time.perf_counter()
-        self._background.run(partial(self._open_device, self._wanted, self._cancelled))
+        self._background.run(partial(self._open_device, self._requested, self._cancelled))
 
     def _open_device(self, name: str, cancelled: threading.Event) -> tuple[object, threading.Event]:
-        """Compile, open and start the device in its own thread; return the outcome for ``_hand_over_device``."""
+        """Compile, open and start the device; return the outcome for `_deliver_outcome`. Called in a thread."""
         try:
-            loads = self._open_live is None
+            is_first = self._open_live is None
             if self._open_live is None:
-                from study_app.lab.live import open_live  # noqa: PLC0415 - the compiler: only once it is needed
+                from study_app.lab.live import open_live  # noqa: PLC0415 - imports the compiler, so only on demand
 
                 self._open_live = partial(open_live, options=self._options)
-            made: object = self._open_live(name, progress=self.said.emit, cancelled=cancelled.is_set)
-            if loads:
-                gc.freeze()  # keep the loaded objects out of the windows' thread's collections
+            outcome: object = self._open_live(name, progress=self.said.emit, cancelled=cancelled.is_set)
+            if is_first:
+                gc.freeze()  # so that collections in the GUI thread skip the loaded objects
         except Exception as error:  # noqa: BLE001 - passed on: a thread has no caller to raise it to
-            made = error
-        return made, cancelled
+            outcome = error
+        return outcome, cancelled
 
-    def _hand_over_device(self, done: tuple[object, threading.Event]) -> None:
+    def _deliver_outcome(self, done: tuple[object, threading.Event]) -> None:
         """Emit the opened device, or close it if it is no longer requested."""
-        made, cancelled = done
+        outcome, cancelled = done
         if not cancelled.is_set():
-            self._wanted = None
-            (self.failed if isinstance(made, Exception) else self.opened).emit(made)
+            self._requested = None
+            (self.failed if isinstance(outcome, Exception) else self.opened).emit(outcome)
             return
-        if not isinstance(made, Exception):
+        if not isinstance(outcome, Exception):
             try:
-                made.close()  # type: ignore[attr-defined]
-            except Exception as error:  # noqa: BLE001 - reported: the device may exert force, and the next request must not wait
+                outcome.close()  # type: ignore[attr-defined]
+            except Exception as error:  # noqa: BLE001 - reported, since the device may exert force
                 self.failed.emit(error)
-        if self._wanted is not None:
+        if self._requested is not None:
             self._start_opening()
 
 
 class _LabSaving(QObject):
-    """The available liquids; writes presets one at a time, and then updates the list.
+    """The available liquids; writes presets one at a time, and updates the liquids afterwards.
 
-    ``said`` names what was written or opened last. ``failed`` carries the exception.
+    ``said`` names what was saved or opened last; ``failed`` carries an exception.
     """
 
     failed = Signal(object)
@@ -220,16 +220,16 @@ class _LabSaving(QObject):
         super().__init__()
         self.liquids = liquids
         self.said = ""
-        self._before: threading.Thread | None = None
+        self._last_thread: threading.Thread | None = None
         self._done.connect(self._report_outcome, Qt.ConnectionType.QueuedConnection)
 
     def save_preset(self, path: Path, setting: Setting) -> None:
-        at_hand = (*(it.source for it in self.liquids), str(path))
+        sources = (*(choice.source for choice in self.liquids), str(path))
         # Not a pool, since Python waits for its threads at exit, and a drive may never respond.
-        self._before = threading.Thread(
-            target=self._write_preset, args=(self._before, path, setting, at_hand), name="preset", daemon=True
+        self._last_thread = threading.Thread(
+            target=self._write_preset, args=(self._last_thread, path, setting, sources), name="preset", daemon=True
         )
-        self._before.start()
+        self._last_thread.start()
 
     def open_liquids(self, path: Path) -> Choice:
         """Add the liquids of a file to the available ones; return the first.
@@ -237,27 +237,27 @@ class _LabSaving(QObject):
         Raises
         ------
         ProtocolError
-            Lists every problem of the file.
+            The file has problems, all of which are listed.
         """
         choices = liquids_of(str(path))
-        self.liquids = (*(it for it in self.liquids if it not in choices), *choices)
-        self.said = f"Opened {path.name}: {', '.join(displayed_name(it.liquid) for it in choices)}"
+        self.liquids = (*(choice for choice in self.liquids if choice not in choices), *choices)
+        self.said = f"Opened {path.name}: {', '.join(displayed_name(choice.liquid) for choice in choices)}"
         return choices[0]
 
     def wait(self, patience_s: float = PATIENCE_S) -> None:
-        """Wait until all presets are written and report the outcomes."""
-        if self._before is not None:
-            self._before.join(patience_s)
+        """Wait until all presets are written and their outcomes reported."""
+        if self._last_thread is not None:
+            self._last_thread.join(patience_s)
             QCoreApplication.sendPostedEvents(self)
 
     def _write_preset(
-        self, before: threading.Thread | None, path: Path, setting: Setting, at_hand: tuple[str, ...]
+        self, previous: threading.Thread | None, path: Path, setting: Setting, sources: tuple[str, ...]
     ) -> None:
-        if before is not None:
-            before.join()
+        if previous is not None:
+            previous.join()
         try:
             save_preset(path, preset_text(setting))
-            outcome: object = f"Saved as {path.name} in {path.parent}", available_liquids(saved=at_hand)
+            outcome: object = f"Saved as {path.name} in {path.parent}", available_liquids(saved=sources)
         except Exception as error:  # noqa: BLE001 - passed on: a thread has no caller to raise it to
             outcome = error
         self._done.emit(outcome)
@@ -266,8 +266,8 @@ class _LabSaving(QObject):
         if isinstance(outcome, Exception):
             self.failed.emit(outcome)
             return
-        self.said, written = outcome
-        self.liquids = tuple(dict.fromkeys((*self.liquids, *written)))
+        self.said, liquids = outcome
+        self.liquids = tuple(dict.fromkeys((*self.liquids, *liquids)))
 
 
 _INITIAL_A: Final = Choice(source="rek2024", liquid="water", title="Water")
@@ -282,9 +282,9 @@ class LabController(QObject):
 
     Parameters
     ----------
-    place : the widgets; the controller's lifetime is theirs
+    place : the page, which is the controller's parent
     device, options : the initial device, and the values of devices' options, by name
-    open_live, make_appraiser : functions that open a device by its name, and start the appraising process
+    open_live, make_appraiser : functions that open a device by its name, and start the process that measures costs
     chance : random generator for blind comparisons
     bench, liquids : the initial workbench, and the liquids that can be chosen
     """
@@ -309,7 +309,7 @@ class LabController(QObject):
         self.trouble = self.study = ""
         self._refused: tuple[str, str] | None = None
         self._entered = False
-        self._prices = _Prices(make_appraiser)
+        self._measurements = _Measurements(make_appraiser)
         self._opening = LabOpening(open_live, options)
         self._saving = _LabSaving(available_liquids() if liquids is None else liquids)
         self.chance = chance if chance is not None else random.SystemRandom()
@@ -317,7 +317,7 @@ class LabController(QObject):
         self.uncaught = UncaughtExceptions(self._handle_uncaught)
         self.frames = self._make_timer(_FRAME_MS, self._draw_frame)
         self._due = self._make_timer(0, self._draw_frame, once=True)
-        self._cost_due = self._make_timer(_APPRAISE_AFTER_MS, self._request_prices, once=True)
+        self._cost_due = self._make_timer(_APPRAISE_AFTER_MS, self._request_measurements, once=True)
         self._connect()
 
     def _make_timer(self, interval_ms: int, slot: Callable[[], None], *, once: bool = False) -> QTimer:
@@ -336,10 +336,10 @@ class LabController(QObject):
             signal.connect(slot)
 
     @guarded
-    def _handle_request(self, what: str, details: tuple[Any, ...]) -> None:
-        """Carry out a request of the lab's window."""
+    def _handle_request(self, request: str, details: tuple[Any, ...]) -> None:
+        """Carry out a request of the lab's page."""
         bench, live = self.bench, self.live
-        match what, *details:
+        match request, *details:
             case "enter", *_:
                 self._enter()
             case "leave", *_:
@@ -350,7 +350,7 @@ class LabController(QObject):
                 self._choose_liquid(side, chosen)
             case "copy", *_:
                 self._try_edit(bench.copy_to_other, "")
-            case "switch", *_:  # release a held knob at once: it belonged to the other side
+            case "switch", *_:  # show the view at once, to release a held knob of the other side
                 self.feel_workbench(bench.switch())
                 self._show_view()
             case "blind", True:
@@ -358,16 +358,16 @@ class LabController(QObject):
             case "blind", *_:
                 self.feel_workbench(bench.revealed())
             case "undo" | "redo", *_:
-                self.feel_workbench(bench.undo() if what == "undo" else bench.redo())
+                self.feel_workbench(bench.undo() if request == "undo" else bench.redo())
             case "device", name:
                 self._open_device(name)
             case "cancel", *_:
                 self._cancel_opening()
             case "stop", *_ if live is not None:
                 live.stop_force()
-            case "stop", *_ if self._opening.busy_with is not None:  # a device would bring its own force
+            case "stop", *_ if self._opening.busy_with is not None:  # the device that is being opened would exert force
                 self._cancel_opening()
-            case "diagnose", *_:  # the main window then opens the diagnosis, which needs the device
+            case "diagnose", *_:  # the main window opens the diagnosis, which needs the device
                 self.trouble = self.view().trouble
                 self._close_device()
             case "fade in", *_:
@@ -391,7 +391,7 @@ class LabController(QObject):
         return self._saving.liquids
 
     def leave(self) -> None:
-        """Release the hand: zero force, stop the servo, close the device, then everything else."""
+        """Send zero force, stop the servo, close the device, then everything else."""
         if not self._entered:
             return
         self._entered = False
@@ -404,19 +404,19 @@ class LabController(QObject):
             log.warning("the servo did not stop properly: %s", error)
             self.place.message.emit("The device was not released properly", f"{error}.")
         finally:
-            self._prices.close()
+            self._measurements.close()
             self.uncaught.remove()
 
     def end(self, patience: Patience) -> None:
-        """Leave, then wait for presets being written and devices being opened."""
+        """Leave the lab, then wait for presets that are being written and devices that are being opened."""
         self.leave()
         self._saving.wait(patience.left_s)
         self._opening.wait(patience.left_s)
 
     def fail(self, error: BaseException) -> None:
-        """Send zero force, then show the failure; the force can be resumed once the device is opened again.
+        """Send zero force and close the device, then show the failure; the device can be opened again.
 
-        The traceback is cleared, since a painter that it references would stay active and block all painting.
+        The traceback is cleared, since a painter that it keeps alive would block all painting.
         """
         self._opening.cancel()
         try:
@@ -425,25 +425,25 @@ class LabController(QObject):
             log.warning("the servo did not stop properly: %s", second)
         traceback.clear_frames(error.__traceback__)
         known = isinstance(error, StudyError)
-        said = f"{error}" if known else f"{type(error).__name__}: {error}; the force is off"
-        before, self.trouble = self.trouble, said
-        if not known and self.trouble != before:  # only once, although every frame may raise it
+        sentence = f"{error}" if known else f"{type(error).__name__}: {error}; the force is off"
+        previous, self.trouble = self.trouble, sentence
+        if not known and self.trouble != previous:  # every frame may raise it again
             log.error("the lab failed: %s", error, exc_info=error)
 
     def view(self) -> LabView:
-        bench, live, opening, costs = self.bench, self.live, self._opening.busy_with, self._prices.costs
+        bench, live, opening, costs = self.bench, self.live, self._opening.busy_with, self._measurements.costs
         reading = None if live is None else live.reading()
         fault = "" if reading is None else reading.fault
-        if fault or (self.trouble and live is None):  # a refused edit or file does not stop the device
+        if fault or (self.trouble and live is None):  # a rejected edit or file does not stop the device
             state = "stopped"
         else:
             state = "opening" if opening is not None else "ready" if live is not None else "closed"
         scene = bench.in_hand.scene
         progress = self._said or (_COMPILING if self._opening.elapsed_s > LONG_AFTER_S else "")
-        shown: dict[str, Any] = {}
+        live_values: dict[str, Any] = {}
         if live is not None and reading is not None:
             half_x, half_y, half_z = live.device.workspace_m
-            shown = {
+            live_values = {
                 "workspace_m": (2 * half_x, 2 * half_y, 2 * half_z),
                 "path": live.path,
                 "trace": live.trace(),
@@ -453,8 +453,8 @@ class LabController(QObject):
                 "limiters": live.limiters(),
             }
         if not bench.blind:  # the ball's size would reveal the side
-            shown["body_radius_m"] = scene.body.diameter_m / 2 / scene.scale
-        described = descriptor_of(self.device)
+            live_values["body_radius_m"] = scene.body.diameter_m / 2 / scene.scale
+        descriptor = descriptor_of(self.device)
         return LabView(
             workbench=bench,
             liquids=self.liquids,
@@ -463,25 +463,25 @@ class LabController(QObject):
                 chosen=self.device,
                 state=state,
                 ready=live is not None and not fault,
-                pointer=described.pointer,
-                diagnosable=described.doctor is not None,
+                pointer=descriptor.pointer,
+                diagnosable=descriptor.doctor is not None,
             ),
             paths=tuple(TITLES.items()),
             cost=() if costs is None else _cost_rows(costs),
             tick_ns=None if costs is None else costs.tick_ns,
-            errors=() if self._prices.errors is None else _error_rows(self._prices.errors),
-            measuring=self._prices.waits or self._cost_due.isActive(),
+            errors=() if self._measurements.errors is None else _error_rows(self._measurements.errors),
+            measuring=self._measurements.waits or self._cost_due.isActive(),
             force_on=reading is not None and reading.force_on,
             busy="" if opening is None else progress or f"Opening {title_of(opening)}",
             trouble=self.trouble or fault,
             refused=self._refused,
             said=self._saving.said,
             study=self.study,
-            **shown,
+            **live_values,
         )
 
     def feel_study_liquids(self, a: Setting, b: Setting, study: str) -> None:
-        """Feel liquids of the study in the designer, which takes changes back; ``study`` is "" if it cannot."""
+        """Present liquids of the study in the designer; changes can be put back into ``study``, unless it is ""."""
         self.study = study
         self.feel_workbench(Workbench(a, b), anew=True)
 
@@ -497,7 +497,7 @@ class LabController(QObject):
     def _draw_frame(self) -> None:
         if self.live is not None:
             self.live.poll()
-        self._prices.read_answers()
+        self._measurements.read_answers()
         self._show_view()
 
     def _show_view(self) -> None:
@@ -525,7 +525,7 @@ class LabController(QObject):
         self._try_edit(lambda: self.bench.choose(side, displayed_name(choice.liquid), choice.scene), "")
 
     def _try_edit(self, edit: Callable[[], Workbench], name: str) -> None:
-        """Make an edit; if it is rejected, keep the reason for its parameter."""
+        """Make an edit; if it is rejected, show the reason, next to the parameter ``name`` if there is one."""
         try:
             bench = edit()
         except StudyError as error:
@@ -538,10 +538,10 @@ class LabController(QObject):
 
     def feel_workbench(self, bench: Workbench, *, anew: bool = False) -> None:
         """Present a workbench at once, and measure its cost after a pause without edits."""
-        before, self.bench, self._refused = self.bench, bench, None
+        previous, self.bench, self._refused = self.bench, bench, None
         self._clear_trouble()
-        if bench.in_hand.scene != before.in_hand.scene:
-            self._prices.discard_answers()
+        if bench.in_hand.scene != previous.in_hand.scene:
+            self._measurements.discard_answers()
             self._cost_due.start()
         if self.live is not None:
             self.live.feel(bench, anew=anew)
@@ -550,8 +550,8 @@ class LabController(QObject):
                 self._due.start(math.ceil(1e3 * waits_s))
 
     @guarded
-    def _request_prices(self) -> None:
-        self._prices.request(self.bench.in_hand.scene)
+    def _request_measurements(self) -> None:
+        self._measurements.request(self.bench.in_hand.scene)
 
     def _save_preset(self, path: Path, setting: Setting) -> None:
         if self.bench.blind:
@@ -561,7 +561,7 @@ class LabController(QObject):
         self._saving.save_preset(path, setting)
 
     def _open_preset(self, path: Path) -> None:
-        """Feel the first liquid of a file; the file's other liquids become available."""
+        """Present the first liquid of a file, and make its other liquids available."""
         try:
             first = self._saving.open_liquids(path)
         except StudyError as error:
@@ -571,7 +571,7 @@ class LabController(QObject):
 
     @guarded
     def _show_saving_error(self, error: Exception) -> None:
-        """Show why a preset could not be written; the force continues. Other exceptions are bugs and are raised."""
+        """Show why a preset could not be written; the force continues. Raise exceptions that are bugs."""
         if not isinstance(error, StudyError):
             raise error
         self.trouble = str(error)

@@ -1,4 +1,4 @@
-"""The main window's stay: its places, the settings and devices of this machine, one session at a time."""
+"""The controller of the main window: its pages, the settings of this machine, one session at a time."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ if TYPE_CHECKING:
 
 
 class WorkstationController(QObject):
-    """Holds the settings, stores changes at once, and can undo the last one.
+    """Holds the settings of this machine, stores changes at once, and can undo them.
 
     ``changed`` is emitted when a setting changes; ``troubled(title, sentence)`` if settings cannot be read or stored.
     """
@@ -67,7 +67,7 @@ class WorkstationController(QObject):
     def __init__(self) -> None:
         super().__init__()
         self.settings, self.trouble = settings_here()
-        self._before: list[tuple[str, MachineSettings]] = []
+        self._undo_stack: list[tuple[str, MachineSettings]] = []
         self.place: MachinePlace | None = None
 
     def make_place(self) -> MachinePlace:
@@ -79,25 +79,25 @@ class WorkstationController(QObject):
         return place
 
     def change_settings(self, values: dict[str, Any]) -> None:
-        before = {name: getattr(self.settings, name) for name in MachineSettings.model_fields}
-        made = MachineSettings.model_validate(before | values)
-        if made == self.settings:
+        current = {name: getattr(self.settings, name) for name in MachineSettings.model_fields}
+        settings = MachineSettings.model_validate(current | values)
+        if settings == self.settings:
             self._show_settings()
             return
         changed = next(iter(values)).removesuffix("_mm").replace("_", " ").replace("lsl", "LSL")
-        self._before.append((changed, self.settings))
-        self._save_settings(made)
+        self._undo_stack.append((changed, self.settings))
+        self._save_settings(settings)
 
     def remember_operator(self, operator: str) -> None:
-        """Store these initials as the default of the next session; undo ignores this."""
+        """Store the operator's initials as the default of the next session, without undo."""
         if operator and operator != self.settings.operator:
             self._save_settings(self.settings.model_copy(update={"operator": operator}))
 
     def remember_protocol(self, protocol: Path) -> None:
-        """Store a protocol file among the recent ones; undo ignores this."""
-        made = self.settings.with_recent(protocol)
-        if made != self.settings:
-            self._save_settings(made)
+        """Store a protocol file among the recent ones, without undo."""
+        settings = self.settings.with_recent(protocol)
+        if settings != self.settings:
+            self._save_settings(settings)
 
     def store_display_offset(self, mean_ms: float, spread_ms: float, how: str, screen: str) -> None:
         offset = {"mean_ms": mean_ms, "spread_ms": spread_ms, "how": how, "screen": screen}
@@ -106,14 +106,14 @@ class WorkstationController(QObject):
         )
 
     def undo(self) -> None:
-        if self._before:
+        if self._undo_stack:
             kept = {"operator": self.settings.operator, "recent": self.settings.recent}
-            self._save_settings(self._before.pop()[1].model_copy(update=kept))
+            self._save_settings(self._undo_stack.pop()[1].model_copy(update=kept))
 
     @property
     def undo_name(self) -> str:
-        """The name of the change that undo reverts; "" if there is none."""
-        return self._before[-1][0] if self._before else ""
+        """The name of the change that undo reverts, or ""."""
+        return self._undo_stack[-1][0] if self._undo_stack else ""
 
     def _save_settings(self, settings: MachineSettings) -> None:
         self.settings = settings
@@ -135,7 +135,7 @@ class WorkstationController(QObject):
 
 
 def load_modules() -> None:
-    """Load the modules of session, lab, designer and compiler, and those that the first page needs."""
+    """Import the modules of session, lab, designer and compiler, and compute what the first page of a session needs."""
     import study_app.app.lab_controller  # noqa: PLC0415
     import study_app.app.session.playing  # noqa: PLC0415
     import study_app.gui.watch.window  # noqa: PLC0415
@@ -145,19 +145,19 @@ def load_modules() -> None:
 
     brightness()
     schema()
-    gc.freeze()  # keep the loaded objects out of later collections
+    gc.freeze()  # so that collections skip the loaded objects
 
 
-LOOK_AFTER_MS = 300  # the window is painted by then
+LOOK_AFTER_MS = 300  # after this time, the window is painted
 _JOBS_PATIENCE_S = 5.0
 
 
 def run_home_window(
     results: Path | None = None, *, then: Callable[[MainController], None] = lambda _visit: None
 ) -> int:
-    """Open the home window on the results folder; return the exit code when it is closed.
+    """Open the main window; return the exit code when it is closed.
 
-    By default the folder is the workspace's. ``then`` is called once the window is open.
+    ``results`` is the results folder, by default that of the workspace. ``then`` is called once the window is open.
 
     Raises
     ------
@@ -179,15 +179,15 @@ def run_home_window(
 
 def _with_guarded_painting(make: Callable[[], Place]) -> Callable[[], Place]:
     def guarded() -> Place:
-        made = make()  # imports its classes
+        page = make()  # imports the page's classes
         guard_painting()
-        return made
+        return page
 
     return guarded
 
 
 class MainController(QObject):
-    """Controls the home window: one session at a time, after which it is shown again."""
+    """Controls the main window, which is hidden during a session and shown again afterwards."""
 
     def __init__(self, results: Path | None = None) -> None:
         super().__init__()
@@ -233,22 +233,22 @@ class MainController(QObject):
         self._opened.timeout.connect(self.preload)
 
     def open(self) -> None:
-        """Show the window, no larger than the screen, then look for devices."""
+        """Show the window, no larger than the screen; then search for devices."""
         place_window(self.window, self.window.screen(), corner=False)
         self.window.show()
         if self.machine.trouble:
             self.window.show_message("The default settings are being used", f"{self.machine.trouble}.")
         elif self._follows_machine and chosen_workspace() is None:
-            asked = self.question = WorkspaceDialog(self.window, self.window.theme, offered_workspace().folder)
-            asked.accepted.connect(lambda: self._choose_workspace(asked.folder))
-            asked.finished.connect(asked.deleteLater)
-            asked.open()
+            dialog = self.question = WorkspaceDialog(self.window, self.window.theme, offered_workspace().folder)
+            dialog.accepted.connect(lambda: self._choose_workspace(dialog.folder))
+            dialog.finished.connect(dialog.deleteLater)
+            dialog.open()
         self._opened.start()
 
     def show_bug(self, error: BaseException) -> bool:
-        """Show an unhandled exception once, unless a session shows it; return False, so that it is printed, too."""
-        bug, said = bug_sentence(error), error is self.window.not_opened
-        if self.live is None and self.window.isVisible() and not said and bug not in self._bugs:
+        """Show an unhandled exception once, unless a session is running; return False, so that it is also printed."""
+        bug, is_shown = bug_sentence(error), error is self.window.not_opened
+        if self.live is None and self.window.isVisible() and not is_shown and bug not in self._bugs:
             self._bugs.add(bug)
             self.window.show_message("The last action failed", bug)
         return False
@@ -263,7 +263,7 @@ class MainController(QObject):
         self.check_computer()
 
     def check_computer(self) -> None:
-        from study_app.app.session.preflight_controller import ComputerCheck  # noqa: PLC0415 - only where it is asked for
+        from study_app.app.session.preflight_controller import ComputerCheck  # noqa: PLC0415 - only on demand
 
         screens = QGuiApplication.screens()
         participants = screens[screen_number(self.machine.settings) - 1]
@@ -272,12 +272,12 @@ class MainController(QObject):
         self.check.measure()
 
     def _make_machine_place(self) -> MachinePlace:
-        made = self.machine.make_place()
-        made.check_asked.connect(self.check_computer)
-        return made
+        page = self.machine.make_place()
+        page.check_asked.connect(self.check_computer)
+        return page
 
     def preload(self) -> None:
-        """Load the modules of session, lab and designer in the background, so that the first visit rarely waits."""
+        """Import the modules of session, lab and designer in the background, so that they open without delay."""
         self._loading.run(load_modules)
 
     def compile_when_loaded(self) -> None:
@@ -285,21 +285,21 @@ class MainController(QObject):
         self._loading.done.connect(self.compilation.start)
 
     def _make_lab_place(self) -> LabPlace:
-        self._loading.wait()  # two threads that import modules of the same cycle may see them partially initialised
-        from study_app.app.lab_controller import LabController  # noqa: PLC0415 - pyqtgraph: only once it is needed
+        self._loading.wait()  # two threads must not import the same modules
+        from study_app.app.lab_controller import LabController  # noqa: PLC0415 - imports pyqtgraph, so only on demand
         from study_app.gui.lab import LabPlace  # noqa: PLC0415
 
-        made = LabPlace()
+        page = LabPlace()
         settings = self.machine.settings
-        self.lab = LabController(made, device=settings.device, options=settings.device_options)
-        made.put_back_asked.connect(self._put_liquid_back)
-        made.asked.connect(self._prepare_lab_request)
-        return made
+        self.lab = LabController(page, device=settings.device, options=settings.device_options)
+        page.put_back_asked.connect(self._put_liquid_back)
+        page.asked.connect(self._prepare_lab_request)
+        return page
 
-    def _prepare_lab_request(self, what: str, _details: object) -> None:
-        if what in {"enter", "device", "fade in"}:
+    def _prepare_lab_request(self, request: str, _details: object) -> None:
+        if request in {"enter", "device", "fade in"}:
             self.devices.end_diagnosis()  # the diagnosis would hold the device
-        elif what == "diagnose" and self.lab is not None:
+        elif request == "diagnose" and self.lab is not None:
             self.devices.diagnose(self.lab.device)
 
     def _put_liquid_back(self, side: Side, setting: Setting) -> None:
@@ -308,7 +308,7 @@ class MainController(QObject):
 
     def _make_designer_place(self) -> DesignerPlace:
         self._loading.wait()
-        from study_app.app.session.playing import Playing  # noqa: PLC0415 - only once they are needed
+        from study_app.app.session.playing import Playing  # noqa: PLC0415 - only on demand
         from study_app.designer.controller import DesignerController  # noqa: PLC0415
 
         self.designer = DesignerController(self.results)
@@ -332,7 +332,7 @@ class MainController(QObject):
         )
 
     def show_version(self, session: SessionFacts) -> None:
-        """Open the designer at the changes since a session; without the study's file, list those between sessions."""
+        """Open the designer with the changes since a session; without the study's file, list those between sessions."""
         try:
             protocol_file(session.study)
         except StudyError:
@@ -349,16 +349,17 @@ class MainController(QObject):
         )
 
     def begin_new_study(self, source: str = "", name: str = "") -> None:
-        """Open the page for new studies in the designer; with ``name`` create the study at once."""
+        """Open the designer's page for new studies, or with ``name`` create the study at once."""
         self._go_to_designer(
-            lambda it: it.show_new_page(source), lambda it: it.begin_study(source, name) if name else None
+            lambda designer: designer.show_new_page(source),
+            lambda designer: designer.begin_study(source, name) if name else None,
         )
 
     def _go_to_designer(self, *actions: Callable[[DesignerController], object]) -> None:
         self.window.go("designer")
         assert self.designer is not None  # noqa: S101 - otherwise the window has shown and raised the error
-        for act in actions:
-            act(self.designer)
+        for action in actions:
+            action(self.designer)
 
     def _feel_liquids(self, liquids: LabLiquids) -> None:
         self.window.go("lab")
@@ -366,28 +367,28 @@ class MainController(QObject):
         self.lab.feel_study_liquids(liquids.a, liquids.b, liquids.study)
 
     def _forget_study(self) -> None:
-        """Note that another study is open in the designer, so that the lab no longer offers to take changes back."""
+        """Stop offering to put changes in the lab back, because another study is open in the designer."""
         if self.lab is not None:
             self.lab.study = ""
 
     def _with_commands(self, make: Callable[[], Place]) -> Place:
-        """Create a page with the keys for Home and a new study, which Home and the designer have themselves."""
-        made = make()
+        """Create a page, and add the keys for the home page and a new study."""
+        page = make()
         begin_new = partial(self._go_to_designer, lambda designer: designer.place.begin_new())
-        add_commands(made, {"home": partial(self.window.go, "home"), "new": begin_new})
-        return made
+        add_commands(page, {"home": partial(self.window.go, "home"), "new": begin_new})
+        return page
 
     def _make_home_place(self) -> HomePlace:
-        made = HomePlace(self.results, _draft_words)
-        made.session_asked.connect(self._start_session)
-        made.results_asked.connect(self.show_study)
-        made.protocol_opened.connect(self.machine.remember_protocol)
-        made.edit_asked.connect(self.open_designer)
-        made.discard_asked.connect(self.discard_draft)
-        made.new_asked.connect(self.begin_new_study)
-        made.device.display.clicked.connect(self._test_display)
-        self._home_place = made
-        return made
+        page = HomePlace(self.results, _draft_words)
+        page.session_asked.connect(self._start_session)
+        page.results_asked.connect(self.show_study)
+        page.protocol_opened.connect(self.machine.remember_protocol)
+        page.edit_asked.connect(self.open_designer)
+        page.discard_asked.connect(self.discard_draft)
+        page.new_asked.connect(self.begin_new_study)
+        page.device.display.clicked.connect(self._test_display)
+        self._home_place = page
+        return page
 
     def _make_devices_place(self) -> DevicesPlace:
         self.devices = DevicesPlace(self.machine.settings)
@@ -397,16 +398,16 @@ class MainController(QObject):
         return self.devices
 
     def _show_machine(self) -> None:
-        """Show settings and the state of the preferred device on the home page."""
+        """Show the settings and the preferred device on the home page."""
         settings = self.machine.settings
         self._home_place.show_machine(settings, device_named(settings.device, self.devices.shown))
 
     def _apply_settings(self, settings: MachineSettings) -> None:
-        """Apply changed settings of this machine, except those that the command line set."""
+        """Apply changed settings of this machine, except a results folder that the command line overrides."""
         self.window.show_theme(theme_named(settings.theme))
-        here = workspace()
-        if self._follows_machine and here.results != self.results:
-            self.results = here.results
+        results = workspace().results
+        if self._follows_machine and results != self.results:
+            self.results = results
             self._home_place.show_results(self.results)
             if self.results_place is not None:
                 self.results_place.show_results(self.results)
@@ -428,35 +429,35 @@ class MainController(QObject):
         self.window.go("results")
 
     def _make_results_place(self) -> ResultsPlace:
-        from study_app.gui.results.view import ResultsPlace  # noqa: PLC0415 - only once it is needed
+        from study_app.gui.results.view import ResultsPlace  # noqa: PLC0415 - only on demand
 
         self.results_place = ResultsPlace(self.results)
         self.results_place.version_asked.connect(self.show_version)
         return self.results_place
 
     def _make_help_place(self) -> HelpPlace:
-        from study_app.gui.help.view import HelpPlace  # noqa: PLC0415 - only once it is needed
+        from study_app.gui.help.view import HelpPlace  # noqa: PLC0415 - only on demand
 
         self.help = HelpPlace()
         return self.help
 
     def show_help(self, page: str = "") -> None:
-        here = self.window.here
+        origin = self.window.here
         self.window.place("help")
-        assert self.help is not None  # noqa: S101 - made with its place
-        self.help.open_from(here)
+        assert self.help is not None  # noqa: S101 - created with the page
+        self.help.open_from(origin)
         if page:
             self.help.open_page(page)
         self.window.go("help")
         self.help.reader.setFocus()
 
     def end(self) -> None:
-        """Release everything that the pages hold, and wait for work in other threads, such as opening a device.
+        """Release everything that the pages hold, and wait for jobs in other threads, such as opening a device.
 
-        After a signal the program waits for at most 2 s; a device that is still being opened then gets no force.
+        After a signal, wait for at most 2 s; a device that is still being opened does not exert force.
         """
         patience = Patience(BY_SIGNAL_S if self.code else OPENING_PATIENCE_S)
-        self._opened.stop()  # a thread that it starts would outlive Python
+        self._opened.stop()  # since it would start a thread that outlives Python
         self.compilation.close()
         self._home_place.end()
         for part in (self.playing, self.lab):
@@ -479,8 +480,8 @@ class MainController(QObject):
     def _start_session(self, chosen: NewSession) -> None:
         if self.live is not None:
             return
-        self._loading.wait()  # two threads that import modules of the same cycle may see them partially initialised
-        from study_app.app.session.live_session import LiveSession  # noqa: PLC0415 - only for a session
+        self._loading.wait()  # two threads must not import the same modules
+        from study_app.app.session.live_session import LiveSession  # noqa: PLC0415 - only for sessions
 
         self.devices.end_diagnosis()  # the diagnosis would hold the device
         self.machine.remember_operator(chosen.operator)
@@ -503,12 +504,12 @@ class MainController(QObject):
         self.window.return_from_session()
         if isinstance(live.error, DeviceError) and not live.has_begun:
             name = live.chosen.device
-            examined = descriptor_of(name).doctor is not None
+            is_diagnosable = descriptor_of(name).doctor is not None
             self.window.ask_about_device(
                 "The session did not start",
                 f"{live.error}.",
                 partial(self._start_session, live.chosen),
-                partial(self.devices.diagnose, name) if examined else None,
+                partial(self.devices.diagnose, name) if is_diagnosable else None,
             )
         elif live.error is not None:
             title = "The session did not finish" if live.has_begun else "The session did not start"
@@ -518,6 +519,6 @@ class MainController(QObject):
 
 
 def _draft_words() -> DraftWords:
-    from study_app.designer import version_rows  # noqa: PLC0415 - only where there is a draft
+    from study_app.designer import version_rows  # noqa: PLC0415 - only for drafts
 
     return version_rows

@@ -1,4 +1,4 @@
-"""What keeps frames on time: the rest of a frame for drawing, collection in one thread, the thread's priority."""
+"""Timeliness of frames: deferred tasks, garbage collection in one thread, and the thread's priority."""
 
 import ctypes
 import gc
@@ -13,9 +13,9 @@ from typing import Final
 
 from PySide6.QtCore import QTimer
 
-MOST_PERIODS: Final = 4  # the longest wait of a task for free time
-MOST_SHARE: Final = 0.15  # the largest share of the time that a task may use; slower tasks run less often
-_FORGETS: Final = 0.9  # the decay of a task's worst duration per run
+MOST_PERIODS: Final = 4  # maximum wait of a task for free time, in periods
+MOST_SHARE: Final = 0.15  # maximum fraction of the time that a task may use; slower tasks run less often
+_DECAY: Final = 0.9  # decay of a task's longest duration per run
 
 
 @dataclass(slots=True, kw_only=True)
@@ -39,39 +39,39 @@ class FrameBudget:
 
     Parameters
     ----------
-    works : the tasks with their periods [s], the most urgent first
+    tasks : the tasks with their periods [s], the most urgent first
     """
 
     def __init__(
-        self, works: Sequence[tuple[Callable[[], object], float]], now_ns: Callable[[], int] = time.perf_counter_ns
+        self, tasks: Sequence[tuple[Callable[[], object], float]], now_ns: Callable[[], int] = time.perf_counter_ns
     ) -> None:
-        self.tasks = [_DeferredTask(do=do, period_ns=round(period_s * 1e9)) for do, period_s in works]
+        self.tasks = [_DeferredTask(do=do, period_ns=round(period_s * 1e9)) for do, period_s in tasks]
         self._now_ns = now_ns
 
     def run_due_tasks(self, until_ns: int) -> None:
-        """Run due tasks that will end by ``until_ns``; if tasks are long overdue, run one in any case."""
-        hurried = False
-        for work in self.tasks:
+        """Run due tasks that will probably end by ``until_ns``, and at most one other that is long overdue."""
+        has_run_overdue = False
+        for task in self.tasks:
             now_ns = self._now_ns()
-            waited_ns = work.overdue_ns(now_ns)
+            waited_ns = task.overdue_ns(now_ns)
             if waited_ns < 0:
                 continue
-            if now_ns + work.took_ns > until_ns:
-                if hurried or waited_ns < MOST_PERIODS * work.period_ns:
+            if now_ns + task.took_ns > until_ns:
+                if has_run_overdue or waited_ns < MOST_PERIODS * task.period_ns:
                     continue
-                hurried = True
-            self._run_task(work, now_ns)
+                has_run_overdue = True
+            self._run_task(task, now_ns)
 
-    def _run_task(self, work: _DeferredTask, began_ns: int) -> None:
-        work.done_ns = began_ns
-        work.do()
-        work.took_ns = max(self._now_ns() - began_ns, round(_FORGETS * work.took_ns))
+    def _run_task(self, task: _DeferredTask, started_ns: int) -> None:
+        task.done_ns = started_ns
+        task.do()
+        task.took_ns = max(self._now_ns() - started_ns, round(_DECAY * task.took_ns))
 
 
 _PERIOD_MS = 200
-YOUNG, OLDEST = 1, 2  # generations; collecting up to the first is fast
+YOUNG, OLDEST = 1, 2  # generations; only the young one is collected quickly
 _LONG_S = 0.02
-MOST_FROZEN = 500_000  # objects; the modules of home, designer, lab and session have 170 000
+MOST_FROZEN = 500_000  # objects; the program's modules have 170 000
 _session_runs = threading.Event()
 
 
@@ -86,7 +86,7 @@ def collect_if_due() -> int | None:
 
 
 def _collect() -> None:
-    """Collect what is due; after a long full collection freeze all objects, up to a limit between sessions."""
+    """Collect what is due. After a long full collection freeze all objects, or unfreeze them if there are too many."""
     began_s = time.thread_time()
     if collect_if_due() == OLDEST and time.thread_time() - began_s > _LONG_S:
         gc.freeze()
@@ -95,9 +95,9 @@ def _collect() -> None:
 
 
 def freeze_garbage() -> None:
-    """Exclude all current objects from collection until `unfreeze_garbage`, after a collection of the youngest.
+    """Exclude all current objects from collection until `unfreeze_garbage`, after collecting the youngest ones.
 
-    A collection of all objects of a session takes as long as several frames; one of later objects takes hardly any
+    Collecting all objects of a session takes as long as several frames; collecting only later ones takes hardly any
     time.
     """
     _session_runs.set()
@@ -111,19 +111,19 @@ def unfreeze_garbage() -> None:
     gc.unfreeze()
 
 
-_ends_at_once = threading.Event()
+_collection_disabled = threading.Event()
 
 
 def disable_collection() -> None:
-    """Disable collection at the end of the program, where a full collection takes seconds under load."""
-    _ends_at_once.set()
+    """Disable the collection at the end of the program, which takes seconds under load."""
+    _collection_disabled.set()
 
 
 @contextmanager
 def collecting_in_this_thread() -> Iterator[None]:
     """Run collections only in this thread, which runs Qt's event loop."""
-    before = gc.isenabled()
-    _ends_at_once.clear()
+    was_enabled = gc.isenabled()
+    _collection_disabled.clear()
     gc.disable()
     timer = QTimer()
     timer.timeout.connect(_collect)
@@ -133,8 +133,8 @@ def collecting_in_this_thread() -> Iterator[None]:
     finally:
         timer.stop()
         unfreeze_garbage()
-        if before:
-            if not _ends_at_once.is_set():
+        if was_enabled:
+            if not _collection_disabled.is_set():
                 gc.collect()
             gc.enable()
 
@@ -154,13 +154,13 @@ class ThreadPriority:
         if sys.platform == "win32":
             return _set_windows_priority(ABOVE_NORMAL)
         if sys.platform == "darwin":
-            return True  # the windows' thread already has interactive priority there
+            return True  # the GUI thread already has interactive priority
         thread = threading.get_native_id()
         before = os.getpriority(os.PRIO_PROCESS, thread)
         try:
             os.setpriority(os.PRIO_PROCESS, thread, NICE)
         except PermissionError:
-            from study_app.haptics.runtime.clocks import make_high_priority  # noqa: PLC0415 - a session has the compiler
+            from study_app.haptics.runtime.clocks import make_high_priority  # noqa: PLC0415 - a session has imported the compiler
 
             try:
                 make_high_priority(thread, NICE)

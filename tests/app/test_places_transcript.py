@@ -141,7 +141,7 @@ def test_results(qtbot: Any) -> None:
                 if name == "none":
                     place.read_studies()
                 reader.told = [(reader.number - (name == "late"), given)]
-                place._since_s -= 10.0 * (name == "slow")
+                place._sent_s -= 10.0 * (name == "slow")
                 place._read_answers()
             case "written":
                 workers[-1].told = [(1, given)]
