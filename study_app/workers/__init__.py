@@ -1,8 +1,8 @@
-"""Work in other processes: a worker process for a window, and executors for many independent cases.
+"""Computation in other processes: a worker process for a window, and executors of many independent cases.
 
-``client`` and ``server`` are the two ends of a worker process; ``executors`` runs cases in processes or on a cluster;
-read these first. ``cases`` compares the versions of both sides, ``shared_tasks`` shares tasks with a copy of this
-process, ``one_thread`` limits linear algebra.
+Read first: ``client`` and ``server``, the two ends of a worker process, and ``executors``, which opens an executor of
+processes or of a cluster; ``cases`` implements these executors. ``shared_tasks`` shares tasks with a copy of this
+process; ``one_thread`` limits linear algebra to one thread.
 
 Reading order: one_thread, shared_tasks; server; cases, client; executors.
 

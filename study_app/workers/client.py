@@ -1,4 +1,4 @@
-"""The client of a worker process: it sends orders and receives answers, and never blocks on the process."""
+"""The client of a worker process, which sends orders and receives answers without ever waiting for the process."""
 
 import threading
 from contextlib import suppress
@@ -9,7 +9,7 @@ from typing import Final, Generic, TypeVar
 from study_app.workers.server import CONTEXT, Crashed, Refused, serve_orders
 
 PATIENCE_S: Final = 3.0
-"""Time after which a process that was asked to end is killed [s]."""
+"""How long a process may take to end before it is killed [s]."""
 
 _Order = TypeVar("_Order")
 _Answer = TypeVar("_Answer")
@@ -18,13 +18,13 @@ _Answer = TypeVar("_Answer")
 class WorkerClient(Generic[_Order, _Answer]):
     """A worker process that carries out orders, one after the other.
 
-    A new order, like `stop`, asks the last one to stop early; its task decides whether to do so.
+    A new order or `stop` asks the current one to stop early; the task decides whether to do so.
 
     Parameters
     ----------
     task : str
-        The function that carries out an order (see `study_app.workers.server.Task`), as "package.module:function".
-        Only the process imports it. Orders and answers are pickled.
+        The function that carries out an order (see `study_app.workers.server.Task`), as "package.module:function",
+        which only the process imports. Orders and answers are pickled.
     background : bool
         Whether the process gets the lowest priority.
 
@@ -35,25 +35,25 @@ class WorkerClient(Generic[_Order, _Answer]):
     """
 
     def __init__(self, task: str, *, name: str, background: bool = False) -> None:
-        far_orders, self._orders = CONTEXT.Pipe(duplex=False)
-        self._answers, far_answers = CONTEXT.Pipe(duplex=False)
+        orders_end, self._orders = CONTEXT.Pipe(duplex=False)
+        self._answers, answers_end = CONTEXT.Pipe(duplex=False)
         self.process: BaseProcess = CONTEXT.Process(
             target=serve_orders,
-            args=(far_orders, far_answers, task),
+            args=(orders_end, answers_end, task),
             kwargs={"background": background},
             name=name,
             daemon=True,
         )
-        with far_orders, far_answers:
+        with orders_end, answers_end:
             self.process.start()
-        self._ordered = 0
-        self._open: list[int] = []
+        self._order_count = 0
+        self._open_orders: list[int] = []
         self._closed = False
-        self._ending: threading.Thread | None = None
+        self._ending_thread: threading.Thread | None = None
 
     @property
     def works(self) -> bool:
-        """Whether the process accepts orders."""
+        """Whether orders can be sent."""
         return not self._closed and self.process.is_alive()
 
     @property
@@ -62,11 +62,11 @@ class WorkerClient(Generic[_Order, _Answer]):
         return not self.process.is_alive()
 
     def order(self, order: _Order) -> int:
-        """Send an order; return the number of its answers. Answers to earlier orders may still arrive."""
-        self._ordered += 1
-        self._open.append(self._ordered)
-        self._send((self._ordered, order))
-        return self._ordered
+        """Send an order; return the number that its answers have. Answers to earlier orders may still arrive."""
+        self._order_count += 1
+        self._open_orders.append(self._order_count)
+        self._send((self._order_count, order))
+        return self._order_count
 
     def stop(self) -> None:
         """Ask the current order to stop early."""
@@ -91,31 +91,33 @@ class WorkerClient(Generic[_Order, _Answer]):
                 number, answer, last = self._answers.recv()
                 answers.append((number, answer))
                 if last:
-                    self._open.remove(number)
+                    self._open_orders.remove(number)
             return answers
-        if self.process.is_alive():  # the process closed its end, and is about to end
+        if self.process.is_alive():  # the process has closed its end of the pipe and is about to end
             return answers
-        answers += [(number, Crashed(self.process.exitcode)) for number in self._open]
-        self._open = []
+        answers += [(number, Crashed(self.process.exitcode)) for number in self._open_orders]
+        self._open_orders = []
         return answers
 
     def close(self) -> None:
-        """Ask the process to end, even during a request; a thread waits for it, and kills it after ``PATIENCE_S``."""
+        """Ask the process to end, even during an order; a thread kills it after `PATIENCE_S`."""
         if self._closed:
             return
         self._closed = True
         self._orders.close()
         self._answers.close()
         self.process.terminate()
-        self._ending = threading.Thread(target=self._end, name=f"{self.process.name} ending", daemon=True)
-        self._ending.start()
+        self._ending_thread = threading.Thread(
+            target=self._end_process, name=f"{self.process.name} ending", daemon=True
+        )
+        self._ending_thread.start()
 
     def wait_until_ended(self) -> None:
         """Wait until the process has ended after `close`."""
-        if self._ending is not None:
-            self._ending.join()
+        if self._ending_thread is not None:
+            self._ending_thread.join()
 
-    def _end(self) -> None:
+    def _end_process(self) -> None:
         self.process.join(PATIENCE_S)
         if self.process.is_alive():
             self.process.kill()

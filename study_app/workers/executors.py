@@ -1,7 +1,7 @@
-"""The executor for many independent cases, each of which draws from its own seed: processes here, or a Dask cluster.
+"""The choice of an executor of many independent cases: processes of this computer, or a Dask cluster.
 
-Code that has many cases takes a `concurrent.futures.Executor` and uses only its ``submit`` and ``map``: results do not
-depend on the executor.
+Code with many cases receives a `concurrent.futures.Executor` and uses only ``submit`` and ``map``. Each case has its
+own seed, so results do not depend on the executor.
 """
 
 from __future__ import annotations
@@ -13,24 +13,24 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from concurrent.futures import Executor
 
-# multiprocessing is loaded where processes are needed: every command imports this module.
+# multiprocessing is imported only when it is needed, since every command imports this module.
 
 
 @dataclass(frozen=True, slots=True)
 class Workers:
-    """The workers: ``count`` processes of this computer (None: one per core), or a cluster by its address."""
+    """The workers: ``count`` processes of this computer (None means one per core), or the cluster at an address."""
 
     count: int | None = None
     cluster: str | None = None
 
 
 def open_executor(workers: Workers = Workers()) -> Executor:
-    """Return the executor; a ``with`` block that is left by an exception cancels what has not finished.
+    """Return the executor; an exception in its ``with`` block cancels the unfinished cases.
 
     Raises
     ------
     WorkerError
-        There is no cluster at this address. The ``with`` block raises it if a process, or the cluster, was lost.
+        There is no cluster at this address. The end of the ``with`` block raises it if a process or the cluster failed.
     """
     from study_app.workers.cases import ClusterExecutor, ProcessExecutor  # noqa: PLC0415
 

@@ -1,7 +1,7 @@
-"""The worker process: it carries out orders in sequence, by one function, until its client has ended.
+"""The worker process, which carries out orders one after the other until its client has ended.
 
-Processes are started by spawn and ignore Ctrl+C, which the terminal sends to all processes of a program. `Refused`,
-`Crashed` and `Stopped` answer any order, besides the values of its task.
+Processes are spawned and ignore Ctrl+C, which the terminal sends to all processes of a program. An order is answered by
+the values of its task, and by `Refused` or `Crashed` if it fails.
 """
 
 import signal
@@ -24,11 +24,11 @@ from study_app.errors import MissingExtra, StudyError, naming_the_extra
 from study_app.workers.one_thread import compute_in_one_thread
 
 Send: TypeAlias = Callable[[Any], object]
-"""Sends an answer before the last one."""
+"""Sends an answer that is not the last one."""
 Stop: TypeAlias = Callable[[], bool]
-"""Returns whether to stop early: by request, because another order waits, or because the client has ended."""
+"""Returns whether to stop early, since the client requested it, sent another order, or has ended."""
 Task: TypeAlias = Callable[[Any, Send, Stop], object]
-"""Executes an order and returns its last answer. A `StudyError` is answered by `Refused`."""
+"""Carries out an order and returns the last answer; a `StudyError` becomes the answer `Refused`."""
 _STOP: Final = None
 _END: Final = object()
 
@@ -37,7 +37,7 @@ _END: Final = object()
 class Refused:
     """An order could not be carried out, with the reason and without partial effects.
 
-    ``stopped``: by request; ``lacks_extra``: libraries are not installed.
+    ``stopped`` means that it was asked to stop; ``lacks_extra`` means that libraries of an extra are not installed.
     """
 
     sentence: str
@@ -49,14 +49,14 @@ class Refused:
 class Crashed:
     """The process ended before it had carried out the order.
 
-    ``exit_code`` is negative if a signal ended it, 1 if the terminal shows an exception.
+    ``exit_code`` is negative if a signal ended it, and 1 after an exception, which the terminal shows.
     """
 
     exit_code: int | None
 
     @property
     def sentence(self) -> str:
-        """The description of the event for the user."""
+        """A description for the user."""
         if self.exit_code is not None and self.exit_code < 0:
             return f"the process was ended by signal {-self.exit_code}"
         return f"the process ended with exit code {self.exit_code}; the terminal may show why"
@@ -67,21 +67,21 @@ class Stopped(StudyError):
 
 
 class _WorkerProcess(SpawnProcess):
-    """A process that begins with SIGINT blocked, so that it prints no traceback before it can ignore it."""
+    """A process that starts with SIGINT blocked, so that Ctrl+C prints no traceback before it is ignored."""
 
     def start(self) -> None:
         if sys.platform == "win32":
             super().start()
         else:
-            before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+            previous_mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
             try:
                 super().start()
             finally:
-                signal.pthread_sigmask(signal.SIG_SETMASK, before)
+                signal.pthread_sigmask(signal.SIG_SETMASK, previous_mask)
 
 
 class _WorkerContext(SpawnContext):
-    """Spawns `_WorkerProcess`."""
+    """The context that spawns `_WorkerProcess`."""
 
     Process = _WorkerProcess
 
@@ -90,42 +90,42 @@ CONTEXT: Final = _WorkerContext()
 
 
 def ignore_interrupts() -> None:
-    """Ignore Ctrl+C: the program that started this process ends its workers."""
+    """Ignore Ctrl+C, since the program that started this process ends it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def serve_orders(orders: Connection, answers: Connection, task: str, *, background: bool) -> None:
-    """Carry out orders (number, order) until the client has ended; answers are (number, answer, last)."""
+    """Carry out orders (number, order) until the client has ended; send answers (number, answer, is_last)."""
     ignore_interrupts()
     if background:
         psutil.Process().nice(getattr(psutil, "IDLE_PRIORITY_CLASS", 19))
         compute_in_one_thread()
     waiting: SimpleQueue[Any] = SimpleQueue()
-    # Orders are read at once: a full pipe would make the client's window wait.
-    threading.Thread(target=_read, args=(orders, waiting), name="orders", daemon=True).start()
+    # Orders are read immediately, since a full pipe would block the client's window.
+    threading.Thread(target=_read_orders, args=(orders, waiting), name="orders", daemon=True).start()
     with suppress(ModuleNotFoundError):  # the first order reports the error
         resolve_name(task)
     with suppress(BrokenPipeError, ConnectionResetError):
         while (received := waiting.get()) is not _END:
             if received is _STOP:
-                continue  # the order has already ended
+                continue  # the order to stop has ended
             number, order = received
             try:
                 with naming_the_extra():
                     carry_out: Task = resolve_name(task)
-                    last = carry_out(order, partial(_send, answers, number), lambda: not waiting.empty())
-            except Exception as raised:
-                if not isinstance(error := explain_error(raised), StudyError):
+                    last_answer = carry_out(order, partial(_send, answers, number), lambda: not waiting.empty())
+            except Exception as exception:
+                if not isinstance(error := explain_error(exception), StudyError):
                     raise
-                last = Refused(str(error), isinstance(error, Stopped), isinstance(error, MissingExtra))
-            answers.send((number, last, True))
+                last_answer = Refused(str(error), isinstance(error, Stopped), isinstance(error, MissingExtra))
+            answers.send((number, last_answer, True))
 
 
 def _send(answers: Connection, number: int, answer: object) -> None:
     answers.send((number, answer, False))
 
 
-def _read(orders: Connection, waiting: SimpleQueue[Any]) -> None:
+def _read_orders(orders: Connection, waiting: SimpleQueue[Any]) -> None:
     try:
         with suppress(EOFError, OSError):
             while True:
