@@ -1,8 +1,8 @@
-"""The commands: parse arguments, call one function, return an exit code.
+"""The commands, which parse arguments, call one function and return an exit code.
 
-0 done · 1 a bug (with traceback) · 2 a mistake the user can correct (one line) · 3 a check found a problem.
-Each command imports what it needs when it runs, so that ``--help`` loads neither Qt nor the compiler. Read ``options``
-(what commands share), ``study`` (run, rehearse, check) and ``data`` (verify, report, export) first.
+Exit codes: 0 is success, 1 a bug (with traceback), 2 a mistake that the user can correct (one line), 3 a problem that
+a check found. Each command imports what it needs when it runs, so ``--help`` loads neither Qt nor the compiler. Read
+first: ``options`` (shared by the commands), ``study`` (run, rehearse, check) and ``data`` (verify, report, export).
 
 Reading order: options; data, demo, devices, evidence, model, power, study; reference.
 """
@@ -26,7 +26,7 @@ from study_app.errors import PlugInError, StudyError, naming_the_extra
 from study_app.workers.one_thread import compute_in_one_thread
 
 _BY_SIGNAL = 128  # added to a signal's number
-SHOWN = 200  # letters of a bad value that a message repeats
+SHOWN = 200  # how many letters of a wrong value a message repeats
 
 
 @click.group(cls=GroupedCommands, invoke_without_command=True, context_settings={"help_option_names": ["-h", "--help"]})
@@ -58,32 +58,33 @@ for command in (devices, outlets, plugins):  # the module's other commands belon
 
 
 def _shorten_message(message: str) -> str:
-    """Return a message without unprintable letters, in which words longer than `SHOWN` letters are truncated."""
+    """Return a message with words truncated to `SHOWN` letters and unprintable letters escaped."""
     return re.sub(rf"(\S{{{SHOWN}}})\S+", r"\1…", "\n".join(map(printable, message.split("\n"))))
 
 
-def _exit_at_once(ended: list[int]) -> None:
-    if ended:
+def _exit_at_once(exit_codes: list[int]) -> None:
+    """End the process without freeing objects, if there is an exit code."""
+    if exit_codes:
         try:
             logging.shutdown()
             sys.stdout.flush()
-        finally:  # also where the output is closed, or a windowed program has none
-            os._exit(ended[0])
+        finally:  # even if the output is closed or missing (program without a console)
+            os._exit(exit_codes[0])
 
 
 def main() -> None:
     """Run a command; report a user's mistake in one line with exit code 2, and log any other failure.
 
-    A program ended by a signal does not free Qt's objects and Python's modules, which takes seconds under load.
+    After a signal, Qt's objects and Python's modules are not freed, which would take seconds under load.
     """
-    ended: list[int] = []
-    atexit.register(_exit_at_once, ended)  # registered first, so it is called last
+    exit_codes: list[int] = []
+    atexit.register(_exit_at_once, exit_codes)  # registered first, so it is called last
     compute_in_one_thread()
     os.environ.setdefault(
         "PYDANTIC_DISABLE_PLUGINS", "__all__"
-    )  # they are not used, and searching for them reads every package
+    )  # searching for these unused plug-ins would read every installed package
     for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):  # an old console may lack a letter; a pipe or file is UTF-8
+        if isinstance(stream, io.TextIOWrapper):  # an old console may lack characters; pipes and files are UTF-8
             stream.reconfigure(encoding=None if stream.isatty() else "utf-8", errors="backslashreplace")
     try:
         with naming_the_extra():
@@ -97,7 +98,7 @@ def main() -> None:
         sys.exit(130)
     except StudyError as error:
         if isinstance(error, PlugInError):
-            logging.getLogger(__name__).info("%s", error, exc_info=True)  # the terminal shows only the line
+            logging.getLogger(__name__).info("%s", error, exc_info=True)  # the terminal shows only the message
         click.echo(f"liquid-study: {_shorten_message(str(error))}", err=True)
         sys.exit(EXIT_USER_ERROR)
     except (Exception, SystemExit) as error:
@@ -107,14 +108,14 @@ def main() -> None:
             click.echo(f"liquid-study: {_shorten_message(str(error.filename))}: the file name is too long", err=True)
             sys.exit(EXIT_USER_ERROR)
         log = logging.getLogger(__name__)
-        if (said := explain_error(error)) is error:
+        if (explained := explain_error(error)) is error:
             log.critical("a bug ended the program", exc_info=True)
             raise
-        log.info("%s", said, exc_info=True)  # only in the log: the terminal shows the line below
-        click.echo(f"liquid-study: {_shorten_message(str(said))}", err=True)
+        log.info("%s", explained, exc_info=True)  # the terminal shows only the message
+        click.echo(f"liquid-study: {_shorten_message(str(explained))}", err=True)
         sys.exit(EXIT_USER_ERROR)
     code = code if isinstance(code, int) else 0
     if code > _BY_SIGNAL and (qt := sys.modules.get("PySide6.QtCore")):
         atexit.unregister(getattr(qt, "__moduleShutdown", print))
-        ended.append(code)
+        exit_codes.append(code)
     sys.exit(code)

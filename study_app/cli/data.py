@@ -1,4 +1,4 @@
-"""The commands that read, prove and evaluate results folders."""
+"""The commands about results folders: tables, reports, exclusions, withdrawals, merged sites, checks and proofs."""
 
 import gc
 from dataclasses import replace
@@ -65,8 +65,8 @@ def export(
     from study_app.analysis.export import Extra
     from study_app.analysis.export_study import export as export_study
 
-    asked: dict[Extra, bool] = {"wide": wide, "parquet": parquet, "sav": sav, "psych-ds": psych_ds}
-    extras = [name for name, wanted in asked.items() if wanted]
+    requested: dict[Extra, bool] = {"wide": wide, "parquet": parquet, "sav": sav, "psych-ds": psych_ds}
+    extras = [name for name, is_requested in requested.items() if is_requested]
     failed: list[str] = []
     with progress() as show:
         show("writing the tables")
@@ -85,15 +85,16 @@ def _report_failed_sections(failed: list[str]) -> None:
 
 
 def _run_validator(validator: Path, to: Path) -> None:
+    """Check a Psych-DS folder; end with exit code 3 if the validator finds errors."""
     import subprocess
 
     from study_app.analysis.export import FOLDER
 
     try:
-        ended = subprocess.run([validator.absolute(), to / FOLDER], check=False)  # noqa: S603 - named by the user
+        completed = subprocess.run([validator.absolute(), to / FOLDER], check=False)  # noqa: S603 - named by the user
     except OSError as error:
         raise click.UsageError(f"{validator} cannot be run: {error.strerror}; specify an executable file") from error
-    exit_if(ended.returncode)
+    exit_if(completed.returncode)
 
 
 @click.command()
@@ -117,7 +118,7 @@ def report(results: Path, to: Path) -> None:
 
     The exit code is 3 if a section could not be computed; the report says which one, and contains all the others.
     """
-    gc.set_threshold(50_000, 20, 100)  # collections took a tenth of the time of a report of 12
+    gc.set_threshold(50_000, 20, 100)  # garbage collection took a tenth of the time of a report on 12 participants
     from study_app.analysis.report import report as write_report
 
     failed: list[str] = []
@@ -145,9 +146,9 @@ def unblind(results: Path, by: str, reason: str) -> None:
     for prefix, unblinding in unblinded.items():
         for block, codes in unblinding.codes.items():
             for code, condition in codes.items():
-                standard, of_track, _ = condition.partition("/")
-                shown = f"standard {standard}" if standard else "all levels"
-                click.echo(f"{block}  {prefix}{code}  {shown if of_track else condition}")
+                standard, is_track, _ = condition.partition("/")
+                track = f"standard {standard}" if standard else "all levels"
+                click.echo(f"{block}  {prefix}{code}  {track if is_track else condition}")
         for row in unblinding.excluded:
             click.echo(f"excluded  {describe_exclusion(row)}: {row.reason}")
         for sentence in unblinding.left:
@@ -169,12 +170,15 @@ def exclude(results: Path, participant: str, session: int, trial: int | None, ru
     from study_app.store.exclusions import exclude as exclude_from
     from study_app.store.merged import locate_participant
 
-    new = exclude_from(*locate_participant(results, participant), session, trial=trial, by=by, reason=reason, rule=rule)
-    click.echo(describe_exclusion(replace(new, participant=participant)))
-    _warn_if_opened(results)
+    exclusion = exclude_from(
+        *locate_participant(results, participant), session, trial=trial, by=by, reason=reason, rule=rule
+    )
+    click.echo(describe_exclusion(replace(exclusion, participant=participant)))
+    _warn_if_unblinded(results)
 
 
-def _warn_if_opened(results: Path) -> None:
+def _warn_if_unblinded(results: Path) -> None:
+    """Print a warning if a key of the study is open."""
     from study_app.store.unblinding import has_opened_keys
 
     if has_opened_keys(results):
@@ -203,14 +207,14 @@ def include(
     from study_app.store.merged import locate_participant
 
     exclude_each_other(trial=trial, rule=rule)
-    where = locate_participant(results, participant)
+    located = locate_participant(results, participant)
     if rule is None:
-        taken = include_in(*where, session, trial=trial, by=by, reason=reason)
+        exclusion = include_in(*located, session, trial=trial, by=by, reason=reason)
     else:
-        taken = keep(*where, session, rule=rule, by=by, reason=reason)
-    done = "included again" if rule is None else f"kept, although the rule {rule} applies"
-    click.echo(f"{done}: {describe_exclusion(replace(taken, participant=participant))}")
-    _warn_if_opened(results)
+        exclusion = keep(*located, session, rule=rule, by=by, reason=reason)
+    outcome = "included again" if rule is None else f"kept, although the rule {rule} applies"
+    click.echo(f"{outcome}: {describe_exclusion(replace(exclusion, participant=participant))}")
+    _warn_if_unblinded(results)
 
 
 @click.command()
@@ -235,18 +239,18 @@ def withdraw(results: Path, participant: str, by: str, reason: str, also: tuple[
     from study_app.store.withdrawals import withdraw as withdraw_from
     from study_app.workspace import workspace
 
-    done = withdraw_from(*locate_participant(results, participant), by=by, reason=reason, also=also)
-    for folder in done.folders:
+    withdrawal = withdraw_from(*locate_participant(results, participant), by=by, reason=reason, also=also)
+    for folder in withdrawal.folders:
         click.echo(f"erased     the data of participant {participant} in {folder}")
-    for path in done.outputs:
+    for path in withdrawal.outputs:
         click.echo(f"deleted    {path}, which was produced from the results")
-    click.echo(f"keep this line with the fingerprints:  {checked_line(*proof_of_withdrawal(done.tombstone))}")
-    if not (done.folders or done.outputs):
-        click.echo(f"nothing to erase: participant {participant} already withdrew at {done.tombstone.at}")
-    for output in done.elsewhere:
+    click.echo(f"keep this line with the fingerprints:  {checked_line(*proof_of_withdrawal(withdrawal.tombstone))}")
+    if not (withdrawal.folders or withdrawal.outputs):
+        click.echo(f"nothing to erase: participant {participant} already withdrew at {withdrawal.tombstone.at}")
+    for output in withdrawal.elsewhere:
         state = "delete it and create it again" if output.paths else "it no longer exists"
         click.echo(f"warning: output created at {output.at} outside the workspace ({state}): {output.to}", err=True)
-    for sentence in done.left:
+    for sentence in withdrawal.left:
         click.echo(f"warning: {sentence}", err=True)
     searched = ", ".join(map(str, (workspace().results, *also)))
     click.echo(f"searched   {searched}; if there are copies elsewhere, repeat the command with --also DIR")
@@ -283,15 +287,15 @@ def merge(sites: dict[str, Path], to: Path) -> None:
 
     with progress() as show:
         show("reading the sites")
-        made = merge_sites(sites, to, progress=show)
-    for site in made.sites:
-        new = "merged" if site.name in sites else "kept  "
-        click.echo(f"{new}  site {site.name}: {counted(site.sessions, 'session')}, key {site.key_hash[:12]}")
+        merged = merge_sites(sites, to, progress=show)
+    for site in merged.sites:
+        state = "merged" if site.name in sites else "kept  "
+        click.echo(f"{state}  site {site.name}: {counted(site.sessions, 'session')}, key {site.key_hash[:12]}")
     for name, folder in sites.items():
         for session in damaged_sessions(folder):
             warning = f"warning: the journal of {session} (site {name}) is damaged, so its results may be incomplete"
             click.echo(f"{warning}; the verify command describes the damage", err=True)
-    click.echo(f"study {made.study}, protocol {made.protocol_hash[:12]}: {to}")
+    click.echo(f"study {merged.study}, protocol {merged.protocol_hash[:12]}: {to}")
 
 
 @click.command()
@@ -300,16 +304,16 @@ def rebuild(session: Path) -> None:
     """Rebuild a session's tables from its journal."""
     from study_app.store.sessions import rebuild_session
 
-    made = rebuild_session(session)
-    for path in made.rewritten:
+    rebuilt = rebuild_session(session)
+    for path in rebuilt.rewritten:
         click.echo(f"rewritten  {path}")
-    for path in made.swept:
+    for path in rebuilt.swept:
         click.echo(f"removed    {path}, an incomplete file")
-    if made.torn_bytes:
+    if rebuilt.torn_bytes:
         click.echo(
-            f"the journal ends with an incomplete line of {counted(made.torn_bytes, 'byte')}, which has been kept"
+            f"the journal ends with an incomplete line of {counted(rebuilt.torn_bytes, 'byte')}, which has been kept"
         )
-    if not (made.rewritten or made.swept):
+    if not (rebuilt.rewritten or rebuilt.swept):
         click.echo("nothing to do: every table agrees with the journal")
 
 
@@ -405,8 +409,8 @@ def proof(
     text = proof_text(StudyFolder(results), server=server or "", sign=sign or None)
     changes = {"proofs": always and str(always.absolute()), "stamp_root": root and str(root.absolute())}
     changes |= {"stamps": server} if always is not None else {}
-    if given := {name: value for name, value in changes.items() if value is not None}:
-        workstation.save_settings(workstation.MachineSettings(**(workstation.load_settings().model_dump() | given)))
+    if changed := {name: value for name, value in changes.items() if value is not None}:
+        workstation.save_settings(workstation.MachineSettings(**(workstation.load_settings().model_dump() | changed)))
     if to is None:
         click.echo(text, nl=False)
     else:

@@ -1,4 +1,4 @@
-"""The demo: from the first compilation to the report of a small study, and the program on its results."""
+"""The demo: a small simulated study from the first compilation to the report, and the window with its results."""
 
 import os
 from functools import partial
@@ -12,13 +12,13 @@ from study_app.number_text import counted
 
 STUDY: Final = "demo"
 FOLDER: Final = "demo-simulated"
-"""The study folder: neither that of real sessions, nor one that `rehearse` would take."""
+"""The study folder, which differs from those of real sessions and of `rehearse`."""
 DEVICE: Final = "falcon-emulated"
 PARTICIPANTS: Final = ("P001", "P002")
 SEED: Final = 4
-"""Every trial of the two is within the limits that the study sets for a valid trial."""
-_UNSEEN_PLATFORMS: Final = ("offscreen", "minimal", "minimalegl")
-"""Qt platforms whose windows nobody sees."""
+"""With this seed, every trial is within the study's limits for valid trials."""
+_INVISIBLE_PLATFORMS: Final = ("offscreen", "minimal", "minimalegl")
+"""Qt platforms that show no windows."""
 
 
 @click.command()
@@ -38,7 +38,7 @@ def demo(context: click.Context, *, no_window: bool) -> None:
     report = workspace().folder.absolute() / f"{FOLDER}-report"
     click.echo(f"Demo study with {counted(len(PARTICIPANTS), 'simulated participant')} on an emulated Falcon")
     _run_sessions(study)
-    _unblind(study)
+    _open_key(study)
     failed = _write_report(study, report)
     click.echo(f"Sessions and tables: {study}")
     if (report / "report.html").is_file():
@@ -85,14 +85,14 @@ def _run_servo(protocol: Path, device: str, *, ticks: int) -> None:
             rig.servo.advance(ticks)
 
 
-def _unblind(study: Path) -> None:
-    """Open the key of the simulated study, once."""
+def _open_key(study: Path) -> None:
+    """Open the key of the simulated study, unless it is open."""
     from study_app.store.unblinding import is_unblinded, unblind_folder
 
     if is_unblinded(study):
         return
-    for opened in unblind_folder(study, by="demo", reason="all participants are simulated").values():
-        for sentence in opened.left:
+    for unblinding in unblind_folder(study, by="demo", reason="all participants are simulated").values():
+        for sentence in unblinding.left:
             click.echo(f"warning: {sentence}", err=True)
     click.echo("The key has been opened: the tables now contain the conditions")
 
@@ -120,14 +120,14 @@ def _write_report(study: Path, to: Path) -> list[str]:
 
 
 def _show_results(study: Path) -> int:
-    """Open the program on the results and return its exit code; or print how to open it, and return 0."""
+    """Show the results in the main window and return the exit code; without a display, explain how to and return 0."""
     from study_app.errors import DisplayError
     from study_app.gui.display_check import check_display, missing_window_library
 
     platform = os.environ.get("QT_QPA_PLATFORM", "").partition(":")[0]
     try:
         check_display()
-        if platform not in _UNSEEN_PLATFORMS:
+        if platform not in _INVISIBLE_PLATFORMS:
             from study_app import app
 
             click.echo("The program is now opening to show these results; close its window to finish")

@@ -1,4 +1,4 @@
-"""The commands about devices: what is connected, what is wrong with it, its measurement, how strong a Falcon is."""
+"""The commands about devices, plug-ins and outlets: list, diagnose, measure and calibrate."""
 
 from __future__ import annotations
 
@@ -46,10 +46,12 @@ def list_devices() -> None:
     """List every device: whether it is connected, what it can do and, if it cannot be used, why."""
     from study_app.devices.registry import all_devices, backends
 
-    of = {device.name: f"; {device.kind}, {device.degrees_of_freedom} degrees of freedom" for device in all_devices()}
+    properties = {
+        device.name: f"; {device.kind}, {device.degrees_of_freedom} degrees of freedom" for device in all_devices()
+    }
     for backend in backends():
-        about = f"{backend.by}{of.get(backend.name.partition(':')[0], '')}"
-        click.echo(f"{backend.name:<19} {backend.state}  ({about})")
+        description = f"{backend.by}{properties.get(backend.name.partition(':')[0], '')}"
+        click.echo(f"{backend.name:<19} {backend.state}  ({description})")
         for line in (backend.can, backend.why):
             if line:
                 space = " " * 20
@@ -93,7 +95,7 @@ def doctor(name: str, faults: tuple[str, ...], to: Path | None, device_options: 
     code is 3 if a fault is found. The zip file contains this report, version numbers, settings, the log and the last
     error, but no participant IDs, answers or liquids.
     """
-    click.echo(_PREPARING)  # the next imports and compilations take long the first time
+    click.echo(_PREPARING)  # the first time, the imports and compilations below take long
     from study_app.devices.doctor import report_lines
     from study_app.devices.registry import check_options, doctor_of
 
@@ -143,8 +145,8 @@ def calibrate(name: str, firmware: Path | None, grams: float | None, *, scale: b
     for line in _calibration_lines(calibrated, notes):
         click.echo(line)
     if calibrated.residual_n > calibration.MOST_RESIDUAL_N:
-        unexplained = f"The unexplained force is greater than {calibration.MOST_RESIDUAL_N} N"
-        click.echo(f"{unexplained}, so nothing was saved. Repeat the calibration.")
+        problem = f"The unexplained force is greater than {calibration.MOST_RESIDUAL_N} N"
+        click.echo(f"{problem}, so nothing was saved. Repeat the calibration.")
         exit_if(True)
     click.echo(f"Saved in {calibration.save_calibration(serial or '', calibrated)}.")
 
@@ -192,12 +194,12 @@ def bench(name: str, to: Path | None, device_options: dict[str, str | Path]) -> 
 
 
 def _ask_operator(terminal: Terminal) -> AskOperator:
-    """Return a function that asks at the terminal; only "let-go" is answered by Enter alone."""
+    """Return a function that asks at the terminal; only "let-go" asks to press Enter."""
     return lambda kind, question: terminal.ask(kind if kind == "let-go" else "reading", question)
 
 
 def _save_bench(results: Found, folder: Path, *, simulated: bool) -> None:
-    """Write the report; for a real device store the numbers in this machine's settings."""
+    """Write the report; for a real device, also store the results in this machine's settings."""
     from study_app.devices.bench.procedure import as_json, as_markdown, workstation_results
     from study_app.store import workstation
     from study_app.store.files import write_file
@@ -226,7 +228,7 @@ def _save_bench(results: Found, folder: Path, *, simulated: bool) -> None:
 
 
 def _falcon_and_emulator(name: str, firmware: Path | None, grams: float | None) -> tuple[FalconDevice, Emulator | None]:
-    """Return the Falcon, not yet open, and the emulator behind it, if there is one."""
+    """Return the Falcon, which is not open yet, and its emulator, if it is emulated."""
     from study_app.devices.descriptor import OpenRequest
     from study_app.devices.driver import framed_device
     from study_app.devices.emulators.falcon import EmulatedFalcon
@@ -242,7 +244,7 @@ def _falcon_and_emulator(name: str, firmware: Path | None, grams: float | None) 
         return device, None
     if grams is None:
         raise DeviceError("an emulated Falcon cannot be pulled with a scale: use a weight with --grams")
-    # A separate serial number, so that no rehearsal finds this calibration.
+    # Rehearsals must not find this calibration, so the serial number differs from theirs.
     emulator = Emulator(running=firmware is None, serial="EMULATED-WEIGHED")
     return EmulatedFalcon(firmware=firmware, progress=click.echo, emulator=emulator), emulator
 
@@ -251,15 +253,15 @@ def _calibration_lines(fit: Calibration, notes: Notes) -> list[str]:
     from study_app.devices.falcon.calibration import UNCALIBRATED_UNITS_PER_NM, residual_forces
 
     lines = ["", "pos.  load [N]  unexplained x, y, z [N]"]
-    for number, (load, left) in enumerate(
+    for number, (load, residual) in enumerate(
         zip(-notes.forces_n[:, 1], residual_forces(fit, notes.counts, notes.forces_n, notes.units), strict=True),
         start=1,
     ):
-        lines.append(f"{number:>4}  {load:>8.2f}  {left[0]:+.3f} {left[1]:+.3f} {left[2]:+.3f}")
-    share = fit.units_per_nm / UNCALIBRATED_UNITS_PER_NM
+        lines.append(f"{number:>4}  {load:>8.2f}  {residual[0]:+.3f} {residual[1]:+.3f} {residual[2]:+.3f}")
+    ratio = fit.units_per_nm / UNCALIBRATED_UNITS_PER_NM
     lines += [
         "",
-        f"{fit.units_per_nm:.0f} motor units per newton metre, {share:.2f} times the uncalibrated default",
+        f"{fit.units_per_nm:.0f} motor units per newton metre, {ratio:.2f} times the uncalibrated default",
         f"arm offset {degrees(fit.arm_offset_rad):+.2f} degrees; grip weight {fit.own_weight_n:.2f} N",
         f"unexplained force {fit.residual_n:.3f} N RMS, mostly friction",
     ]
@@ -267,10 +269,9 @@ def _calibration_lines(fit: Calibration, notes: Notes) -> list[str]:
 
 
 class Terminal:
-    """Lines that the operator types while the grip is held.
+    """Reads the lines that the operator types, in a separate thread.
 
-    They are read without Python's own buffer, whose lock would be held by a thread that is still waiting at the end of
-    the program.
+    It does not use ``sys.stdin``, since a thread that is still reading at the end of the program would hold its lock.
     """
 
     def __init__(self, descriptor: int) -> None:
@@ -279,14 +280,17 @@ class Terminal:
         threading.Thread(target=self._read_lines, daemon=True).start()
 
     def ask(self, kind: str, question: str) -> Callable[[], str | None]:
-        """Ask a question and return a function that reads the answer; lines typed before it do not count."""
+        """Ask a question; return a function that returns the answer, or None until there is one.
+
+        Lines typed earlier at a terminal are ignored.
+        """
         if os.isatty(self._descriptor):
             with suppress(queue.Empty):
                 while self._lines.get_nowait() is not None:
                     pass
         click.echo(question if kind == "reading" else f"{question} Then press Enter.")
 
-        def answered() -> str | None:
+        def read_answer() -> str | None:
             try:
                 line = self._lines.get_nowait()
             except queue.Empty:
@@ -295,20 +299,20 @@ class Terminal:
                 raise click.Abort
             return line.strip()
 
-        return answered
+        return read_answer
 
     def _read_lines(self) -> None:
-        typed = b""
-        with suppress(OSError):  # in the background nothing can be read from a terminal
-            while more := os.read(self._descriptor, 1024):
-                *lines, typed = (typed + more).split(b"\n")
+        incomplete = b""
+        with suppress(OSError):  # a background process cannot read from a terminal
+            while received := os.read(self._descriptor, 1024):
+                *lines, incomplete = (incomplete + received).split(b"\n")
                 for line in lines:
                     self._lines.put(line.decode(errors="replace"))
         self._lines.put(None)
 
 
 def _ask_emulator(emulator: Emulator, weight_n: float) -> Ask:
-    """Return a function that answers for the emulated hand."""
+    """Return a function that carries out the instructions on the emulator instead of asking."""
 
     def ask(kind: str, question: str) -> Callable[[], str | None]:
         click.echo(question)

@@ -44,10 +44,9 @@ _EXIT_UNDECIDED = 4
 
 
 def _present_evidence(result: Evidence, to: Path | None, *, with_text: bool = True) -> None:
-    """Print evidence and write it into a folder, if given.
+    """Print evidence, and write it to the folder ``to``, if given; without ``with_text``, only do one of the two.
 
-    The exit code is 3 if a limit is missed, and 4 if one is undecided. ``with_text`` prints the text even with a
-    folder.
+    The exit code is 3 if a limit is missed, otherwise 4 if one is undecided.
     """
     if with_text or to is None:
         click.echo(result.text, nl=False)
@@ -106,14 +105,14 @@ def accuracy(scene: str | None, liquid: str | None, path: str, to: Path | None, 
     if motion is None:
         raise click.UsageError(f"nothing can be measured: {'; '.join(notes)}")
     make_output_folder(to)
-    named = "stirring" if path == _DEFAULT_PATH else path
+    name = "stirring" if path == _DEFAULT_PATH else path
     with progress(lambda text: click.echo(f"{text} …", err=True)) as show:
-        measured = measure(numerical, physical, motion, named=named, notes=notes, progress=show)
+        measured = measure(numerical, physical, motion, named=name, notes=notes, progress=show)
     _present_evidence(accuracy_evidence(measured), to, with_text=False)
 
 
 def _print_survey(file: str | None, to: Path | None) -> None:
-    """Print or write the force error of every liquid of a file."""
+    """Print or write the force error of every liquid in a file."""
     from study_app.evidence.accuracy import survey_evidence, survey_scenes
     from study_app.protocol.load import load_scenes
 
@@ -128,7 +127,7 @@ def _print_survey(file: str | None, to: Path | None) -> None:
 
 
 def _scenes_to_compare(scene: str | None, liquid: str | None) -> tuple[Scene | None, Scene | None, tuple[str, ...]]:
-    """Return the scene that defines the force, the scene of the real liquid, and notes on what is missing."""
+    """Return the scene whose force is compared, the scene of a real liquid, and notes on a missing one."""
     from study_app.protocol.load import load_scene, load_scenes
 
     if scene is None and liquid is None:
@@ -156,17 +155,17 @@ def _scenes_to_compare(scene: str | None, liquid: str | None) -> tuple[Scene | N
 
 
 def _motion_along(path: str, scene: Scene) -> Motion:
-    """Return the motion of a path's name or a motion file, at the scene's rate."""
+    """Return a programmed motion or that of a file, at the scene's rate."""
     from study_app.evidence.reference_solutions import stirring_motion
     from study_app.haptics.model import motion
     from study_app.lab.identify.measured_force import at_rate
 
     if path == _DEFAULT_PATH:
         return stirring_motion(scene.scale, scene.rate_hz)
-    programmed = path in motion.NAMES or not (Path(path).suffix or Path(path).exists())
+    is_programmed = path in motion.NAMES or not (Path(path).suffix or Path(path).exists())
     return (
         motion.programmed_motion(path, rate_hz=scene.rate_hz)
-        if programmed
+        if is_programmed
         else at_rate(motion.read_motion(Path(path)), scene.rate_hz)
     )
 
@@ -253,7 +252,7 @@ def cfd(to: Path | None, workers: Workers, *, solve: bool, refit: bool, material
 
 
 def _print_material_errors(to: Path | None, workers: Workers, *, solve: bool) -> None:
-    """Print or write the law's error in Herschel–Bulkley liquids, with the stored table or a new one."""
+    """Print or write the drag law's error in Herschel–Bulkley liquids, with the stored table or a new one."""
     from study_app.evidence.cfd import solve_materials, stored_materials, yield_flow_evidence
 
     if solve and to is not None:
@@ -368,11 +367,11 @@ def stability(
     if any(parts.values()):
         part = next(name for name, chosen in parts.items() if chosen)
         with progress() as show, executor_for(workers) as executor:
-            measured = _measure(part, executor, show, whole=whole)
+            measured = _measure_part(part, executor, show, whole=whole)
         _present_evidence(measured, None)
         return
     seed = seed or os.urandom(4).hex()
-    chosen = groups(seed, cases) if only is None else tuple(it for it in groups(seed, cases) if only in it.name)
+    chosen = tuple(group for group in groups(seed, cases) if only is None or only in group.name)
     if not chosen:
         names = ", ".join(group.name for group in groups(seed, cases))
         raise StudyError(f"no group has a name that contains {only!r}; choose from: {names}")
@@ -385,11 +384,11 @@ def stability(
         )
         show("comparing forces")
         compared = fidelities(executor=executor) if only is None else ()
-    shown = stability_evidence(swept, compared, seed)
-    click.echo(shown.text, nl=False)
+    evidence = stability_evidence(swept, compared, seed)
+    click.echo(evidence.text, nl=False)
     if to is not None:
         click.echo()
-        echo_files(shown.write(to))
+        echo_files(evidence.write(to))
     for grade in (UNSTABLE, NOISY):
         if flagged := swept.of_grade(grade):
             click.echo(f"\n{grade} with safety on; to repeat a case, use --case:", err=True)
@@ -397,8 +396,8 @@ def stability(
     exit_if(swept.missed)
 
 
-def _measure(part: str, executor: Executor, show: ShowProgress, *, whole: bool) -> Evidence:
-    """Return the evidence from one separate measurement."""
+def _measure_part(part: str, executor: Executor, show: ShowProgress, *, whole: bool) -> Evidence:
+    """Return the evidence from one of the separate measurements."""
     from study_app.evidence.stability import (
         delivered_force_evidence,
         measure_delivered_force,
@@ -416,7 +415,7 @@ def _measure(part: str, executor: Executor, show: ShowProgress, *, whole: bool) 
     return delivered_force_evidence(measure_delivered_force(whole=whole, executor=executor))
 
 
-_MOST_COMPARED_S = 300.0
+_MAX_COMPARISON_S = 300.0
 _LOAD = click.Choice(("none", "gui", "gui+cpu"))
 
 
@@ -487,7 +486,7 @@ def timing(
 
     others = {"delays": of_delays, "devices": of_devices, "lsl": lsl, "triggers": triggers}
     exclude_each_other(**others)
-    other = next((name for name, given in others.items() if given), "")
+    other = next((name for name, is_requested in others.items() if is_requested), "")
     if other and spin_us is not None:
         raise StudyError(f"--spin applies only to the servo's loops: omit it with --{other}")
     if other in {"lsl", "triggers"}:
@@ -496,7 +495,7 @@ def timing(
         _choose_display()
     make_output_folder(to)
 
-    def measured(ending: threading.Event, show: ShowProgress) -> Evidence:
+    def measure_other(ending: threading.Event, show: ShowProgress) -> Evidence:
         if other == "devices":
             from study_app.evidence.timing import emulated_devices, lateness_evidence, time_devices
 
@@ -507,7 +506,7 @@ def timing(
 
             localhost_only()
             lateness = measure_streams(seconds, ending=ending, progress=show)
-            compared = compare_streams(min(seconds, _MOST_COMPARED_S), ending=ending, progress=show)
+            compared = compare_streams(min(seconds, _MAX_COMPARISON_S), ending=ending, progress=show)
             return streams_evidence(lateness, compared)
         from study_app.evidence.outlets import measure_triggers, triggers_evidence
 
@@ -523,7 +522,7 @@ def timing(
         windows = _windows_thread(load) if load != "none" or not other else None
         with _ending_by_signal() as (ending, _), progress(partial(click.echo, err=True)) as show:
             if other:
-                result = under_load(load, windows, partial(measured, ending, show))
+                result = under_load(load, windows, partial(measure_other, ending, show))
             else:
                 from study_app.evidence.timing import measure_timing, timing_evidence
 
@@ -539,7 +538,7 @@ def _choose_display() -> None:
 
 
 def _windows_thread(load: LoadName) -> WindowsThread | None:
-    """Return the GUI thread; None without Qt or if the load paints no windows."""
+    """Return the GUI thread, or None if Qt cannot be loaded and the load does not need it."""
     try:
         from study_app.app.delay_session import WindowsThread
     except DisplayError:
@@ -551,7 +550,7 @@ def _windows_thread(load: LoadName) -> WindowsThread | None:
 
 @contextmanager
 def _ending_by_signal() -> Iterator[tuple[threading.Event, list[int]]]:
-    """Set an event on Ctrl+C or a request to terminate; yield it with the list of received signals."""
+    """Yield an event that Ctrl+C or a request to terminate sets, and the list of received signals."""
     ending = threading.Event()
     received: list[int] = []
 
@@ -559,11 +558,11 @@ def _ending_by_signal() -> Iterator[tuple[threading.Event, list[int]]]:
         received.append(number)
         ending.set()
 
-    before = {number: signal.signal(number, end) for number in (signal.SIGINT, signal.SIGTERM)}
+    previous_handlers = {number: signal.signal(number, end) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
         yield ending, received
     finally:
-        for number, handler in before.items():
+        for number, handler in previous_handlers.items():
             signal.signal(number, handler)
 
 
@@ -606,27 +605,27 @@ def soak(
         context.exit(128 + received[0])
 
 
-_SAID_EVERY_S: Final = 20.0
-"""Progress is written so often where it is no line of a terminal."""
+_SHOW_EVERY_S: Final = 20.0
+"""Minimum time between lines of progress outside a terminal [s]."""
 
 
 def _timed_lines() -> Callable[[str], None]:
-    """Return a function that writes a line on standard error, with the seconds since now."""
-    begun = time.perf_counter()
-    return lambda text: click.echo(f"{time.perf_counter() - begun:.0f} s: {text}", err=True)
+    """Return a function that prints lines on standard error, with the time since this call."""
+    started_s = time.perf_counter()
+    return lambda text: click.echo(f"{time.perf_counter() - started_s:.0f} s: {text}", err=True)
 
 
-def _at_intervals(say: Callable[[str], None]) -> Callable[[str], None]:
-    """Return a function that prints a text at most once in `_SAID_EVERY_S`."""
-    said = -math.inf
+def _at_intervals(show: Callable[[str], None]) -> Callable[[str], None]:
+    """Return a function like ``show`` that ignores texts within `_SHOW_EVERY_S` of the last shown one."""
+    shown_s = -math.inf
 
-    def say_sometimes(text: str) -> None:
-        nonlocal said
-        if time.perf_counter() - said >= _SAID_EVERY_S:
-            said = time.perf_counter()
-            say(text)
+    def show_sometimes(text: str) -> None:
+        nonlocal shown_s
+        if time.perf_counter() - shown_s >= _SHOW_EVERY_S:
+            shown_s = time.perf_counter()
+            show(text)
 
-    return say_sometimes
+    return show_sometimes
 
 
 @click.command("validate-report")
@@ -661,20 +660,20 @@ def validate_report(studies: int, workers: Workers, seed: int, to: Path | None) 
 
     make_output_folder(to)
     rates: tuple[Rate, ...] = ()
-    begun, done = time.perf_counter(), 0
-    say = _timed_lines()
+    started_s, done = time.perf_counter(), 0
+    print_line = _timed_lines()
     try:
-        with progress(_at_intervals(say)) as show, executor_for(workers) as executor:
+        with progress(_at_intervals(print_line)) as show, executor_for(workers) as executor:
             show("rehearsing every condition")
             protocol = load("rek2024")
             studied = plan(protocol, condition_features(protocol, seed=seed))
-            begun = time.perf_counter()
-            for done, so_far in measure_report_rates(studied, studies, executor, seed=seed, progress=say):
-                rates = so_far
+            started_s = time.perf_counter()
+            for done, new_rates in measure_report_rates(studied, studies, executor, seed=seed, progress=print_line):
+                rates = new_rates
                 show(f"{done} studies")
     except KeyboardInterrupt:
         click.echo("ended early", err=True)
-    _present_evidence(report_rates_evidence(rates, f"{done} studies in {time.perf_counter() - begun:.0f} s"), to)
+    _present_evidence(report_rates_evidence(rates, f"{done} studies in {time.perf_counter() - started_s:.0f} s"), to)
 
 
 @click.command()
@@ -715,12 +714,12 @@ def validate(files: tuple[str, ...], studies: int, seeds: tuple[int, ...], worke
     except ValueError as error:
         raise click.UsageError(str(error)) from error
     make_output_folder(to)
-    begun, say = time.perf_counter(), _timed_lines()
-    with progress(_at_intervals(say)) as show, executor_for(workers) as executor:
-        verdicts = validate_values(chosen, studies, seeds, executor, show, say)
-    used_s = sum(os.times()[:4])  # with the workers', which have ended
-    took = f"{time.perf_counter() - begun:.0f} s, {used_s:.0f} s of processor time"
-    heading = f"{studies} studies for each protocol and seed ({', '.join(map(str, seeds))}), in {took}"
+    started_s, print_line = time.perf_counter(), _timed_lines()
+    with progress(_at_intervals(print_line)) as show, executor_for(workers) as executor:
+        verdicts = validate_values(chosen, studies, seeds, executor, show, print_line)
+    used_s = sum(os.times()[:4])  # includes that of the workers, which have ended
+    duration = f"{time.perf_counter() - started_s:.0f} s, {used_s:.0f} s of processor time"
+    heading = f"{studies} studies for each protocol and seed ({', '.join(map(str, seeds))}), in {duration}"
     _present_evidence(known_values_evidence(verdicts, heading), to)
 
 

@@ -1,4 +1,4 @@
-"""The commands about the force model: its forces, and its parameters from measurements."""
+"""The commands about the force model: simulate forces, describe scenes, fit parameters to measurements."""
 
 from __future__ import annotations
 
@@ -46,8 +46,8 @@ def simulate(scene: str, liquid: str, path: str, to: Path, changes: tuple[str, .
     click.echo(f"{to}: {len(table)} rows")
 
 
-def _changed_scene(file: str, liquid: str, changes: tuple[str, ...]) -> Scene:
-    """Return the scene of one liquid of a file, with each --set."""
+def _load_changed_scene(file: str, liquid: str, changes: tuple[str, ...]) -> Scene:
+    """Return the scene of a liquid in a file, with the changes of ``--set``."""
     from study_app.haptics.model.overrides import override_all
     from study_app.protocol.load import load_scene
 
@@ -55,6 +55,7 @@ def _changed_scene(file: str, liquid: str, changes: tuple[str, ...]) -> Scene:
 
 
 def _parse_changes(changes: tuple[str, ...]) -> dict[str, str]:
+    """Return the values of ``--set`` by name."""
     values = {}
     for change in changes:
         name, separator, value = change.partition("=")
@@ -135,16 +136,18 @@ def identify(
     from study_app.lab.identify import preset as identified
     from study_app.lab.identify.fit import CurveFit, Fit, fit, fit_curve
 
-    chosen = _changed_scene(scene, liquid, changes)
-    read = measurements.read_measurement(measured)
+    chosen = _load_changed_scene(scene, liquid, changes)
+    measurement = measurements.read_measurement(measured)
     fitted = [name.strip() for name in names.split(",")]
     fitted_liquid: Fit | CurveFit
     with progress() as show:
         show(f"fitting {names}")
-        if isinstance(read, measurements.FlowCurve):
-            fitted_liquid = fit_curve(chosen, liquid, fitted, read)
+        if isinstance(measurement, measurements.FlowCurve):
+            fitted_liquid = fit_curve(chosen, liquid, fitted, measurement)
         else:
-            motion = measurements.with_centred_velocity(read.motion) if velocity == "centred" else read.motion
-            fitted_liquid = fit(chosen, liquid, fitted, motion, read.force_n)
+            motion = (
+                measurements.with_centred_velocity(measurement.motion) if velocity == "centred" else measurement.motion
+            )
+            fitted_liquid = fit(chosen, liquid, fitted, motion, measurement.force_n)
     click.echo(identified.report_text(fitted_liquid))
     echo_files(identified.write_fit(fitted_liquid, to, measured) if to is not None else ())

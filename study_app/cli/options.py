@@ -1,4 +1,4 @@
-"""The arguments, options, groups and exit codes that commands share, their executor, and progress on the terminal."""
+"""The arguments, options, groups, exit codes, executor and progress display that commands share."""
 
 import sys
 from collections.abc import Callable, Iterable, Iterator
@@ -48,7 +48,7 @@ _SAMPLES: Final = {
 }
 """Values of arguments and of required options in examples."""
 _LONGEST: Final = 150
-"""Characters of a command's first sentence in ``--help``, which wraps it."""
+"""Maximum number of characters of a command's description in the list of commands."""
 _Command = TypeVar("_Command", bound=Callable[..., Any])
 FILE = click.argument("protocol", metavar="FILE")
 SCENE_FILE = click.argument("scene", metavar="FILE")
@@ -74,7 +74,7 @@ class GroupedCommands(click.Group):
 
 
 def example_of(ctx: click.Context) -> str:
-    """Return a command with its arguments and required options; empty without any."""
+    """Return a command with its arguments and required options, or "" if it has none."""
     parts: list[str] = []
     for parameter in ctx.command.params:
         name = (
@@ -90,13 +90,13 @@ def example_of(ctx: click.Context) -> str:
 
 
 class Target(click.Path):
-    """A path to write to; an empty one, which would be the current folder, is rejected."""
+    """A path to write to; an empty path is rejected, since it would mean the current folder."""
 
     def __init__(self) -> None:
         super().__init__(path_type=Path)
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Return the path."""
+        """Return the path, or reject an empty one."""
         if not str(value):
             self.fail("is empty: specify a file or folder (. is the current folder)", param, ctx)
         return super().convert(value, param, ctx)
@@ -107,15 +107,15 @@ RESULTS = click.option(
 )
 
 
-def exclude_each_other(**given: object) -> None:
+def exclude_each_other(**options: object) -> None:
     """Raise a usage error if more than one of these options is given (neither None nor False)."""
-    names = [f"--{name}" for name, value in given.items() if value is not None and value is not False]
+    names = [f"--{name}" for name, value in options.items() if value is not None and value is not False]
     if len(names) > 1:
         raise click.UsageError(f"{' and '.join(names)} cannot be combined: specify only one of them")
 
 
 def takes_study(function: _Command) -> _Command:
-    """Add the argument RESULTS and ``--results DIR`` to a command; its function gets the study's folder ``results``."""
+    """Add the argument RESULTS and ``--results DIR`` to a command; its function receives the folder as ``results``."""
 
     @click.argument("named", metavar="[RESULTS]", required=False)
     @RESULTS
@@ -127,19 +127,19 @@ def takes_study(function: _Command) -> _Command:
 
 
 def takes_session(function: _Command) -> _Command:
-    """Add the argument SESSION to a command; its function gets ``session``, the session's folder."""
+    """Add the argument SESSION and ``--results DIR`` to a command; its function receives the folder as ``session``."""
 
     @click.argument("session", metavar="SESSION")
     @RESULTS
     @wraps(function)
     def run(*arguments: Any, session: str, results: Path | None, **options: Any) -> Any:
-        return function(*arguments, session=_session_at(session, results), **options)
+        return function(*arguments, session=_session_folder(session, results), **options)
 
     return run  # type: ignore[return-value]
 
 
 def study_at(named: str | None, results: Path | None) -> Path:
-    """Return a study's folder: a path, or the name of one in the workspace."""
+    """Return a study's folder, from its path or its name in the workspace."""
     from study_app.workspace import workspace
 
     if (named is None) == (results is None):
@@ -153,10 +153,10 @@ def study_at(named: str | None, results: Path | None) -> Path:
     return inside if path.name == named and not path.is_dir() and inside.is_dir() else path
 
 
-def _session_at(named: str, results: Path | None) -> Path:
-    """Return a session's folder: a path, or STUDY/PARTICIPANT/NUMBER as ``sessions`` lists it (default: number 1).
+def _session_folder(named: str, results: Path | None) -> Path:
+    """Return a session's folder, from its path or its name STUDY/PARTICIPANT/NUMBER in the list of ``sessions``.
 
-    With ``results``, a study's folder, the name is PARTICIPANT/NUMBER.
+    With ``results``, a study's folder, the name is PARTICIPANT/NUMBER. The default number is 1.
     """
     from study_app.store.merged import session_in
     from study_app.workspace import workspace
@@ -167,13 +167,13 @@ def _session_at(named: str, results: Path | None) -> Path:
     study, rest = (Path(path.parts[0]), path.parts[1:]) if results is None else (results.absolute(), path.parts)
     number = rest[1] if len(rest) == 2 else "1"
     if len(rest) in (1, 2) and number.isdecimal():
-        place = session_in(workspace().results / study, rest[0], int(number)).path
-        return place if place.is_dir() else path
+        folder = session_in(workspace().results / study, rest[0], int(number)).path
+        return folder if folder.is_dir() else path
     return path
 
 
 def keep_offered_workspace() -> None:
-    """Store and print the suggested workspace if none was chosen, because data will be written there."""
+    """Store and print the suggested workspace if none was chosen, before data are written to it."""
     from study_app.store.workstation import keep_workspace
     from study_app.workspace import chosen_workspace, offered_workspace
 
@@ -192,7 +192,7 @@ def exit_if(problems: object) -> None:
 
 
 def printable(text: str) -> str:
-    """Return a line with its unprintable characters escaped: names of a stranger's files may control a terminal."""
+    """Return a line with unprintable characters escaped, since names of others' files may control the terminal."""
     return "".join(letter if letter.isprintable() else letter.encode("unicode_escape").decode() for letter in text)
 
 
@@ -203,7 +203,7 @@ def echo_files(written: Iterable[Path]) -> None:
 
 
 def make_output_folder(to: Path | None) -> None:
-    """Create the output folder, if given, before a long computation."""
+    """Create the output folder, if given, so that a long computation does not fail at its end."""
     from study_app.store.files import make_folder
 
     if to is not None:
@@ -218,33 +218,33 @@ class ShowProgress(Protocol):
 
 @contextmanager
 def progress(otherwise: Callable[[str], object] | None = None) -> Iterator[ShowProgress]:
-    """Show progress below the output, on standard error, and remove it at the end of the block.
+    """Show progress below the output, on standard error, until the end of the block.
 
-    Print nothing on standard output inside the block.
+    Outside a terminal, ``otherwise`` is called with the texts instead. The block must not print on standard output.
     """
     if not sys.stderr.isatty():
 
-        def plainly(what: str, share: float | None = None) -> None:
+        def show_plainly(what: str, share: float | None = None) -> None:
             if otherwise is not None:
                 otherwise(what)
 
-        yield plainly
+        yield show_plainly
         return
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
     columns = (BarColumn(), TextColumn("{task.description}", markup=False), TimeElapsedColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True, redirect_stdout=False) as shown:
-        task = shown.add_task("", total=None)
+    with Progress(*columns, console=Console(stderr=True), transient=True, redirect_stdout=False) as bar:
+        task = bar.add_task("", total=None)
 
         def show(what: str, share: float | None = None) -> None:
-            shown.update(task, description=what, total=None if share is None else 1.0, completed=share or 0.0)
+            bar.update(task, description=what, total=None if share is None else 1.0, completed=share or 0.0)
 
         yield show
 
 
 def takes_workers(function: _Command) -> _Command:
-    """Add ``--workers`` and ``--cluster`` to a command; its function gets ``workers``."""
+    """Add ``--workers`` and ``--cluster`` to a command; its function receives ``workers``."""
 
     @click.option(
         "--workers",
@@ -265,11 +265,11 @@ def takes_workers(function: _Command) -> _Command:
     )
     @wraps(function)
     def run(*arguments: Any, count: int, cluster: str | None, **options: Any) -> Any:
-        of_count, of_cluster = (click.get_current_context().get_parameter_source(it) for it in ("count", "cluster"))
-        if of_count == of_cluster == ParameterSource.COMMANDLINE:
+        source_of = click.get_current_context().get_parameter_source
+        if source_of("count") == source_of("cluster") == ParameterSource.COMMANDLINE:
             raise click.UsageError("--workers and --cluster cannot be combined: a cluster has its own workers")
-        here = cluster is None or of_count == ParameterSource.COMMANDLINE
-        workers = Workers(None if count < 0 else count) if here else Workers(cluster=cluster)
+        is_local = cluster is None or source_of("count") == ParameterSource.COMMANDLINE
+        workers = Workers(None if count < 0 else count) if is_local else Workers(cluster=cluster)
         return function(*arguments, workers=workers, **options)
 
     return run  # type: ignore[return-value]
@@ -283,7 +283,7 @@ def _check_worker_count(_context: click.Context, _option: click.Parameter, value
 
 @contextmanager
 def executor_for(workers: Workers) -> "Iterator[Executor]":
-    """Open the executor of a command; report a cluster without workers."""
+    """Open the executor of a command, and print a notice if a cluster has no workers."""
     with open_executor(workers) as executor:
         if not getattr(executor, "has_workers", True):
             click.echo(
@@ -294,49 +294,51 @@ def executor_for(workers: Workers) -> "Iterator[Executor]":
 
 
 class DeviceName(click.Option):
-    """``--device``, whose help names the devices; ``only_moving`` names those that move by themselves."""
+    """The option ``--device``, whose help lists the devices; with ``only_moving``, those that move by themselves."""
 
     def __init__(self, *declarations: Any, only_moving: bool = False, **attributes: Any) -> None:
         super().__init__(*declarations, metavar="NAME", **attributes)
         self._only_moving = only_moving
 
     def get_help_record(self, ctx: click.Context) -> tuple[str, str] | None:
-        """Return the names and the help text of the option."""
+        """Return the option and its help text with the devices."""
         from study_app.devices.registry import all_devices
 
         names = []
         for device in all_devices():
             if device.moves_by_itself or not self._only_moving:
-                bare = [] if device.argument_required else [device.name]
-                names += [*bare, f"{device.name}:{device.argument}"] if device.argument else bare
+                without = [] if device.argument_required else [device.name]
+                names += [*without, f"{device.name}:{device.argument}"] if device.argument else without
         *first, last = names
         listed = f"{', '.join(first)} or {last}" if first else last
-        known = self.help
+        own_help = self.help
         self.help = (
-            f"{listed}; see liquid-study devices." if not known else f"{known} {listed}; see liquid-study devices."
+            f"{listed}; see liquid-study devices."
+            if not own_help
+            else f"{own_help} {listed}; see liquid-study devices."
         )
         try:
             return super().get_help_record(ctx)
         finally:
-            self.help = known
+            self.help = own_help
 
 
 class TakesDeviceOptions(click.Command):
     """A command that also accepts the options of all devices and passes them on as ``device_options``."""
 
     def invoke(self, ctx: click.Context) -> Any:
-        """Call the function with its own parameters and the device options by name."""
-        of_devices = ctx.params.keys() - {parameter.name for parameter in self.params}
-        taken = {name.replace("_", "-"): ctx.params.pop(name) for name in sorted(of_devices)}
-        ctx.params["device_options"] = {name: value for name, value in taken.items() if value is not None}
+        """Call the function with its parameters and the used device options by name."""
+        added = ctx.params.keys() - {parameter.name for parameter in self.params}
+        values = {name.replace("_", "-"): ctx.params.pop(name) for name in sorted(added)}
+        ctx.params["device_options"] = {name: value for name, value in values.items() if value is not None}
         return super().invoke(ctx)
 
     def get_params(self, ctx: click.Context) -> list[click.Parameter]:
-        """Return the command's own options, then those of the devices whose names are free."""
+        """Return the command's own options, and those of devices whose names differ from these."""
         from study_app.devices.registry import all_devices
 
         own = super().get_params(ctx)
-        taken = {parameter.name for parameter in own}
+        own_names = {parameter.name for parameter in own}
         options = {option.name: option for device in all_devices() for option in device.options}
         added = [
             click.Option(
@@ -346,6 +348,6 @@ class TakesDeviceOptions(click.Command):
                 help=option.help,
             )
             for option in options.values()
-            if (keyword := option.name.replace("-", "_")) not in taken
+            if (keyword := option.name.replace("-", "_")) not in own_names
         ]
-        return [*own[:-1], *added, *own[-1:]]  # --help stays the last
+        return [*own[:-1], *added, *own[-1:]]  # --help remains the last one

@@ -1,4 +1,4 @@
-"""The commands that plan a study: how many participants it needs, and what it commits to."""
+"""The commands that plan a study: estimate power, write a preregistration."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _TRIALS = (1, 1000)
 
 
 def _parse_numbers(value: str, least: int, most: int, what: str) -> tuple[int, ...]:
-    """Return a list of numbers, ascending."""
+    """Return the distinct numbers of a list, in ascending order."""
     try:
         numbers = sorted({int(part) for part in value.split(",")})
     except ValueError as error:
@@ -97,13 +97,13 @@ def power(
         )
     if to is not None:
         make_folder(to, waits=False)
-    stated = click.get_current_context().get_parameter_source("sizes") is not ParameterSource.DEFAULT
-    if stated and study.analysis is not None and (looks := study.analysis.looks):
+    is_given = click.get_current_context().get_parameter_source("sizes") is not ParameterSource.DEFAULT
+    if is_given and study.analysis is not None and (looks := study.analysis.looks):
         raise click.UsageError(
             f"--sizes cannot be used, because the study plans interim looks at {', '.join(map(str, looks))} "
             "participants: omit --sizes"
         )
-    sizes = sizes if stated else planned_sizes(study)
+    sizes = sizes if is_given else planned_sizes(study)
     estimate: PowerEstimate | None = None
     cancelled = False
     try:
@@ -129,7 +129,7 @@ def power(
 
 
 def _write_estimate(estimate: PowerEstimate, to: Path | None) -> None:
-    """Print the tables; write them and the figures into a folder."""
+    """Print the tables; write them and the figures to ``to``, if given."""
     from study_app.analysis.planning.power_curves import Powers, write_power
     from study_app.analysis.planning.power_estimates import estimate_markdown
     from study_app.analysis.planning.threshold_studies import threshold_csv

@@ -1,4 +1,4 @@
-"""Pages of the documentation that are made from the program: its commands, and every kind that a study can use."""
+"""Pages of the documentation that are generated from the program: commands, kinds of study elements, delayed force."""
 
 import re
 import sys
@@ -26,7 +26,7 @@ _DEVICE_KINDS = {"felt": "with force", "seen": "without force", "simulated": "si
 
 
 def kinds_markdown() -> str:
-    """Return a Markdown table for each kind that has a descriptor."""
+    """Return Markdown tables of the kinds of study elements, devices, limiters and templates."""
     tables = (
         ("Questions", ("`kind`", "question", "additional keys", "value in the tables"), _question_rows()),
         ("Standard questionnaires", ("`instrument`", "texts", "scores", "source and comparison"), _instrument_rows()),
@@ -47,17 +47,17 @@ def kinds_markdown() -> str:
 
 
 def delayed_force_markdown() -> str:
-    """Return the delivered share of a delayed force and the longest delay with 95 %, by liquid and hand."""
+    """Return Markdown tables of the delivered share of a delayed force, and of the longest delay that delivers 95 %."""
     entries = [entry for entry in stored_table() if entry.estimator == "kalman"]
     delays = [delay for delay in sorted({entry.delay_ms for entry in entries}) if delay >= _LEAST_DELAY_MS]
-    left = {(entry.liquid, entry.hand, entry.delay_ms): f"{entry.left_percent:.0f}" for entry in entries}
+    remaining = {(entry.liquid, entry.hand, entry.delay_ms): f"{entry.left_percent:.0f}" for entry in entries}
     liquids = dict.fromkeys(entry.liquid for entry in entries)
     labels = {liquid: liquid.replace("physical2_", "`physical2`: ").replace("_", " ") for liquid in liquids}
     shares = (
-        (labels[name], *(f"{left[name, 'light', delay]} ({left[name, 'middle', delay]})" for delay in delays))
+        (labels[name], *(f"{remaining[name, 'light', delay]} ({remaining[name, 'middle', delay]})" for delay in delays))
         for name in liquids
     )
-    longest = ((labels[name], *(f"{longest_delay_ms(name, *how):g}" for how in _LOOPS)) for name in liquids)
+    longest = ((labels[name], *(f"{longest_delay_ms(name, *loop):g}" for loop in _LOOPS)) for name in liquids)
     tables = (
         (
             "Remaining force [%], light grip (medium grip in brackets), `kalman`",
@@ -84,17 +84,17 @@ def _question_rows() -> Iterator[tuple[str, ...]]:
     for name, description in _kind_descriptions(questions.KINDS):
         kind = questions.KINDS[name.strip("`")]
         keys = (field.alias or key for key, field in kind.model_fields.items() if key not in common)
-        shown = "no `kind`" if name == f"`{questions.STATEMENT}`" else name
-        yield shown, description, ", ".join(f"`{key}`" for key in keys), kind.value_type
+        label = "no `kind`" if name == f"`{questions.STATEMENT}`" else name
+        yield label, description, ", ".join(f"`{key}`" for key in keys), kind.value_type
 
 
 def _instrument_rows() -> Iterator[tuple[str, ...]]:
     for name in Instrument.names():
-        about = Instrument(name).table
-        doubt = f"; from memory: {about['from_memory']}" if "from_memory" in about else ""
-        scores = ", ".join(f"`{score}`" for score in about["scores"])
-        texts = ", ".join(about["languages"]) or "yours"
-        yield f"`{name}`", texts, scores, f"{about['source']}; {about['compared']}{doubt}"
+        table = Instrument(name).table
+        caveat = f"; from memory: {table['from_memory']}" if "from_memory" in table else ""
+        scores = ", ".join(f"`{score}`" for score in table["scores"])
+        texts = ", ".join(table["languages"]) or "yours"
+        yield f"`{name}`", texts, scores, f"{table['source']}; {table['compared']}{caveat}"
 
 
 def _effect_rows() -> Iterator[tuple[str, ...]]:
@@ -105,8 +105,8 @@ def _effect_rows() -> Iterator[tuple[str, ...]]:
 
 
 def _limiter_rows() -> Iterator[tuple[str, ...]]:
-    for it in sorted(LIMITERS):
-        yield str(it.bit), it.label, f"`limiter_{it.name}`", it.meaning
+    for limiter in sorted(LIMITERS):
+        yield str(limiter.bit), limiter.label, f"`limiter_{limiter.name}`", limiter.meaning
 
 
 def _device_rows() -> Iterator[tuple[str, ...]]:
@@ -139,8 +139,8 @@ def commands_markdown() -> str:
 def _with_subcommands(path: tuple[str, ...], command: click.Command) -> Iterator[tuple[tuple[str, ...], click.Command]]:
     yield path, command
     if isinstance(command, click.Group):
-        for name, below in command.commands.items():
-            yield from _with_subcommands((*path, name), below)
+        for name, subcommand in command.commands.items():
+            yield from _with_subcommands((*path, name), subcommand)
 
 
 def _command_lines(path: tuple[str, ...], command: click.Command) -> Iterator[str]:
@@ -163,14 +163,12 @@ def _paragraphs(text: str) -> list[str]:
 
 
 def _option_row(option: click.Option, context: click.Context) -> str:
-    named = option.metavar or re.sub(r"(INTEGER|FLOAT)( RANGE)?", "N", option.make_metavar(context))
-    metavar = "" if option.is_flag else f" {named}"
+    placeholder = option.metavar or re.sub(r"(INTEGER|FLOAT)( RANGE)?", "N", option.make_metavar(context))
+    metavar = "" if option.is_flag else f" {placeholder}"
     names = ", ".join(f"`{name}{metavar}`" for name in option.opts).replace("|", "\\|")
     default = option.get_default(context, call=False)
-    shown = "" if option.is_flag or option.multiple or callable(default) else str(default)
-    value = (
-        "required" if option.required else f"`{shown}`" if shown and "UNSET" not in shown and shown != "None" else ""
-    )
+    text = "" if option.is_flag or option.multiple or callable(default) else str(default)
+    value = "required" if option.required else f"`{text}`" if text and "UNSET" not in text and text != "None" else ""
     return f"| {names} | {value} | {_cell(option.help or '')} |"
 
 

@@ -1,4 +1,4 @@
-"""The commands about studies: protocols, sessions, the workspace."""
+"""The commands about studies: protocols, sessions, the workspace and the documentation."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -58,8 +58,8 @@ def check(protocol: str | None, *, schema: str | None, delay_ticks: int) -> None
         from study_app.protocol.file_format import editor_schema
         from study_app.store.journals.journal_events import journal_schema
 
-        printed = editor_schema() if schema == "protocol" else journal_schema()
-        click.echo(json.dumps(printed, indent=2, ensure_ascii=False))
+        json_schema = editor_schema() if schema == "protocol" else journal_schema()
+        click.echo(json.dumps(json_schema, indent=2, ensure_ascii=False))
         return
     if protocol is None:
         raise click.UsageError("check needs a protocol: specify a file, or one of " + ", ".join(load.shipped()))
@@ -141,8 +141,8 @@ def edit(protocol: str) -> None:
     from study_app.protocol.source import protocol_file
 
     file = protocol_file(protocol)
-    named = protocol if file.name != Path(protocol).name else str(file)
-    click.get_current_context().exit(app.run_home_window(then=lambda visit: visit.open_designer(named)))
+    name = protocol if file.name != Path(protocol).name else str(file)
+    click.get_current_context().exit(app.run_home_window(then=lambda visit: visit.open_designer(name)))
 
 
 @click.command()
@@ -162,8 +162,8 @@ def design(protocol: str, participants: int, first: str, seed: int) -> None:
     from study_app.protocol.load import load
     from study_app.protocol.orders import balances, describe_balance, numbered_participants
 
-    judged = balances(load(protocol), numbered_participants(participants, first), seed)
-    click.echo("\n\n".join(map(describe_balance, judged)))
+    counts = balances(load(protocol), numbered_participants(participants, first), seed)
+    click.echo("\n\n".join(map(describe_balance, counts)))
 
 
 @click.command(cls=TakesDeviceOptions)
@@ -283,10 +283,10 @@ def workspace(folder: Path | None) -> None:
 
     if folder is not None:
         keep_workspace(Workspace(folder.absolute()))
-    here = workspace_here()
-    if folder is not None and here.folder.absolute() != folder.absolute():
+    current = workspace_here()
+    if folder is not None and current.folder.absolute() != folder.absolute():
         click.echo(f"{WORKSPACE_VARIABLE} sets another workspace for this run", err=True)
-    click.echo(here.folder.absolute() if chosen_workspace() else f"{here.folder} (not chosen yet)")
+    click.echo(current.folder.absolute() if chosen_workspace() else f"{current.folder} (not chosen yet)")
 
 
 @click.command()
@@ -298,8 +298,8 @@ def studies() -> None:
     from study_app.store.workstation import recent_protocols
     from study_app.workspace import workspace as workspace_here
 
-    here = workspace_here()
-    click.echo(f"Protocols in {here.protocols.absolute()}, shipped protocols, and recently opened protocols")
+    current = workspace_here()
+    click.echo(f"Protocols in {current.protocols.absolute()}, shipped protocols, and recently opened protocols")
     for name in (*known_protocols(), *recent_protocols()):
         try:
             if is_scene_file(name):
@@ -309,15 +309,15 @@ def studies() -> None:
             click.echo(f"  {name}  {study.text(study.study.title, study.study.languages[0])}")
         except ProtocolError as error:
             click.echo(f"  {name}  cannot be used: {error.problems[0]}")
-    click.echo(f"Studies in {here.results.absolute()}")
-    for folder in _study_folders(here.results):
+    click.echo(f"Studies in {current.results.absolute()}")
+    for folder in _study_folders(current.results):
         try:
-            places = folders_of(folder)
+            folders = folders_of(folder)
         except StoreError as error:
             click.echo(f"  {folder.name}  cannot be used: {error}")
             continue
-        count = len(sessions_in(places.values()))
-        sites = "" if "" in places else f", sites {', '.join(prefix[:-1] for prefix in places)}"
+        count = len(sessions_in(folders.values()))
+        sites = "" if "" in folders else f", sites {', '.join(prefix[:-1] for prefix in folders)}"
         click.echo(f"  {folder.name}  {counted(count, 'session')}{sites}")
 
 
@@ -360,29 +360,32 @@ def sessions(named: str | None, results: Path | None) -> None:
     from study_app.store.tables import participants_of
     from study_app.workspace import workspace as workspace_here
 
-    at = workspace_here().results
-    folders = list(_study_folders(at)) if named is None and results is None else [study_at(named, results)]
+    in_workspace = workspace_here().results
+    folders = list(_study_folders(in_workspace)) if named is None and results is None else [study_at(named, results)]
     for folder in folders:
         if not folder.is_dir():
             raise StoreError(f"{folder} is not a folder: specify a study listed by liquid-study studies, or its path")
-        left_out = {row.what for row in all_exclusions(folder)}
-        inside = folder.parent.resolve() == at.resolve()
+        excluded = {row.what for row in all_exclusions(folder)}
+        inside = folder.parent.resolve() == in_workspace.resolve()
         for row in participants_of(folder):
-            who, number = row["participant"], row["session"]
-            name = f"{folder.name}/{who}/{number}" if inside else str(session_in(folder, who, number).path)
+            participant, number = row["participant"], row["session"]
+            name = (
+                f"{folder.name}/{participant}/{number}" if inside else str(session_in(folder, participant, number).path)
+            )
             started = _local_time(row["session_started_at"])
-            mark = "  excluded" if (who, number, None) in left_out else ""
+            mark = "  excluded" if (participant, number, None) in excluded else ""
             click.echo(f"{name}  {started}  {row['status']}{mark}")
 
 
-def _local_time(written: str | None) -> str:
-    """Return a time of a table as local time, to the minute with its offset; "" if it is unknown."""
+def _local_time(recorded: str | None) -> str:
+    """Return a table's time as local time with its offset, to the minute; "" if it is unknown."""
     from datetime import datetime
 
-    return datetime.fromisoformat(written).astimezone().isoformat(" ", "minutes") if written else ""
+    return datetime.fromisoformat(recorded).astimezone().isoformat(" ", "minutes") if recorded else ""
 
 
 def _study_folders(results: Path) -> Iterator[Path]:
+    """Yield the study folders in a folder of results, which need not exist."""
     from study_app.store.tables import study_folders
 
     if results.is_dir():
@@ -401,13 +404,13 @@ def docs(search_words: tuple[str, ...]) -> None:
     """
     from study_app import documentation
 
-    typed = " ".join(search_words)
-    if not typed or typed in documentation.names():
-        click.echo(documentation.page(typed) if typed else "\n".join(documentation.names()))
+    query = " ".join(search_words)
+    if not query or query in documentation.names():
+        click.echo(documentation.page(query) if query else "\n".join(documentation.names()))
         return
-    sections = documentation.search(typed)[:_SECTIONS_SHOWN]
+    sections = documentation.search(query)[:_SECTIONS_SHOWN]
     if not sections:
-        raise click.UsageError(f"no page contains any of the words {typed!r}: run liquid-study docs to list the pages")
+        raise click.UsageError(f"no page contains any of the words {query!r}: run liquid-study docs to list the pages")
     best, *others = sections
     click.echo(f"{best.page}: {best.heading}\n\n{best.source.strip()}\n")
     for section in others:
