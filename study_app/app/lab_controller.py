@@ -73,14 +73,14 @@ class _Measurements:
     def __init__(self, make_appraiser: Callable[[], AppraisalClient]) -> None:
         self._make = make_appraiser
         self._appraiser: AppraisalClient | None = None
-        self._asked = 0
+        self._order_number = 0
         self.costs: Costs | None = None
         self.errors: Errors | None = None
         self.waits = False
 
     def discard_answers(self) -> None:
         """Discard the answers, because the setting has changed."""
-        self._asked, self.costs, self.errors, self.waits = -1, None, None, False
+        self._order_number, self.costs, self.errors, self.waits = -1, None, None, False
 
     def request(self, scene: Scene) -> None:
         """Request the cost and error of a setting, which `read_answers` receives."""
@@ -93,11 +93,11 @@ class _Measurements:
             except OSError as error:  # the lab works without costs if the process cannot be started
                 log.info("the appraisal failed: %s", error)
                 return
-        self._asked, self.waits = self._appraiser.order(Question(scene)), True
+        self._order_number, self.waits = self._appraiser.order(Question(scene)), True
 
     def read_answers(self) -> None:
         for number, answer in () if self._appraiser is None else self._appraiser.answers():
-            if number != self._asked:
+            if number != self._order_number:
                 continue
             if isinstance(answer, Costs):
                 self.costs = answer

@@ -147,7 +147,7 @@ class ThreadPriority:
     """Raises the priority of the calling thread, and restores it."""
 
     def __init__(self) -> None:
-        self._before: int | None = None
+        self._previous: int | None = None
 
     def raise_priority(self) -> bool:
         """Raise this thread's priority above other programs'; return whether the system permitted it."""
@@ -156,7 +156,7 @@ class ThreadPriority:
         if sys.platform == "darwin":
             return True  # the GUI thread already has interactive priority
         thread = threading.get_native_id()
-        before = os.getpriority(os.PRIO_PROCESS, thread)
+        previous = os.getpriority(os.PRIO_PROCESS, thread)
         try:
             os.setpriority(os.PRIO_PROCESS, thread, NICE)
         except PermissionError:
@@ -166,15 +166,15 @@ class ThreadPriority:
                 make_high_priority(thread, NICE)
             except OSError:
                 return False
-        self._before = before
+        self._previous = previous
         return True
 
     def restore(self) -> None:
         if sys.platform == "win32":
             _set_windows_priority(NORMAL)
-        elif sys.platform != "darwin" and self._before is not None:
-            os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), self._before)
-            self._before = None
+        elif sys.platform != "darwin" and self._previous is not None:
+            os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), self._previous)
+            self._previous = None
 
 
 def _set_windows_priority(level: int) -> bool:

@@ -52,14 +52,14 @@ class PlayedSession(LiveSession):
     def has_begun(self) -> bool:
         return self._shown
 
-    def open_windows(self, made: object) -> Iterator[None]:
-        yield from super().open_windows(made)
+    def open_windows(self, ready: object) -> Iterator[None]:
+        yield from super().open_windows(ready)
         assert self.bridge is not None  # noqa: S101 - just created
         self._shown = True
         participant, runner = self.bridge.participant, self.bridge.runner
         participant.installEventFilter(self)
         participant.event.connect(lambda event: self._stop_later() if isinstance(event, ForceStopped) else None)
-        self.bridge.operator.asked.connect(lambda what, _details: self._stop_later() if what == "stop" else None)
+        self.bridge.operator.asked.connect(lambda request, _details: self._stop_later() if request == "stop" else None)
         if self.bridge.strip is not None:
             self.bridge.strip.stop.pressed.connect(self._stop_later)
         runner.on_change(self._follow_state)

@@ -65,7 +65,7 @@ class Appraisal:
         self._last = last
         self.dynamics = dynamics
         self.delivery: PredictedDelivery | None = None
-        self._asked = 0
+        self._order_number = 0
         self.appraiser = start_appraisal_worker()
         self.tick_s: float | None = None
         self.error_n: float | None = None
@@ -83,7 +83,7 @@ class Appraisal:
         """Read the available answers; return whether a result has changed."""
         has_news = False
         for number, answer in self.appraiser.answers():
-            if number != self._asked or self.is_over:
+            if number != self._order_number or self.is_over:
                 continue
             if isinstance(answer, Costs):
                 self.tick_s = max(self.tick_s or 0.0, answer.tick_ns * 1e-9)
@@ -107,9 +107,9 @@ class Appraisal:
     def _request_next(self) -> None:
         if self._waiting:
             _, scene, stroke = self._waiting[0]
-            self._asked = self.appraiser.order(Question(scene, stroke, self.dynamics))
+            self._order_number = self.appraiser.order(Question(scene, stroke, self.dynamics))
         elif self._last is not None:
-            self._asked = self.appraiser.order(self._last)
+            self._order_number = self.appraiser.order(self._last)
 
     def close(self) -> None:
         self.appraiser.close()

@@ -141,9 +141,9 @@ class DevicesPlace(Place):
         self._body = QBoxLayout(QBoxLayout.Direction.LeftToRight)
         self._body.setSpacing(18)
         add_parts(self._body, (lists, 1), column)
-        inside = QWidget()
-        vbox(head, (self._body, 1), spacing=20, margins=(30, 30, 30, 22), parent=inside)
-        self._area = scrolled(inside)
+        content = QWidget()
+        vbox(head, (self._body, 1), spacing=20, margins=(30, 30, 30, 22), parent=content)
+        self._area = scrolled(content)
         vbox(self._area, margins=0, parent=self)
 
     def enter(self) -> None:

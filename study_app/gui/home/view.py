@@ -208,10 +208,10 @@ class HomePlace(Place):
         self._files, self._read_failed = file_states(self._opened), False
         self._studies.run(partial(read_studies, tuple(self._opened), self._draft_words, self.results))
 
-    def _show_studies(self, read: tuple[Facts, ...]) -> None:
+    def _show_studies(self, facts: tuple[Facts, ...]) -> None:
         self.waiting.hide()
-        if read != self._facts:
-            self._show_facts(read)
+        if facts != self._facts:
+            self._show_facts(facts)
         self.show_sessions()
 
     def _show_read_error(self, error: Exception) -> None:
@@ -462,9 +462,9 @@ def _read_sessions(
     """Return the results folder, the sessions in it, and the one that can be resumed, if any."""
     counts = {study.name: set(extent_of(study.protocol).answers) for study in studies if isinstance(study, StudyFacts)}
     answers = {name: max(numbers) for name, numbers in counts.items() if len(numbers) == 1}
-    known = sessions(results, answers)
+    recorded = sessions(results, answers)
     saved = [study for study in studies if not isinstance(study, DraftFacts)]
-    return results, known, interrupted_session(known, saved, datetime.now().astimezone())
+    return results, recorded, interrupted_session(recorded, saved, datetime.now().astimezone())
 
 
 def _screen_lines(settings: MachineSettings) -> tuple[str, ...]:

@@ -59,11 +59,11 @@ class DeviceShown:
 def devices_shown(backends: Sequence[Backend]) -> tuple[DeviceShown, ...]:
     """Return the description of each device, common ones first; a device's backends are merged."""
     names = list(dict.fromkeys(backend.name for backend in backends))
-    shown = [_device_shown(name, [backend for backend in backends if backend.name == name]) for name in names]
-    return tuple(sorted(shown, key=lambda device: device.simulated))
+    devices = [_device_shown(name, [backend for backend in backends if backend.name == name]) for name in names]
+    return tuple(sorted(devices, key=lambda device: device.simulated))
 
 
-def device_named(name: str, shown: Iterable[DeviceShown]) -> DeviceShown:
+def device_named(name: str, devices: Iterable[DeviceShown]) -> DeviceShown:
     """Return the description of a device; if no search has found it, one with only its name."""
     try:
         kind = descriptor_of(name).name
@@ -78,7 +78,7 @@ def device_named(name: str, shown: Iterable[DeviceShown]) -> DeviceShown:
             can="",
             why=_as_sentence(str(error)),
         )
-    for device in shown:
+    for device in devices:
         if device.name.partition(":")[0] == kind:
             return device
     return device_before_search(name)
@@ -198,8 +198,8 @@ def screen_number(settings: MachineSettings) -> int:
 
 def text_scale_on(settings: MachineSettings, screen: QScreen) -> float:
     """Return the factor by which the participant's text must be enlarged on a screen."""
-    shown = screen_shown(screen)
-    return settings.text_scale(shown.width_px, shown.width_mm)
+    description = screen_shown(screen)
+    return settings.text_scale(description.width_px, description.width_mm)
 
 
 def described_screens(settings: MachineSettings, participant: QScreen, operator: QScreen) -> dict[str, Any]:
@@ -207,7 +207,7 @@ def described_screens(settings: MachineSettings, participant: QScreen, operator:
 
     ``frames`` names the timing source of the participant's frames: buffer swaps with a graphics card, else a clock.
     """
-    shown = screen_shown(participant)
+    description = screen_shown(participant)
     frames = {"frames": LOCKED if has_graphics_card() else BY_CLOCK}
-    measured = settings.describe(shown.name, shown.width_px, shown.width_mm)
+    measured = settings.describe(description.name, description.width_px, description.width_mm)
     return {"participant": describe_screen(participant) | frames | measured, "operator": describe_screen(operator)}

@@ -194,8 +194,8 @@ class LabHeader(QWidget):
             self._middle: (self.blind, self.device, self.path),
             self._right: (self.undo, self.redo, self.stop, self.save),
         }
-        for row, inside in parts.items():
-            add_parts(row, *inside)
+        for row, widgets in parts.items():
+            add_parts(row, *widgets)
         self._left.setSpacing(16)
         self._grid.setColumnStretch(2, 1)
 
@@ -362,23 +362,23 @@ class _NumberRow(_ParameterRow):
     def _text(self, value: float) -> str:
         return write_number(value * self.parameter.factor, self.parameter.decimals)
 
-    def _apply_slide(self, shown: float, held: bool) -> None:
+    def _apply_slide(self, number: float, held: bool) -> None:
         self.show_refused("")
-        self.field.show_text(write_number(shown, self.parameter.decimals))
+        self.field.show_text(write_number(number, self.parameter.decimals))
         self.field.restore_text()
-        self.changed.emit(self.parameter.name, self._value(shown), held)
+        self.changed.emit(self.parameter.name, self._value(number), held)
 
-    def _apply_number(self, shown: float) -> None:
+    def _apply_number(self, number: float) -> None:
         self.show_refused("")
-        self.changed.emit(self.parameter.name, self._value(shown), False)
+        self.changed.emit(self.parameter.name, self._value(number), False)
 
-    def _value(self, shown: float) -> float:
+    def _value(self, number: float) -> float:
         """Return a displayed number in SI units, or the exact preset or current value if that is displayed alike."""
         row = self._row
-        for known in (row.preset, row.value) if row is not None else ():
-            if isinstance(known, int | float) and read_number(self._text(known)) == shown:
-                return float(known)
-        return shown / self.parameter.factor
+        for exact in (row.preset, row.value) if row is not None else ():
+            if isinstance(exact, int | float) and read_number(self._text(exact)) == number:
+                return float(exact)
+        return number / self.parameter.factor
 
     def _show_misread(self, text: str) -> None:
         preset = self._row.preset if self._row is not None else None

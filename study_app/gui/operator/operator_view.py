@@ -401,10 +401,10 @@ def _incomplete_recording_sentences(
 def _late_device_sentences(session: Session, progress: Progress) -> tuple[str, ...]:
     """Return a sentence for every trial in which the device answered late, newest first; none if double-blind."""
     labels = {trial.number: trial.label(session.protocol, session.language) for trial in session.schedule.trials}
-    shown = {} if session.protocol.study.blinding == "double" else progress.late
+    late = {} if session.protocol.study.blinding == "double" else progress.late
     return tuple(
         f"{labels[number]}: {text}; measure the device with liquid-study devices bench"
-        for number, text in sorted(shown.items(), reverse=True)
+        for number, text in sorted(late.items(), reverse=True)
     )
 
 

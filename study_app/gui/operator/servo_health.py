@@ -132,8 +132,8 @@ class ServoHealth:
 
     def trace(self, now_s: float) -> tuple[Floats, Floats]:
         """Return times before now [s] (n,), oldest first, and positions [m] (n, 3) of the last ten seconds."""
-        kept = min(self._path_rows, len(self._path))
-        path = np.roll(self._path, -(self._path_rows % len(self._path)), axis=0)[len(self._path) - kept :]
+        count = min(self._path_rows, len(self._path))
+        path = np.roll(self._path, -(self._path_rows % len(self._path)), axis=0)[len(self._path) - count :]
         path = path[path[:, 0] >= now_s - TRACE_WINDOW_S]
         return path[:, 0] - now_s, path[:, 1:]
 
@@ -141,11 +141,11 @@ class ServoHealth:
         return self.lateness_ns[: min(self._latenesses, len(self.lateness_ns))]
 
     def _rate_hz(self) -> float | None:
-        kept = min(self._ticks, len(self._recent))
-        if kept < 2:
+        count = min(self._ticks, len(self._recent))
+        if count < 2:
             return None
         newest = self._recent[(self._ticks - 1) % len(self._recent)]
-        oldest = self._recent[(self._ticks - kept) % len(self._recent)]
+        oldest = self._recent[(self._ticks - count) % len(self._recent)]
         ticks, time_ns = newest - oldest
         return float(ticks) * 1e9 / float(time_ns) if time_ns > 0 else None
 
@@ -263,8 +263,8 @@ class Forces:
 
     def trace(self, now_ns: int) -> tuple[Floats, Floats]:
         """Return times before now [s] (n,), oldest first, and forces [N] (n, 4: x, y, z, size)."""
-        kept = min(self._written, _ROWS)
-        order = np.arange(self._written - kept, self._written) % _ROWS
+        count = min(self._written, _ROWS)
+        order = np.arange(self._written - count, self._written) % _ROWS
         times_s: Floats = (self._steps[order] * _STEP_NS - now_ns).astype(np.float64) * 1e-9
         recent = times_s >= -TRACE_WINDOW_S
         return times_s[recent], self._rows[order][recent]

@@ -98,8 +98,8 @@ def resumed_rows(protocol: Protocol, schedule: Schedule, events: Iterable[Event]
         position = step.label(protocol, language) + (f", attempt\u00a0{attempt}" if attempt > 1 else "")
     else:
         position = "the end" if step is None else step_title(protocol, step, language)
-    kept = f"{sum(progress_of(journal).answered.values())} of {orders_of(protocol).answers} answers"
-    return ("Continues at", position), ("Kept", kept)
+    answers = f"{sum(progress_of(journal).answered.values())} of {orders_of(protocol).answers} answers"
+    return ("Continues at", position), ("Kept", answers)
 
 
 def planned_rows(
@@ -190,16 +190,16 @@ class _CheckRow(Themed, QWidget):
         value = figures(check.value, "body", "text" if check.verdict == "ok" else ink)
         value.setFont(font("body", weight=600, tabular=True, scale=0.97))
         value.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
-        said = vbox(STRETCH, about, spacing=6)
+        middle = vbox(STRETCH, about, spacing=6)
         if check.share is not None:
             share = Bar(height=6)
             share.setFixedWidth(BAR)
             share.show_share(min(1.0, check.share))
-            said.addWidget(share, 0, Qt.AlignmentFlag.AlignLeft)
-        said.addStretch()
+            middle.addWidget(share, 0, Qt.AlignmentFlag.AlignLeft)
+        middle.addStretch()
         self._head = holder = QWidget()
         holder.setMinimumHeight(_ROW_HEIGHT)
-        hbox(name, (said, 1), value, spacing=14, margins=(0, 4, 0, 4), parent=holder)
+        hbox(name, (middle, 1), value, spacing=14, margins=(0, 4, 0, 4), parent=holder)
         column = vbox(holder, spacing=0, margins=(LEFT, 0, 24, 0 if check.verdict == "ok" else 14), parent=self)
         if check.advice:
             advice = label(check.advice, "label", "text", wraps=True, weight=500)
@@ -287,9 +287,9 @@ class PreflightWindow(QWidget):
     def _lay_out(self) -> None:
         titles = vbox(label("Ready to begin?", "title_dense"), self.who, spacing=4)
         head = hbox((titles, 1), (self.chip, 0, Qt.AlignmentFlag.AlignVCenter))
-        inside = QWidget()
-        vbox(self.checks, STRETCH, margins=0, parent=inside)
-        area = self._area = scrolled(inside)
+        content = QWidget()
+        vbox(self.checks, STRETCH, margins=0, parent=content)
+        area = self._area = scrolled(content)
         middle = hbox((area, 1), self._make_side_column(), spacing=20)
         foot = hbox(self.cancel, self.again, spacing=16)
         self.note = label(_NOT_STARTED, "label", "text2")
@@ -426,9 +426,9 @@ class ComputerWindow(Question):
         area = scrolled(self._rows)
         area.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         area.setAccessibleName("Checks")
-        inside, close = QWidget(), ActionButton("", "Close", role="primary")
-        vbox(self.state, self.bar, (area, 1), spacing=12, margins=0, parent=inside)
-        super().__init__(parent, theme, "Computer check", _ABOUT, close, back="Check again", inside=inside)
+        content, close = QWidget(), ActionButton("", "Close", role="primary")
+        vbox(self.state, self.bar, (area, 1), spacing=12, margins=0, parent=content)
+        super().__init__(parent, theme, "Computer check", _ABOUT, close, back="Check again", inside=content)
         self.setModal(True)
         self.back.clicked.disconnect(self.reject)
         self.back.clicked.connect(self.asked)

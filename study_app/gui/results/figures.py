@@ -150,8 +150,8 @@ class ResultsView:
 
 def figure_counts(sessions: Sequence[SessionFacts]) -> tuple[str, str]:
     """Return sentences about the number of sessions in the figures, and why others are not; "" without sessions."""
-    inside = [session for session in sessions if session.is_counted]
-    head = f"{len(inside)} of {counted(len(sessions), 'session')} in the figures"
+    counted_sessions = [session for session in sessions if session.is_counted]
+    head = f"{len(counted_sessions)} of {counted(len(sessions), 'session')} in the figures"
     if not sessions:
         return "", ""
     excluded = [session.name for session in sessions if session.excluded is not None]

@@ -192,13 +192,13 @@ def _trial_records(
     rows: Sequence[Mapping[str, Any]],
     lines: Sequence[Event],
     limits: Mapping[str, float],
-    own: Sequence[Exclusion],
+    session_exclusions: Sequence[Exclusion],
     *,
     verdict: bool | None,
     codes: Codes,
 ) -> tuple[TrialRecord, ...]:
     """Return the records of trials; if only the session's ``verdict`` is known, each trial's validity is open."""
-    reasons = {exclusion.trial: exclusion.reason for exclusion in own}
+    reasons = {exclusion.trial: exclusion.reason for exclusion in session_exclusions}
     is_hidden = verdict is False and all(row["valid"] is not False for row in rows)
     answered: dict[tuple[int, int], int] = {}
     unconfirmed = progress_of(lines).unconfirmed

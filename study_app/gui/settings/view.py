@@ -149,8 +149,8 @@ class _OffsetForm(QWidget):
                 editor.show_refusal(str(refusal))
                 editor.control.setFocus()
                 return
-        mean_ms, spread_ms, how = values
-        self.kept.emit(mean_ms, spread_ms or 0.0, how)
+        mean_ms, spread_ms, method = values
+        self.kept.emit(mean_ms, spread_ms or 0.0, method)
 
 
 def _offset_sentence(offset: DisplayOffset | None, screen: str) -> str:
@@ -161,10 +161,10 @@ def _offset_sentence(offset: DisplayOffset | None, screen: str) -> str:
         )
     text = f"{write_number(offset.mean_ms, _DECIMALS)} ± {write_number(offset.spread_ms, _DECIMALS)} ms"
     when = f", {offset.measured}" if offset.measured else ""
-    where = (
+    note = (
         "" if offset.screen == screen else f" It was measured on another screen ({offset.screen}) and is not used here."
     )
-    return f"{text} ({offset.how}{when}).{where}"
+    return f"{text} ({offset.how}{when}).{note}"
 
 
 class DisplayTest(QWidget):
@@ -473,9 +473,9 @@ class MachinePlace(Place):
         titles = vbox(label("This machine", "title"), label(about, "body", "text2", wraps=True), spacing=4)
         head = hbox((titles, 1), self.check, self.undo, spacing=16, margins=(SHADOW, 0, SHADOW, 0))
         foot = hbox(self.kept_in, margins=(SHADOW, 0, SHADOW, 0))
-        inside = QWidget()
-        vbox(head, (self._body, 1), foot, spacing=20, margins=(30, 30, 30, 22), parent=inside)
-        vbox(scrolled(inside), margins=0, parent=self)
+        content = QWidget()
+        vbox(head, (self._body, 1), foot, spacing=20, margins=(30, 30, 30, 22), parent=content)
+        vbox(scrolled(content), margins=0, parent=self)
 
     def enter(self) -> None:
         """Show the screens again, since one may have been plugged in."""
@@ -541,16 +541,16 @@ class MachinePlace(Place):
 def _width_sentence(settings: MachineSettings, screen: ScreenShown) -> str:
     """Return a sentence about the screen width that the system reports."""
     reported = screen.width_mm > 0
-    known = f"The system reports {screen.width_mm:.0f} mm." if reported else "The system does not report the width."
-    return known if settings.screen_width_mm is None else f"{known} The measured value is used instead."
+    sentence = f"The system reports {screen.width_mm:.0f} mm." if reported else "The system does not report the width."
+    return sentence if settings.screen_width_mm is None else f"{sentence} The measured value is used instead."
 
 
 def _text_size_sentence(settings: MachineSettings, screen: ScreenShown, scale: float) -> str:
     """Return a sentence about the size of the participant's text."""
-    seen, least = settings.x_height_deg(screen.width_px, screen.width_mm), f"{LEAST_X_HEIGHT_DEG:g}°"
-    if seen is None:
-        enlarged = f"Measure the viewing distance; text is then enlarged until the letter x subtends {least}."
+    angle_deg, recommended = settings.x_height_deg(screen.width_px, screen.width_mm), f"{LEAST_X_HEIGHT_DEG:g}°"
+    if angle_deg is None:
+        enlarged = f"Measure the viewing distance; text is then enlarged until the letter x subtends {recommended}."
         return f"{enlarged} Until then, text is shown at its default size."
     if scale == 1.0:
-        return f"Default size: the letter x subtends {seen:.2f}°; at least {least} is recommended."
-    return f"{scale:.2f} times the default size: the letter x subtends {least} instead of {seen:.2f}°."
+        return f"Default size: the letter x subtends {angle_deg:.2f}°; at least {recommended} is recommended."
+    return f"{scale:.2f} times the default size: the letter x subtends {recommended} instead of {angle_deg:.2f}°."

@@ -170,20 +170,20 @@ class Stage(QWidget):
 
     def show_moment(self, at_s: float) -> None:
         """Show a time [s], or the nearest one within the recording."""
-        shown = self.shown
-        self.at_s = at_s = min(max(at_s, shown.begins_s), shown.ends_s)
-        view = shown.view(shown.drawn_s(at_s) if self.as_seen else at_s)
-        sample = shown.samples[shown.index(at_s)]
+        recording = self.shown
+        self.at_s = at_s = min(max(at_s, recording.begins_s), recording.ends_s)
+        view = recording.view(recording.drawn_s(at_s) if self.as_seen else at_s)
+        sample = recording.samples[recording.index(at_s)]
         self.tank.show_moment(view, self._make_arrows(view, sample))
         if self.forces is not None:
             self.forces.cursor.setValue(at_s)
         self.line.show_time(at_s)
         speed = f"{np.linalg.norm(sample['velocity_mps']):.3f} m/s in the scene"
         sent, requested = (np.linalg.norm(sample[name]) for name in ("device_force_n", "force_n"))
-        force = () if shown.blinded else (f"sent {sent:.3f} N", f"requested {requested:.3f} N")
-        self.numbers.setText("   ".join((f"{at_s:.3f} s", f"sample {shown.index(at_s) + 1}", *force, speed)))
-        before = [mark for mark in shown.marks if mark.at_s <= at_s]
-        self.happened.show_text(f"{before[-1].at_s:.2f} s: {before[-1].text}" if before else "")
+        force = () if recording.blinded else (f"sent {sent:.3f} N", f"requested {requested:.3f} N")
+        self.numbers.setText("   ".join((f"{at_s:.3f} s", f"sample {recording.index(at_s) + 1}", *force, speed)))
+        earlier = [mark for mark in recording.marks if mark.at_s <= at_s]
+        self.happened.show_text(f"{earlier[-1].at_s:.2f} s: {earlier[-1].text}" if earlier else "")
 
     def describe_moment(self) -> None:
         """Describe the displayed moment to screen readers."""

@@ -51,14 +51,14 @@ class Card(Themed, QWidget):
 def scrolled(content: QWidget | QLayout) -> QScrollArea:
     """Return ``content`` in a scroll area that scrolls only vertically."""
     if isinstance(content, QLayout):
-        inside = QWidget()
-        inside.setLayout(content)
+        widget = QWidget()
+        widget.setLayout(content)
     else:
-        inside = content
+        widget = content
     area = QScrollArea(widgetResizable=True)
     area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
     area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-    area.setWidget(inside)
+    area.setWidget(widget)
     return area
 
 

@@ -386,8 +386,8 @@ def _widest_word(text: str, scale: float) -> float:
 @lru_cache(maxsize=1024)
 def _size_of(text: str, scale: float) -> QSize:
     """Return the size of an answer, which fits its longest word and is large enough to be clicked [px]."""
-    least = target_px(scale)
-    return QSize(round(max(least, _widest_word(text, scale) + _TAKEN * scale)), round(least))
+    target = target_px(scale)
+    return QSize(round(max(target, _widest_word(text, scale) + _TAKEN * scale)), round(target))
 
 
 @lru_cache(maxsize=1024)

@@ -95,9 +95,9 @@ class _Foot(QWidget):
 
     def _paint_count(self, painter: QPainter, end: int) -> int:
         """Draw the count of answers up to ``end``; return its start [px]."""
-        before, after = round(14 * self._scale), round(4 * self._scale)
-        width = before + self._width(self._tabular, self._count) + after
-        place = self._place_in_line(end - width, width).adjusted(before, 0, -after, 0)
+        left_gap, right_gap = round(14 * self._scale), round(4 * self._scale)
+        width = left_gap + self._width(self._tabular, self._count) + right_gap
+        place = self._place_in_line(end - width, width).adjusted(left_gap, 0, -right_gap, 0)
         self._draw_text(painter, place, self._count, self._tabular, PARTICIPANT.text2)
         return end - width
 
@@ -333,9 +333,11 @@ class QuestionsPage(PageWidget):
     def _show_parts(self) -> None:
         """Divide the questions into parts that fit, and show the part with the focus."""
         focused = self.focusWidget()
-        kept = question_of(focused) if focused is not None else None
+        focused_question = question_of(focused) if focused is not None else None
         self.parts = self.arrange_parts(self.asked)
-        index = next((n for n, part in enumerate(self.parts) if kept in part), min(self._part, len(self.parts) - 1))
+        index = next(
+            (n for n, part in enumerate(self.parts) if focused_question in part), min(self._part, len(self.parts) - 1)
+        )
         self._show_part(index)
 
     def _show_part(self, index: int) -> None:
@@ -344,8 +346,8 @@ class QuestionsPage(PageWidget):
         for field in self.fields:
             field.setVisible(field in part)
             field.last = field is part[-1]
-        for before, after in zip(part, (*part[1:], self.button), strict=True):
-            QWidget.setTabOrder(before.focusProxy() or before, after.focusProxy() or after)
+        for previous, following in zip(part, (*part[1:], self.button), strict=True):
+            QWidget.setTabOrder(previous.focusProxy() or previous, following.focusProxy() or following)
         self._make_tabs()
         self._update_foot()
 
