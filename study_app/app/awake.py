@@ -36,7 +36,7 @@ class Awake:
         if sys.platform == "win32":
             _set_execution_state(CONTINUOUS)
         elif sys.platform == "darwin" and self._activity:
-            _send(_process_info(), "endActivity:", ctypes.c_void_p(self._activity))
+            _send(_process_info_object(), "endActivity:", ctypes.c_void_p(self._activity))
             self._activity = None
         elif sys.platform == "linux":
             from PySide6.QtDBus import QDBusConnection  # noqa: PLC0415 - only sessions need it
@@ -66,18 +66,18 @@ def _inhibit_screen_saver() -> bool:
 
 def _begin_activity() -> int | None:
     """Begin an activity without App Nap and idle sleep (macOS; untested); return the object that ends it."""
-    reason = _send(_class("NSString"), "stringWithUTF8String:", ctypes.c_char_p(_REASON.encode()))
+    reason = _send(_find_class("NSString"), "stringWithUTF8String:", ctypes.c_char_p(_REASON.encode()))
     options = ctypes.c_uint64(USER_INITIATED | LATENCY_CRITICAL | SCREEN_ON)
-    activity = _send(_process_info(), "beginActivityWithOptions:reason:", options, ctypes.c_void_p(reason))
+    activity = _send(_process_info_object(), "beginActivityWithOptions:reason:", options, ctypes.c_void_p(reason))
     return _send(activity, "retain") if activity else None
 
 
-def _process_info() -> int | None:
-    return _send(_class("NSProcessInfo"), "processInfo")
+def _process_info_object() -> int | None:
+    return _send(_find_class("NSProcessInfo"), "processInfo")
 
 
-def _class(name: str) -> int | None:
-    library = _objective_c()
+def _find_class(name: str) -> int | None:
+    library = _load_objective_c()
     library.objc_getClass.restype = ctypes.c_void_p
     address: int | None = library.objc_getClass(name.encode())
     return address
@@ -85,12 +85,12 @@ def _class(name: str) -> int | None:
 
 def _send(receiver: int | None, message: str, *arguments: Any) -> int | None:
     """Send a message to an Objective-C object; return the resulting object."""
-    library = _objective_c()
+    library = _load_objective_c()
     library.sel_registerName.restype = library.objc_msgSend.restype = ctypes.c_void_p
     selector = ctypes.c_void_p(library.sel_registerName(message.encode()))
     result: int | None = library.objc_msgSend(ctypes.c_void_p(receiver), selector, *arguments)
     return result
 
 
-def _objective_c() -> Any:
+def _load_objective_c() -> Any:
     return ctypes.CDLL("/usr/lib/libobjc.dylib")

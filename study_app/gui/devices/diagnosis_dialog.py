@@ -12,6 +12,7 @@ from study_app.devices.doctor import Report, report_lines
 from study_app.devices.doctor_worker import ExaminationClient, start_examination
 from study_app.devices.registry import descriptor_of, title_of
 from study_app.errors import StoreError
+from study_app.gui.kit.devices import as_sentence
 from study_app.gui.theme.theme import Theme
 from study_app.gui.theme.themed import apply_theme
 from study_app.gui.widgets.boxes import STRETCH, hbox, vbox
@@ -149,13 +150,13 @@ class DiagnosisDialog(QDialog):
         self.close_button.show_action("", "Close")
         self._end_process()
         if not isinstance(conclusion, Report):
-            self._show_step(_as_sentence(conclusion.sentence), "bad", "warning", "bad")
+            self._show_step(as_sentence(conclusion.sentence), "bad", "warning", "bad")
             self.over.emit(False)
             return
         self.report = conclusion
         self.copy.setEnabled(True)
         well = conclusion.well
-        sentence = conclusion.conclusion if conclusion.failure is None else _as_sentence(conclusion.failure)
+        sentence = conclusion.conclusion if conclusion.failure is None else as_sentence(conclusion.failure)
         self._show_step(sentence, "text2" if well else "bad", "check" if well else "warning", "ok" if well else "bad")
         self.text.setPlainText(self._report_text())
         self.over.emit(well)
@@ -185,7 +186,7 @@ class DiagnosisDialog(QDialog):
         try:
             write_support(path, self._report_text())
         except StoreError as error:
-            self.saved.setText(_as_sentence(str(error)))
+            self.saved.setText(as_sentence(str(error)))
         else:
             self.saved.setText(
                 f"Saved as {path}. The file does not contain participant IDs, answers or liquid parameters."
@@ -204,10 +205,6 @@ class DiagnosisDialog(QDialog):
         self._start_pending = False
         self._end_process()
         super().done(result)
-
-
-def _as_sentence(text: str) -> str:
-    return text[:1].upper() + text[1:] + ("" if text.endswith((".", "!", "?")) else ".")
 
 
 _HELD = (

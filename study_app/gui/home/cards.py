@@ -44,14 +44,14 @@ class DeviceCard(Card):
         self.display = ActionButton("", "Display test", height=38)
         add_parts(self.column, 4, hbox((self.devices, 1), (self.display, 1), spacing=12))
 
-    def show_device(self, shown: DeviceShown) -> None:
-        self.icon.show_icon(shown.icon, "text2")
-        self.name.setText(shown.title)
-        self.state.show_state(shown.tone, shown.sign, shown.word)
-        for line, text in ((self.about, shown.can), (self.why, shown.why)):
+    def show_device(self, device: DeviceShown) -> None:
+        self.icon.show_icon(device.icon, "text2")
+        self.name.setText(device.title)
+        self.state.show_state(device.tone, device.sign, device.word)
+        for line, text in ((self.about, device.can), (self.why, device.why)):
             line.setText(text)
             line.setVisible(bool(text))
-        set_ink(self.why, "warn" if shown.tone == "warn" else "bad" if shown.tone == "bad" else "text2")
+        set_ink(self.why, "warn" if device.tone == "warn" else "bad" if device.tone == "bad" else "text2")
 
     def show_screens(self, lines: tuple[str, ...]) -> None:
         self.screens.setText("\n".join(lines))

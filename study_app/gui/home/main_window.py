@@ -190,7 +190,7 @@ class MainWindow(Themed, QMainWindow):
         self.setWindowTitle("Liquid Study")
         self.setMinimumSize(_LEAST)
         self.notice: Question | None = None
-        self._notice_of = ""  # the page of the message
+        self._notice_page = ""
         self._in_session = False  # whether a session uses the screen
         self.not_opened: BaseException | None = None  # the shown error of a page that could not be opened
         self._focused: QWidget | None = None
@@ -227,9 +227,9 @@ class MainWindow(Themed, QMainWindow):
                 raise
             finally:
                 QGuiApplication.restoreOverrideCursor()
-            page.message.connect(lambda title, sentence: self.show_message(title, sentence, of=name))
+            page.message.connect(lambda title, sentence: self.show_message(title, sentence, page=name))
             page.file_message.connect(
-                lambda title, sentence, file: self.show_message(title, sentence, of=name, file=file)
+                lambda title, sentence, file: self.show_message(title, sentence, page=name, file=file)
             )
             page.message_over.connect(lambda: self._close_notice(name))
             page.go_asked.connect(self.go)
@@ -295,33 +295,33 @@ class MainWindow(Themed, QMainWindow):
             self._focused.setFocus()
         self._places[self._here].enter()
 
-    def show_message(self, title: str, sentence: str, *, of: str = "", file: Path | None = None) -> None:
-        """Show a message, with a button that opens ``file``; it closes when the page ``of`` is left."""
-        opens = None if file is None else ActionButton("file", "Open the file")
-        if opens is not None and file is not None:
-            opens.clicked.connect(lambda: open_here(file))
-        self._show_notice(Question(self, self.theme, title, sentence, other=opens), of)
+    def show_message(self, title: str, sentence: str, *, page: str = "", file: Path | None = None) -> None:
+        """Show a message, with a button that opens ``file``; it closes when ``page`` is left."""
+        open_file = None if file is None else ActionButton("file", "Open the file")
+        if open_file is not None and file is not None:
+            open_file.clicked.connect(lambda: open_here(file))
+        self._show_notice(Question(self, self.theme, title, sentence, other=open_file), page)
 
     def ask_about_device(
-        self, title: str, sentence: str, again: Callable[[], object], diagnose: Callable[[], object] | None
+        self, title: str, sentence: str, retry: Callable[[], object], diagnose: Callable[[], object] | None
     ) -> None:
         """Show that a device failed, and offer to try again and, if possible, to diagnose it."""
-        go_on = ActionButton("repeat", "Try again", role="primary")
+        try_again = ActionButton("repeat", "Try again", role="primary")
         other = None if diagnose is None else ActionButton("pulse", "Diagnose …")
         if other is not None and diagnose is not None:
             other.clicked.connect(diagnose)
-        notice = Question(self, self.theme, title, sentence, go_on, back="Close", other=other)
-        notice.accepted.connect(again)
+        notice = Question(self, self.theme, title, sentence, try_again, back="Close", other=other)
+        notice.accepted.connect(retry)
         self._show_notice(notice)
 
-    def _show_notice(self, notice: Question, of: str = "") -> None:
+    def _show_notice(self, notice: Question, page: str = "") -> None:
         notice.finished.connect(notice.deleteLater)
-        self.notice, self._notice_of = notice, of
+        self.notice, self._notice_page = notice, page
         if not self._in_session:  # it would cover the session
             notice.show()
 
-    def _close_notice(self, of: str) -> None:
-        if self.notice is not None and self._notice_of == of and isValid(self.notice):
+    def _close_notice(self, page: str) -> None:
+        if self.notice is not None and self._notice_page == page and isValid(self.notice):
             self.notice.accept()
 
     def show_theme(self, theme: Theme) -> None:

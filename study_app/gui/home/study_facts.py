@@ -171,7 +171,7 @@ def read_studies(
             is_next = study.name == last
         else:
             is_next = study.source == _FIRST_STUDY and has_no_session
-        edited_s = 0.0 if study.draft is None else _seconds(study.draft.kept_at)
+        edited_s = 0.0 if study.draft is None else _epoch_seconds(study.draft.kept_at)
         return -edited_s, study.source not in opened, not is_next
 
     return tuple(sorted(facts, key=order))
@@ -191,13 +191,13 @@ def holds_liquids_alone(source: str) -> bool:
     try:
         path = protocol_file(source)
         state = path.stat()
-        return _holds_liquids_alone(path, state.st_mtime_ns, state.st_size)
+        return _is_liquid_file(path, state.st_mtime_ns, state.st_size)
     except (ProtocolError, OSError):
         return False
 
 
 @lru_cache(maxsize=256)
-def _holds_liquids_alone(path: Path, _changed_ns: int, _size: int) -> bool:
+def _is_liquid_file(path: Path, _changed_ns: int, _size: int) -> bool:
     try:
         return is_scene_file(path)
     except ProtocolError:
@@ -275,13 +275,13 @@ def _draft_note(source: str, draft_words: LoadWords) -> DraftNote | None:
 
 def time_text(moment: str) -> str:
     """Return a time as text: "today 14:02" or "2026-11-20 14:02"."""
-    if not (seconds := _seconds(moment)):
+    if not (seconds := _epoch_seconds(moment)):
         return "an unknown time"
     kept, now = (datetime.fromtimestamp(at).astimezone() for at in (seconds, time.time()))
     return f"today {kept:%H:%M}" if kept.date() == now.date() else f"{kept:%Y-%m-%d %H:%M}"
 
 
-def _seconds(moment: str) -> float:
+def _epoch_seconds(moment: str) -> float:
     """Return a time as seconds since 1970; 0 if it cannot be read."""
     try:
         return datetime.fromisoformat(moment).timestamp()

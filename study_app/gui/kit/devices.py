@@ -76,7 +76,7 @@ def device_named(name: str, devices: Iterable[DeviceShown]) -> DeviceShown:
             sign="warning",
             word="Not known",
             can="",
-            why=_as_sentence(str(error)),
+            why=as_sentence(str(error)),
         )
     for device in devices:
         if device.name.partition(":")[0] == kind:
@@ -135,8 +135,8 @@ def _device_shown(name: str, backends: Sequence[Backend]) -> DeviceShown:
         tone=tone,
         sign=sign,
         word=word,
-        can=_as_sentence(backends[0].can),
-        why="" if tone == "ok" and not best_backend.why else _as_sentence(best_backend.why),
+        can=as_sentence(backends[0].can),
+        why="" if tone == "ok" and not best_backend.why else as_sentence(best_backend.why),
         ways=tuple(f"{backend.by}: {backend.state}" for backend in backends),
         simulated=device is not None and device.simulated,
         choosable=choosable,
@@ -172,7 +172,8 @@ def _descriptor(name: str) -> DeviceDescriptor | None:
     return DEVICES.get(name.partition(":")[0])
 
 
-def _as_sentence(text: str) -> str:
+def as_sentence(text: str) -> str:
+    """Return a text with a capital letter at the start and a full stop at the end, or ""."""
     return text[:1].upper() + text[1:] + ("" if not text or text[-1] in ".!?" else ".")
 
 

@@ -209,11 +209,9 @@ class ForceCard(_PlotCard):
         a, b = ("A (felt now)", "B (same motion)") if view.felt == "A" else ("A (same motion)", "B (felt now)")
         self.legend.show_entries(((A, a), (B, b), (_LIMIT, f"limit {limit:g} N")))
         trace = view.trace
-        nothing = np.empty(0)
-        t_s = nothing if trace is None else trace.t_s
-        forces = (
-            (nothing, nothing) if trace is None else (_vector_sizes(trace.force_b_n), _vector_sizes(trace.force_a_n))
-        )
+        empty = np.empty(0)
+        t_s = empty if trace is None else trace.t_s
+        forces = (empty, empty) if trace is None else (_vector_sizes(trace.force_b_n), _vector_sizes(trace.force_a_n))
         self.plot.show_curves(t_s, forces, limit)
 
 

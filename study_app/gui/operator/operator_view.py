@@ -430,14 +430,14 @@ def stages(protocol: Protocol, schedule: Schedule) -> tuple[Stage, ...]:
             index += 1
             continue
         last = index
-        while last + 1 < len(schedule.steps) and _same_block(step, schedule.steps[last + 1]):
+        while last + 1 < len(schedule.steps) and _is_in_same_block(step, schedule.steps[last + 1]):
             last += 1
         rows.extend(_block_rows(protocol, schedule, index, last, language))
         index = last + 1
     return tuple(rows)
 
 
-def _same_block(trial: Trial, other: Step) -> bool:
+def _is_in_same_block(trial: Trial, other: Step) -> bool:
     return isinstance(other, Trial) and other.block == trial.block
 
 

@@ -74,9 +74,10 @@ class WriteDialog(Work):
 _NEEDS: Final = {"by": "Please enter a name. It will be recorded.", "reason": REASON}
 
 
-def _decision_fields(by: str, who: str, example: str) -> tuple[Field, Field]:
+def _decision_fields(person_label: str, example: str) -> tuple[Field, Field]:
     """Return the fields for the name of the person who decides, and the reason."""
-    return Field("by", by, placeholder=who), Field("reason", "Reason", placeholder=f"For example: {example}")
+    person = Field("by", person_label, placeholder="Your name or initials, such as AK")
+    return person, Field("reason", "Reason", placeholder=f"For example: {example}")
 
 
 class LeaveOutDialog(Question):
@@ -111,7 +112,7 @@ class LeaveOutDialog(Question):
                     "session", "Session", {(facts.participant, facts.session): facts.name for facts in sessions}
                 ),
                 choice_field("trial", "Scope", {}),
-                *_decision_fields("By", "Your name or initials, such as AK", "fell asleep"),
+                *_decision_fields("By", "fell asleep"),
             ),
             needs=_NEEDS,
             width=_QUESTION_PX,
@@ -164,7 +165,7 @@ def unblind_question(parent: QWidget, theme: Theme, study: str, incomplete: int)
         "table, figure and report. This cannot be undone. Your name, the reason and the time are stored "
         "with the data.",
         ActionButton("eye", "Unblind", role="danger"),
-        fields=_decision_fields("Name", "Your name or initials, such as AK", "collection closed"),
+        fields=_decision_fields("Name", "collection closed"),
         needs=_NEEDS,
         warning=warning,
         width=_QUESTION_PX,
@@ -187,7 +188,7 @@ def take_back_question(parent: QWidget, theme: Theme, exclusion: Exclusion) -> Q
         f"{action}: {exclusion_text(exclusion)}",
         f"{why} Your name, the reason and the time are stored in exclusions_reversed.jsonl.",
         ActionButton("undo", action, role="primary"),
-        fields=_decision_fields("By", "Your name or initials, such as AK", "wrong participant"),
+        fields=_decision_fields("By", "wrong participant"),
         needs=_NEEDS,
         width=_QUESTION_PX,
     )

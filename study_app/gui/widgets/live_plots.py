@@ -313,7 +313,7 @@ def _time_ticks(span_s: float) -> list[tuple[float, str]]:
 
 
 def _spread_apart(positions: Sequence[float], gap: float, reach: float) -> list[float]:
-    """Return ``positions``, moved so that they are at gap ``gap`` apart and within ±reach; their order is kept."""
+    """Return ``positions``, moved to be at least ``gap`` apart and within ±reach, in the same order."""
     order = np.argsort(positions, kind="stable")
     moved = np.asarray(positions, float)[order]
     for _ in range(8):

@@ -115,7 +115,7 @@ class _QuestionText(QWidget):
         ):
             painter.setFont(face)
             painter.setPen(QColor(colour))
-            painter.drawText(self._mirror_place(place), self._flags, text)
+            painter.drawText(self._mirror_place(place), self._text_flags, text)
         if self.missing:
             room = self._mirror_place(
                 QRect(left, note_top + (note_high - round(self._sign)) // 2, self._note_left, note_high)
@@ -126,7 +126,7 @@ class _QuestionText(QWidget):
         painter.end()
 
     @property
-    def _flags(self) -> int:
+    def _text_flags(self) -> int:
         return int(line_start(self) | Qt.AlignmentFlag.AlignTop) | int(Qt.TextFlag.TextWordWrap)
 
     @property
@@ -138,7 +138,7 @@ class _QuestionText(QWidget):
         return QRectF(QStyle.visualRect(self.layoutDirection(), self.rect(), place))
 
     def _bounds(self, face: QFont, text: str, width: int) -> QRect:
-        return QFontMetrics(face).boundingRect(0, 0, width, _MAX_HEIGHT, self._flags, text)
+        return QFontMetrics(face).boundingRect(0, 0, width, _MAX_HEIGHT, self._text_flags, text)
 
     def _heights(self, width: int) -> tuple[int, int]:
         """Return the height of number and text, and that of the note [px]."""

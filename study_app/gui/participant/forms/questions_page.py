@@ -272,10 +272,10 @@ class QuestionsPage(PageWidget):
         return self.height() - head - tab_height - self.foot.height()
 
     def focus_first(self) -> None:
-        self.go_to(self._first)
+        self.go_to(self._first_to_answer)
 
     @property
-    def _first(self) -> QuestionField:
+    def _first_to_answer(self) -> QuestionField:
         asked = self.asked
         return next((field for field in asked if not field.is_answered), asked[0])
 
@@ -392,7 +392,9 @@ class QuestionsPage(PageWidget):
     def _update_foot(self) -> None:
         asked = self.asked
         focused = self.focusWidget()
-        question = question_of(focused) if focused is not None else self._first  # the question that will get the focus
+        question = (
+            question_of(focused) if focused is not None else self._first_to_answer
+        )  # the question that will get the focus
         keys = "" if question is None else question.answer_keys
         self.foot.show_state(self.message, sum(field.is_answered for field in asked), len(asked), keys)
 

@@ -41,7 +41,7 @@ def _empty_sprite(half_width: float, half_height: float, ratio: float) -> tuple[
     return Sprite(image, half_columns / ratio, half_rows / ratio), painter
 
 
-def _ink(colour: str, alpha: float = 1.0) -> QColor:
+def _colour_with_alpha(colour: str, alpha: float = 1.0) -> QColor:
     ink = QColor(colour)
     ink.setAlphaF(alpha)
     return ink
@@ -65,8 +65,8 @@ def ball_sprite(radius: float, ratio: float, haze: float) -> Sprite:
     painter.setBrush(body)
     painter.drawEllipse(disc)
     bounce = QRadialGradient(QPointF(0.02, 0.78), 0.62)
-    bounce.setColorAt(0, _ink("#BFD3D8", 0.34))
-    bounce.setColorAt(1, _ink("#BFD3D8", 0))
+    bounce.setColorAt(0, _colour_with_alpha("#BFD3D8", 0.34))
+    bounce.setColorAt(1, _colour_with_alpha("#BFD3D8", 0))
     painter.setBrush(bounce)
     painter.drawEllipse(disc)
     _paint_rim(painter)
@@ -76,11 +76,11 @@ def ball_sprite(radius: float, ratio: float, haze: float) -> Sprite:
     painter.scale(0.34, 0.22)
     shine = QRadialGradient(QPointF(0, 0), 1)
     for place, alpha in ((0, 0.95), (0.3, 0.72), (0.65, 0.22), (1, 0)):
-        shine.setColorAt(place, _ink("#FFFFFF", alpha))
+        shine.setColorAt(place, _colour_with_alpha("#FFFFFF", alpha))
     painter.setBrush(shine)
     painter.drawEllipse(QRectF(-1, -1, 2, 2))
     painter.restore()
-    painter.setBrush(_ink(TANK.water_light, 0.20 * haze))
+    painter.setBrush(_colour_with_alpha(TANK.water_light, 0.20 * haze))
     painter.drawEllipse(disc)
     painter.end()
     return sprite
@@ -90,7 +90,7 @@ def _paint_rim(painter: QPainter) -> None:
     """Paint the reflection of the floor on the ball's lower edge."""
     along = QLinearGradient(-0.85, 0, 0.75, 0)
     for place, alpha in ((0, 0), (0.3, 0.62), (0.6, 0.5), (1, 0)):
-        along.setColorAt(place, _ink("#FFD9A6", alpha))
+        along.setColorAt(place, _colour_with_alpha("#FFD9A6", alpha))
     painter.setPen(QPen(along, 0.035, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap))
     painter.setBrush(Qt.BrushStyle.NoBrush)
     painter.drawArc(QRectF(-0.965, -0.965, 1.93, 1.93), 200 * 16, 115 * 16)
@@ -105,7 +105,7 @@ def shadow_sprite(radius: float, ratio: float, flat: float) -> Sprite:
     painter.scale(reach, reach * flat)
     dark = QRadialGradient(QPointF(0, 0), 1)
     for place, alpha in ((0, 0.78), (0.38, 0.62), (0.68, 0.24), (1, 0)):
-        dark.setColorAt(place, _ink(TANK.shadow, alpha))
+        dark.setColorAt(place, _colour_with_alpha(TANK.shadow, alpha))
     painter.setBrush(dark)
     painter.drawEllipse(QRectF(-1, -1, 2, 2))
     painter.end()
@@ -119,15 +119,15 @@ def ring_sprite(radius: float, ratio: float, stroke: float) -> Sprite:
     sprite, painter = _empty_sprite(reach, reach, ratio)
     glow = QRadialGradient(QPointF(0, 0), reach)
     for place, alpha in ((0, 0.07), (0.5, 0.13), (0.655, 0.42), (0.72, 0.30), (0.86, 0.10), (1, 0)):
-        glow.setColorAt(place, _ink("#CFE9F7", alpha))
+        glow.setColorAt(place, _colour_with_alpha("#CFE9F7", alpha))
     painter.setBrush(glow)
     painter.drawEllipse(QPointF(0, 0), reach, reach)
     painter.setBrush(Qt.BrushStyle.NoBrush)
-    painter.setPen(QPen(_ink(TANK.lit, 0.22), stroke * 1.5))
+    painter.setPen(QPen(_colour_with_alpha(TANK.lit, 0.22), stroke * 1.5))
     painter.drawEllipse(QPointF(0, 0), radius, radius)
-    painter.setPen(QPen(_ink("#A9D3E8", 0.78), stroke * 0.8))
+    painter.setPen(QPen(_colour_with_alpha("#A9D3E8", 0.78), stroke * 0.8))
     painter.drawEllipse(QPointF(0, 0), radius, radius)
-    painter.setPen(QPen(_ink(TANK.lit, 0.92), stroke * 0.42))
+    painter.setPen(QPen(_colour_with_alpha(TANK.lit, 0.92), stroke * 0.42))
     for quarter in range(4):
         angle = math.pi / 4 + quarter * math.pi / 2
         inner, outer = (QPointF(radius * r * math.cos(angle), radius * r * math.sin(angle)) for r in _TICK)
@@ -145,7 +145,7 @@ def diamond_sprite(radius: float, ratio: float, stroke: float) -> Sprite:
     path = QPainterPath(corners[0])
     for corner in (*corners[1:], corners[0]):
         path.lineTo(corner)
-    painter.setPen(dashed_pen(_ink(TANK.dim, 0.86), stroke, math.hypot(radius, radius), 6))
+    painter.setPen(dashed_pen(_colour_with_alpha(TANK.dim, 0.86), stroke, math.hypot(radius, radius), 6))
     painter.drawPath(path)
     painter.end()
     return sprite
