@@ -404,7 +404,7 @@ class LabTank(Themed, QWidget):
             painter.drawImage(QPointF(left, top), _note_plate(note, self.devicePixelRatioF()))
 
     def _paint_corners(self, painter: QPainter) -> None:
-        """Paint the area corners the rounded corners in the window's colour, and the focus ring."""
+        """Paint the area outside the rounded corners in the window's colour, and the focus ring."""
         area = QRectF(self.rect())
         corners = QPainterPath()
         corners.addRect(area)

@@ -195,7 +195,7 @@ def themed_svg(svg: bytes, colours: Mapping[str, str], theme: Theme) -> bytes:
 
 
 def _role_colour(theme: Theme, role: str) -> str:
-    """Return the colour channel a figure's role; "band" is a pale accent on which lines are visible."""
+    """Return the colour of a role in figures; "band" is a pale accent on which lines are visible."""
     if role == "second":
         return SECOND_DARK if theme.dark else SECOND_LIGHT
     if role != "band":

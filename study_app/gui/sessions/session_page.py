@@ -224,7 +224,7 @@ def _trial_records(
 
 
 def _choice_texts(answers: Mapping[str, Answer]) -> tuple[str, ...]:
-    """Return answers as "item: value", in the order in which they were first answers."""
+    """Return answers as "item: value", in the order in which they were first given."""
     in_order = sorted(answers.items(), key=lambda entry: entry[1].first_s or 0.0)
     return tuple(f"{item}: {'cannot judge' if answer.value is None else answer.value}" for item, answer in in_order)
 

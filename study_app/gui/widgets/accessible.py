@@ -33,7 +33,7 @@ def describe_plot(plot: QWidget, name: str, sentence: str) -> None:
 
 
 class PlainLabel(QLabel):
-    """A label that shows its text literally: "<b>" and "&" in a study are no markup."""
+    """A label that shows its text literally: "<b>" and "&" in a study are not markup."""
 
     def __init__(
         self,

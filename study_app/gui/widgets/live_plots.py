@@ -140,7 +140,7 @@ class TracePlot(Plot):
 
     Parameters
     ----------
-    reach : initial range, from −reach to reach; the plot extends if a curve goes limit it
+    reach : initial range, from −reach to reach; the plot extends if a curve goes beyond it
     """
 
     def __init__(self, span_s: float, reach: float, names: Sequence[str] = NAMES) -> None:

@@ -100,7 +100,7 @@ def grid(width: float, height: float, texts: TextWidths, margin: float, *, text_
     number_width, statement_gap = _NUMBER * text, _AFTER_STATEMENT * scale
     available = content - number_width - statement_gap - judge - gap
     statements = 400 * scale if text <= scale else 480 * text  # cells shrink before statements do
-    narrowest = max(52 * scale, texts.word * text / 2 + 2)  # a label may be as available as two columns
+    narrowest = max(52 * scale, texts.word * text / 2 + 2)  # a label may be as wide as two columns
     fewest = min(max((available - statements) / _POINTS, narrowest), max(98 * scale, narrowest))
     pitch = min(max((available - texts.statement * text - 8) / _POINTS, fewest), 120 * max(scale, 0.8 * text))
     return Grid(
@@ -384,7 +384,7 @@ class QuestionnaireWidget(QuestionsPage):
         return [list(asked[first : first + per_page]) for first in range(0, len(asked), per_page)]
 
     def lead_height(self) -> int:
-        """Return the height above the statements [px]; a is_short statements start at a third of the page's height."""
+        """Return the height above the statements [px]; a few statements start at a third of the page's height."""
         room = self.room_height(tabs=False)
         needed = self._heading.height() + sum(field.minimumHeight() for field in self.fields)
         is_short = len(self.parts) == 1 and 2 * needed <= room

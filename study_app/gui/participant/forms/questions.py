@@ -40,8 +40,8 @@ from study_app.protocol.questions import (
 from study_app.protocol.source import UNPRINTABLE, characters
 from study_app.protocol.wording import Words
 
-_SHORT = 12  # letters of an option up to which three are side by side
-_MEDIUM = 28  # up to which two are
+_SHORT = 12  # options with at most this many letters are three in a row
+_MEDIUM = 28  # options with at most this many letters are two in a row
 _MAX_COLUMNS = 4
 
 
