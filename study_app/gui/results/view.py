@@ -436,7 +436,7 @@ class ResultsPlace(Place):
             case StudiesFound() if newest:
                 self._show_found_studies(answer)
             case SessionsFound() if newest:
-                self._take_sessions(answer)
+                self._show_found_sessions(answer)
             case ProposedExclusions() if newest:
                 self._update_view(proposed=answer.exclusions, rules=answer.rules)
             case StudyFound() if newest:
