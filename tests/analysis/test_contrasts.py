@@ -629,6 +629,12 @@ def test_the_smallest_difference_is_slightly_above_that_of_published_tables(
     assert of_t < detectable_difference(*sizes, alpha=0.05, expected=expected)[1] < 1.15 * of_t
 
 
+def test_a_difference_of_more_than_3_sd_is_infinite_and_a_smaller_one_is_not() -> None:
+    """Student's t of 5 pairs must exceed 8.61 at α = .001, a difference of 3.85 SD; of 8 pairs 3.00 at .02, 1.06 SD."""
+    assert detectable_difference(5, alpha=0.001, expected=None)[1] == math.inf
+    assert 1.06 < detectable_difference(8, alpha=0.02, expected=None)[1] < 3.0
+
+
 @pytest.mark.parametrize("groups", [(9,), (30,), (12, 6)])
 def test_so_many_studies_without_a_difference_show_equality(groups: tuple[int, ...]) -> None:
     """The t tests alone show it more often: the bootstrap must agree with them."""

@@ -196,8 +196,9 @@ def detectable_difference(
     """Return the half-width of the 95 % interval and the smallest mean difference that 80 % of studies detect [SD].
 
     The studies have ``n`` pairs, or two groups of ``n`` and ``second`` participants, whose t has the degrees of freedom
-    of the smaller group; a hypothesis without an ``expected`` direction is tested on both sides.
+    of the smaller group; a hypothesis without an ``expected`` direction is tested on both sides. A difference above
+    `MOST_SD` may be returned as infinite.
     """
     sizes, alternative = (n,) if second is None else (n, second), "two-sided" if expected is None else "greater"
     half = float(stdtrit(min(sizes) - 1, 0.975)) * math.sqrt(sum(1 / size for size in sizes))
-    return half, smallest_shift(*sizes, alpha=alpha, alternative=alternative, power=WANTED)
+    return half, smallest_shift(*sizes, alpha=alpha, alternative=alternative, power=WANTED, most=MOST_SD)

@@ -175,13 +175,21 @@ def p_differs(means: Means, alternative: str) -> DifferencePs:
 
 
 @cache
-def smallest_shift(*sizes: int, alpha: float, alternative: str, power: float) -> float:
+def smallest_shift(*sizes: int, alpha: float, alternative: str, power: float, most: float = math.inf) -> float:
     """Return the mean difference [SD] that all tests show in the share ``power`` of simulated studies.
 
     A study has pairs, or two groups of these ``sizes``, with normal numbers; ``alternative`` is "greater" or
-    "two-sided". The difference is infinite if a thousand standard errors are too few.
+    "two-sided". The difference is infinite if a thousand standard errors are too few, or if the t tests alone need
+    more than ``most``: the bootstrap of hundreds of thousands of resamples is then left out.
     """
-    shifts = [_smallest_shifts(means, alpha, alternative) for means in _simulated_means(sizes, alpha)]
+    if most < math.inf:
+        (means,) = _simulated_means(sizes, resamples=1)
+        if float(np.quantile(_smallest_shifts_of_t(means, alpha, alternative), power)) > most:
+            return math.inf
+    shifts = [
+        np.maximum(_smallest_shifts_of_t(means, alpha, alternative), _smallest_shifts_of_bootstrap(means, alpha))
+        for means in _simulated_means(sizes, resamples_for(alpha))
+    ]
     return float(np.quantile(np.concatenate(shifts), power))
 
 
@@ -192,15 +200,15 @@ def equivalence_power(*sizes: int, alpha: float, bound: float) -> float:
     A study has pairs, or two groups of these ``sizes``, with normal numbers.
     """
     shares = []
-    for means in _simulated_means(sizes, alpha):
+    for means in _simulated_means(sizes, resamples_for(alpha)):
         p = [test(-bound) for side in (means, means.opposite()) for test in (side.p_t, side.p_bootstrap)]
         shares.append(np.max(p, axis=0) <= alpha)
     return float(np.concatenate(shares).mean())
 
 
-def _simulated_means(sizes: tuple[int, ...], alpha: float) -> Iterator[Means]:
+def _simulated_means(sizes: tuple[int, ...], resamples: int) -> Iterator[Means]:
     """Yield the means, or the differences of two groups' means, of simulated studies without a difference."""
-    draw, resamples = np.random.default_rng(1), resamples_for(alpha)
+    draw = np.random.default_rng(1)
     values = [draw.normal(size=(_SIMULATED_STUDIES, size)) for size in sizes]
     batch = math.ceil(_MAX_MEANS / resamples)
     for start in range(0, _SIMULATED_STUDIES, batch):
@@ -211,10 +219,14 @@ def _simulated_means(sizes: tuple[int, ...], alpha: float) -> Iterator[Means]:
         yield groups[0] if len(groups) == 1 else groups[0] - groups[1]
 
 
-def _smallest_shifts(means: Means, alpha: float, alternative: str) -> Array:
-    """Return the smallest shift of each study's values (studies,) with which all tests show a mean above 0."""
+def _smallest_shifts_of_bootstrap(means: Means, alpha: float) -> Array:
+    """Return the smallest shift of each study's values (studies,) with which the bootstrap shows a mean above 0."""
     rank = math.floor(alpha * (1 + len(means.lowest)))  # the most resampled means that may be at most 0
-    by_bootstrap = SAME - np.partition(means.lowest, rank - 1, axis=0)[rank - 1]
+    return np.asarray(SAME - np.partition(means.lowest, rank - 1, axis=0)[rank - 1])
+
+
+def _smallest_shifts_of_t(means: Means, alpha: float, alternative: str) -> Array:
+    """Return the smallest shift of each study's values (studies,) with which both t tests show a mean above 0."""
     below, most = -means.mean, -means.mean + 1000 * means.error
     above, tail = most, alpha / 2 if alternative == "two-sided" else alpha
     for _ in range(_HALVINGS):
@@ -222,4 +234,4 @@ def _smallest_shifts(means: Means, alpha: float, alternative: str) -> Array:
         raised = replace(means, mean=means.mean + middle)
         shown = np.maximum(raised.p_t(), raised.p_skewed()) <= tail
         below, above = np.where(shown, below, middle), np.where(shown, middle, above)
-    return np.asarray(np.maximum(np.where(above < most, above, np.inf), by_bootstrap))
+    return np.asarray(np.where(above < most, above, np.inf))
