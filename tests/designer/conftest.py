@@ -28,7 +28,13 @@ def story(designer: Designer, monkeypatch: pytest.MonkeyPatch) -> Callable[..., 
     for module in ("document.document", "editing", "participant.preview"):
         monkeypatch.setattr(f"study_app.designer.{module}.time", SimpleNamespace(perf_counter=lambda: 1000.0))
     monkeypatch.setattr("study_app.designer.saving.time", SimpleNamespace(perf_counter=lambda: 2000.0))
-    for timer in ("saving._DRAFT", "form.fields.HAND_ON", "form.fields.CLICK", "file.HAND_ON", "problems._REST"):
+    for timer in (
+        "saving._DRAFT_CHECK",
+        "form.fields.SUBMIT_DELAY",
+        "form.fields.CLICK",
+        "file.SUBMIT_DELAY",
+        "problems._PAUSE",
+    ):
         monkeypatch.setattr(f"study_app.designer.{timer}_MS", NEVER_MS)  # each is let go by the story, after an act
     spoken: list[str] = []
     for module in ("header", "window"):

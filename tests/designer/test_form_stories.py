@@ -233,7 +233,7 @@ def keys_without_a_field(story: Story) -> None:
     designer, place = story.designer, story.designer.place
     story.play("@blocks.liquids")
     story.act("measures", lambda: place.show_tab("measures"))
-    row = designer.form_row("blocks", "liquids", "title").words
+    row = designer.form_row("blocks", "liquids", "title").label
     for name, part in (("row", row), ("outline", place.outline), ("measures", place.measures)):
         story.play(":blocks.liquids.title")
         story.act(f"click {name}", lambda part=part: designer.click_on(part, at=QPoint(3, 3)))

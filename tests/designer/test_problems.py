@@ -65,9 +65,9 @@ def test_a_problem_solved_in_the_form_leaves_the_list_under_the_pointer(designer
 def test_header_and_list_count_problems_and_warnings_after_each_step(designer: Any, qtbot: Any) -> None:
     designer.open()
     header, heading = designer.place.header.problems, designer.place.problems.heading
-    sound = header.words
+    sound = header.chip_text
     designer.editing.make_step("Fix the order", Set(("blocks", "liquids", "order"), "fixed"))
-    qtbot.waitUntil(lambda: header.words == "1 warning")
+    qtbot.waitUntil(lambda: header.chip_text == "1 warning")
     assert heading.text() == "1 warning"
     for key in (("tasks", "reach", "dwell_s"), ("liquids", "thin", "density_kg_m3")):
         designer.editing.make_step("Remove a key", Unset(key))
@@ -85,7 +85,7 @@ def test_header_and_list_count_problems_and_warnings_after_each_step(designer: A
     qtbot.waitUntil(lambda: [line + 2] == [shown.row.line for shown in problems.lines if shown.here])
     for _ in range(4):
         designer.editing.undo()
-    qtbot.waitUntil(lambda: header.words == sound)
+    qtbot.waitUntil(lambda: header.chip_text == sound)
     assert heading.text() == "No problems"
 
 

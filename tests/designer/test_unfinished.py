@@ -41,7 +41,7 @@ def shown(designer: Any) -> int:
     QApplication.processEvents()
     designer.controller.show_outline()
     count = len(designer.place.problems.problems)
-    assert designer.place.header.problems.words.startswith(f"{count} problem") is (count > 0)
+    assert designer.place.header.problems.chip_text.startswith(f"{count} problem") is (count > 0)
     assert any(row.faults for row in designer.place.outline.rows) is (count > 0)
     if not count:
         assert not [part for part in designer.place.form.findChildren(QWidget)
@@ -122,7 +122,7 @@ def test_each_way_to_leave_a_copy_shows_that_it_reads_the_same(designer: Any, wa
 def test_save_says_how_many_problems_an_unfinished_entry_has(designer: Any) -> None:
     duplicate_question(designer)
     designer.hit("ctrl+s")
-    assert designer.saving.banner.words == "Saved, but the study cannot be run yet because of 2 problems"
+    assert designer.saving.banner.text == "Saved, but the study cannot be run yet because of 2 problems"
 
 
 def test_a_copy_that_is_reworded_before_it_is_left_never_has_a_problem(designer: Any, qtbot: Any) -> None:

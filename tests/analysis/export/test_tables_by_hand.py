@@ -22,7 +22,7 @@ from study_app.analysis.data.study_tables import Study
 from study_app.analysis.export import psychds_dataset, spss, table_files
 from study_app.analysis.export.table_files import codebook_bytes, credit_lines, file_name
 from study_app.analysis.export.tables import ExportTable, exported_tables, sealed_interval_columns, wide_table
-from study_app.protocol.source.files import StudySource, _is_of
+from study_app.protocol.source.files import StudySource, _has_study_name
 from study_app.store.files.columns import INTERVALS
 from study_app.store.files.csv_files import Column, header, optional, unsealed_columns
 from tests.analysis.made_up import ITEMS, study
@@ -437,5 +437,5 @@ def test_footage_outside_of_the_folder_or_with_other_content_is_missing(
         ("c", "[", False),
     ):
         (tmp_path / name).write_bytes(text.encode())
-        assert _is_of("oil", tmp_path / name) == is_of
-    assert not _is_of("oil", tmp_path / "nowhere")
+        assert _has_study_name("oil", tmp_path / name) == is_of
+    assert not _has_study_name("oil", tmp_path / "nowhere")

@@ -126,10 +126,10 @@ def test_a_likert_study_is_played_from_its_third_trial(qtbot: Any, likert: Any, 
     player = play_to_the_end(qtbot, likert)
     assert [page.trial for page in player.pages if isinstance(page, TaskPage)] == [3, 4]
     assert not player.operated
-    assert "completed" in likert.place.header.strip.words.text()
+    assert "completed" in likert.place.header.strip.sentence.text()
     assert list(folders.iterdir())
     study = kept(qtbot, likert)
-    qtbot.waitUntil(lambda: likert.place.header.version.words == "Piloted")
+    qtbot.waitUntil(lambda: likert.place.header.version.chip_text == "Piloted")
     qtbot.mouseClick(likert.place.header.version, Qt.MouseButton.LeftButton)
     changes = likert.controller.changes
     assert changes.version.currentText().startswith("1.0: 1 pilot, last today")
@@ -240,7 +240,7 @@ def test_another_device_is_asked_for_and_a_fault_ahead_is_named(
     mouse = next(action for action in header.play.menu.actions() if action.text().startswith("Mouse"))
     mouse.trigger()
     press_f5(qtbot, likert)
-    assert "using the device Mouse? This device does not produce force" in header.strip.words.text()
+    assert "using the device Mouse? This device does not produce force" in header.strip.sentence.text()
     qtbot.keyClick(header.strip.buttons["close"], Qt.Key.Key_Escape)
     assert not header.strip.isVisible()
     press_f5(qtbot, likert)
@@ -257,7 +257,7 @@ def test_another_device_is_asked_for_and_a_fault_ahead_is_named(
     field = likert.place.file.editor
     field.setPlainText(field.toPlainText().replace("[pages.thanks]\n", "[pages.thanks]\nnonsense = 3\n", 1))
     press_f5(qtbot, likert)
-    assert "cannot be played" in header.strip.words.text()
+    assert "cannot be played" in header.strip.sentence.text()
     assert any("Page " in line and "pages.thanks" not in line for line in header.strip.notice.listed), (
         header.strip.notice
     )

@@ -110,11 +110,11 @@ class Story:
             unfinished = again.with_unfinished(opened.study.unfinished)
             assert rows == [row.fault for row in problem_rows(unfinished)], "the list of problems"
         count = len(problem_rows(opened.study))
-        words = header.problems.words
+        words = header.problems.chip_text
         assert words == problems_chip(count, 0)[2] if count else not words.endswith("problem"), words
         for button, steps in ((header.undo, opened.done), (header.redo, opened.undone)):
             assert button.isEnabled() == (bool(steps) and not opened.read_only), button.accessibleName()
-            assert not steps or button.accessibleName().endswith(steps[-1].words), button.accessibleName()
+            assert not steps or button.accessibleName().endswith(steps[-1].title), button.accessibleName()
         assert form.head.path == opened.selected[: len(form.head.path)], (form.head.path, opened.selected)
         for row in form.rows:
             assert row.row.value == value_at(opened.study.document, row.row.path), row.row.path

@@ -129,7 +129,7 @@ def test_another_estimator_of_noticed_delays_and_other_intervals_are_noticed(
         low, high = ends
         return replace(found, interval=Interval(low=low, high=high, level=0.95, method="other"))
 
-    monkeypatch.setattr(studies, "noticed", other)
+    monkeypatch.setattr(studies, "detection_threshold", other)
     rates = count_single(("the same threshold for all", 12), 1, 0, 150 if reach == 1 else 800)
     assert [one.holds for one in rates if one.what == what] == ["no"] * bool(what)
     assert what or "no" not in [one.holds for one in rates]

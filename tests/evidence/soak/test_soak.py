@@ -115,6 +115,14 @@ def test_each_number_of_the_report_stands_beside_its_own_name(found):
     assert report.table() == report.table() | numbers
 
 
+def test_counts_of_telemetry_are_compared_only_if_no_sample_was_dropped(found):
+    """With dropped samples telemetry must count less: only ticks = samples + dropped remains to be checked."""
+    more = replace(found, overruns=found.overruns + 1)
+    assert more.findings == (f"{more.overruns} overruns, but the ticks imply {found.counts.overruns}",)
+    dropped = replace(more, dropped=7)
+    assert dropped.findings == (f"{found.ticks} ticks do not equal {found.counts.samples} samples plus 7 dropped",)
+
+
 def test_the_same_seed_finds_the_same(scenes, found):
     again = soak_servo(scenes, SHORT_H, virtual=True).table()
     first = found.table()
