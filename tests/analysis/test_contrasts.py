@@ -410,6 +410,8 @@ def test_an_interaction_compares_groups_in_the_difference_of_each_participant() 
         for picture in draw_figures(write_report.summary_figure_tasks(made, evaluate(made), {}, ("svg",)))
         if "hypothesis" in picture.name
     )
+    tasks = list(write_report.summary_figure_tasks(replace(made, split="one"), evaluate(made), {}, ("svg",)))
+    assert tasks == [], "the figures of one group do not compare it with the other"
     drawn = figure.files["svg"].decode()
     assert ">Difference: c2 − c1<" in drawn
     assert ">one − two<" in drawn

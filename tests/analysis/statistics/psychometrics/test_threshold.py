@@ -146,3 +146,22 @@ def test_drift_is_positive_where_answers_become_better_and_near_0_where_they_do_
     assert drift(~better[::-1], psi) > 2 / math.sqrt(n)
     assert abs(drift(steady, psi)) < 2 / math.sqrt(n)
     assert drift(np.ones(n, bool), psi) is None
+
+
+@pytest.mark.parametrize(
+    ("levels", "spread", "reason"),
+    [
+        ((20, 80, 130, 200), 12, ""),
+        ((60, 80, 130, 200), 22, "the fitted threshold lies outside the range of presented levels (60 to 200)"),
+    ],
+)
+def test_a_threshold_is_reported_from_the_lowest_level_onwards(
+    levels: tuple[int, ...], spread: float, reason: str
+) -> None:
+    """The planted threshold of 45 ms lies between the first two levels, or below the first."""
+    rng = np.random.default_rng(5)
+    chance = expit((np.array(levels)[None, :, None] - 45) / spread)
+    result = detection_threshold(np.where(rng.random((12, 4, 4)) < chance, 6.0, 2.0), levels)
+    assert result.no_interval == reason
+    assert (result.effect is None) == bool(reason)
+    assert result.effect is None or 35 < result.effect < 55
