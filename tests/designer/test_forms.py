@@ -119,12 +119,12 @@ def test_the_file_is_handed_on_while_typing_goes_on_and_when_it_is_left(
     editor = designer.place.file.editor
     designer.place.show_tab("file")
     editor.setFocus()
-    editor._rest.setTimerType(Qt.TimerType.PreciseTimer)
+    editor._typing_timer.setTimerType(Qt.TimerType.PreciseTimer)
     editor.insertPlainText("# ")
-    left_ms = editor._rest.remainingTime()
+    left_ms = editor._typing_timer.remainingTime()
     qtbot.wait(50)
     editor.insertPlainText("x")
-    assert 0 < editor._rest.remainingTime() <= left_ms - 40
+    assert 0 < editor._typing_timer.remainingTime() <= left_ms - 40
     assert "# x" not in designer.text
     designer.place.outline.tree.setFocus()
     assert "# x" in designer.text
@@ -425,7 +425,7 @@ def test_typed_text_waits_for_an_open_list_and_a_pressed_button(
         monkeypatch.setattr(f"study_app.designer.form.fields.QApplication.{blocked}", lambda: held)
     line._flush_after_click()
     assert (designer.value("conditions", "late", "delay_ms") == 137) == (blocked is None)
-    assert line.pending == line._rest.isActive() == (blocked is not None)
+    assert line.pending == line._submit_timer.isActive() == (blocked is not None)
 
 
 def test_a_bound_that_is_not_a_number_is_refused_with_the_value_that_stays(qtbot: Any) -> None:

@@ -410,7 +410,7 @@ LIMIT = "self.turns * self.turn_s"
 ANGLE = "angle = 2 * math.pi * t_s / self.turn_s\n"
 PRESENTED = "return self.levels * self.series"
 LEVELS = "return stimulus.spaced(self.levels)"
-VIEW = "return self._shown(GridView"
+VIEW = "return self._make_view(GridView"
 
 
 @needs_servo

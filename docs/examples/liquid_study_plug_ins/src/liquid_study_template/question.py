@@ -42,7 +42,7 @@ class Grid(Question):
 
     def view(self, number: int, context: Context) -> ItemView:
         edges = tuple(map(context.text, (self.left, self.right, self.lower, self.upper)))
-        return self._shown(GridView, number, context, edges=edges, cells=self.cells)
+        return self._make_view(GridView, number, context, edges=edges, cells=self.cells)
 
     def problem(self, answer: Value, context: Context) -> str | None:
         cells = {f"{x} {y}" for x in range(1, self.cells + 1) for y in range(1, self.cells + 1)}
