@@ -467,7 +467,7 @@ def test_a_block_without_reaching_measures_says_why(
     made = {
         "_movement_measures": [],
         "_motion_rows": [["thin", "1", "2"]],
-        "_recordings": "",
+        "_recordings_sentence": "",
         "settings_noun": "setting",
     }
     for name, value in made.items():
