@@ -6,7 +6,6 @@ from typing import Any
 
 import pytest
 
-from study_app.analysis.levels.conduct import Delivery
 from study_app.analysis.levels.exponents import ExponentEstimate, Exponents
 from study_app.analysis.levels.sensitivities import Sensitivities, SensitivityEstimate
 from study_app.analysis.levels.statistic import LevelStatistic
@@ -88,10 +87,3 @@ def test_exported_thresholds_have_all_estimates_of_a_participant() -> None:
     }.items()  # fmt: skip
     assert compared.items() >= {"participant": "P002", "n": 20, "d_prime": 0.23, "condition": "L2"}.items()
     assert [compared.get(name) for name in ("threshold", "low", "high", "weber_exponent")] == [None] * 4
-
-
-@pytest.mark.parametrize("masses_kg", [(None, None), (None, 0.23)])
-def test_the_apparent_mass_is_explained_only_if_the_table_has_one(masses_kg: tuple[float | None, ...]) -> None:
-    rows = tuple({"reasons": {}, "apparent_mass_kg": mass_kg} for mass_kg in masses_kg)
-    explanation = Delivery(result({"conduct": rows})).explanation()
-    assert ("Apparent mass is the coefficient m" in explanation) == any(masses_kg)
