@@ -79,7 +79,7 @@ class Participant(Answering):
 
     def __init__(self, name: str, answers: Answers, codes: Mapping[str, Mapping[str, str]], *of_session: Any) -> None:
         super().__init__(*of_session)
-        self._name, self._answers, self._codes = name, answers, codes
+        self._name, self._noted, self._codes = name, answers, codes
         self._chosen: dict[str, tuple[Any, float, float]] = {}
 
     def _answers_to(self, page: QuestionnairePage | DesignPage) -> list[Choice]:
@@ -87,11 +87,11 @@ class Participant(Answering):
         return [self._changed(choice, views[choice.item]) for choice in super()._answers_to(page)]
 
     def _changed(self, choice: Choice, view: object) -> Choice:
-        rng = self._answers.rng
+        rng = self._noted.rng
         after_s = round(rng.uniform(0.2, 3.0), 3)
         if isinstance(view, TextView) and choice.value is not None:
-            self._answers.texts += 1
-            return Choice(choice.item, f"{self._name}, text {self._answers.texts}", after_s)
+            self._noted.texts += 1
+            return Choice(choice.item, f"{self._name}, text {self._noted.texts}", after_s)
         if isinstance(view, NumberView) and view.most is None and isinstance(choice.value, int | float):
             # Questions may depend on whether a number is at least 4, and estimates are positive.
             least, most = (4.0, 900.0) if choice.value >= 4 else (-900.0 if view.least is None else 0.01, 3.9)
@@ -114,7 +114,7 @@ class Participant(Answering):
         form, time = (page.form, page.time) if isinstance(page, QuestionnairePage) else (None, 1)
         for item, (value, first_s, last_s) in self._chosen.items():
             asked = Question(participant=self._name, trial=page.trial, form=form, time=time, item=item)
-            self._answers.given[asked] = Given(value=value, first_s=first_s, last_s=last_s, **about)
+            self._noted.given[asked] = Given(value=value, first_s=first_s, last_s=last_s, **about)
         self._chosen = {}
 
 

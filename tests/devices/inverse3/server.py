@@ -114,7 +114,7 @@ class ServiceServer:
         clock = (self._clock.now.address, self._clock.context)
         raise_priority()  # on a busy computer the servo's thread runs before others: so must what answers it
         while serve(memory, connection.fileno(), send, receive, clock, self._time):
-            service.work()
+            service.process_inbox()
             connection.sendall(service.give_bytes())
         service.disconnected()
 
