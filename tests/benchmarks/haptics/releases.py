@@ -1,21 +1,16 @@
-"""Releases of a handle without friction with "kalman": how many keep oscillating, by the period of the stored energy.
+"""Releases of a handle without friction with "kalman": how many keep oscillating.
 
-Run it by itself: ``python tests/benchmarks/haptics/releases.py CASES [PERIOD_S …]``; by default the period in use.
+Run it by itself: ``python tests/benchmarks/haptics/releases.py CASES``.
 """
 
 import dataclasses
 import itertools
-import math
 import sys
 from concurrent.futures import ProcessPoolExecutor
-from functools import partial
 from random import Random
 
-from study_app.evidence.stability import bench
 from study_app.evidence.stability.stability_cases import FIRST, LETS_GO, REACHES, SECOND, SINE, STROKE, Case
 from study_app.evidence.stability.verdict import judge
-from study_app.haptics.model.force_rules import CURRENT
-from study_app.haptics.runtime.pack import pack
 
 LIQUIDS = ("honey", "light_oil", "dense", "physical_honey", "physical_glycerin", "physical_water")
 CHOICES = {
@@ -42,20 +37,18 @@ def cases(count: int) -> list[Case]:
     ]
 
 
-def reasons(period_s: float, case: Case) -> tuple[str, ...]:
-    """Return why a case is unstable with the energy of such a period."""
-    bench.pack = partial(pack, rules=CURRENT._replace(history_rs=math.sqrt(period_s)))
+def reasons(case: Case) -> tuple[str, ...]:
+    """Return why a case is unstable."""
     return judge(case, safe=True).reasons
 
 
 def main() -> None:
-    """Print for each period how many cases are unstable, and how many of them oscillate."""
-    count, *periods_s = sys.argv[1:]
-    for period_s in map(float, periods_s or [CURRENT.history_rs**2]):
-        with ProcessPoolExecutor() as executor:
-            found = [*executor.map(partial(reasons, period_s), cases(int(count)), chunksize=8)]
-        oscillate = sum("oscillation" in one for one in found)
-        print(f"{period_s:g} s: of {count} cases {sum(map(bool, found))} unstable, {oscillate} oscillate", flush=True)
+    """Print how many cases are unstable, and how many of them oscillate."""
+    count = int(sys.argv[1])
+    with ProcessPoolExecutor() as executor:
+        unstable = [*filter(None, executor.map(reasons, cases(count), chunksize=8))]
+    oscillating = sum("oscillation" in case_reasons for case_reasons in unstable)
+    print(f"of {count} cases {len(unstable)} unstable, {oscillating} oscillate")
 
 
 if __name__ == "__main__":
