@@ -17,7 +17,7 @@ again. Their difference then is added and fades out, so that the estimate does n
 Vibrations at 10 to 60 Hz, such as those of gears, change the acceleration faster than the filter assumes, and its
 velocity overshoots. Its lead (its velocity less the mean of EWMA's last two) is therefore checked at every fourth
 sample. The mean velocity over eight samples shows the error of the filter's velocity in their middle. The regression of
-this error on the lead is the false share of the lead, and a multiple of it is subtracted.
+this error on the lead is the false share of the lead. A multiple of what exceeds the tolerated share is subtracted.
 """
 
 from __future__ import annotations
@@ -327,8 +327,8 @@ def _check_lead(parameters: Record, state: Record, filtered: Record) -> None:
         false_m2ps2 = _or_zero(filtered.false_lead_m2ps2 + weight * (false_m2ps2 - filtered.false_lead_m2ps2))
         filtered.lead_m2ps2, filtered.false_lead_m2ps2 = leads_m2ps2, false_m2ps2
         least_mps = parameters.scale * parameters.count_m / LEAST_LEAD_S
-        share = parameters.rules.false_lead_gain * false_m2ps2 / (leads_m2ps2 + least_mps * least_mps)
-        filtered.false_share = min(max(share, 0.0), 1.0)
+        share = false_m2ps2 / (leads_m2ps2 + least_mps * least_mps) - parameters.rules.tolerated_false_lead
+        filtered.false_share = min(max(parameters.rules.false_lead_gain * share, 0.0), 1.0)
     for axis in range(3):
         first[axis] = state.position_m[axis]
         first[3 + axis] = parameters.scale * filtered.estimate_mps[axis]

@@ -36,3 +36,4 @@ def test_a_second_after_the_hand_was_shaken_the_whole_force_arrives():
     assert len(shaken) == 4
     assert max(liquid.after[QUICK.index(SHOWN_SHAKE)][0] for liquid in shaken) > 0.1
     assert all(liquid.lasting < MOST_AFTER for liquid in shaken)
+    assert all(liquid.met for liquid in liquids)

@@ -31,6 +31,7 @@ RELEASED = {
     "acting_share": math.inf,
     "late_swing_mps": math.inf,
     "false_lead_gain": 0.0,
+    "tolerated_false_lead": 0.0,
     "fast_radps": 34.55751918948772,  # 5.5 Hz
     "fast_damping": 0.5,
 }
@@ -62,6 +63,7 @@ def test_released_versions_keep_their_numbers():
         "fast_radps": 47.12388980384689,  # 7.5 Hz
         "fast_damping": 0.3,
     }
+    assert VERSIONS[12]._asdict() == {**VERSIONS[11]._asdict(), "version": 12, "tolerated_false_lead": 0.05}
 
 
 def test_the_present_version_is_the_newest_and_has_its_own_numbers():

@@ -47,7 +47,7 @@ def felt(velocity, position_m, interval_s=1e-3):
     return vectors(simulate(Scene(scale=1, velocity=velocity, knee=UNBENT), motion), "velocity")
 
 
-def literal(position_m, interval_s, force_n, false_lead_gain=CURRENT.false_lead_gain):
+def literal(position_m, interval_s, force_n, rules=CURRENT):
     """Return the velocities (n, 3) by the definition: positions (n, 3), intervals (n,), acting forces (n, 3)."""
     x, response, v = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((len(position_m), 3))  # rows of x: axes
     found, smooth, smooth_before = np.zeros_like(v), np.zeros(3), np.zeros(3)
@@ -87,12 +87,13 @@ def literal(position_m, interval_s, force_n, false_lead_gain=CURRENT.false_lead_
             lasted_s, way, (checked, old_lead) = elapsed_s - checks[-3][0], place - checks[-3][1], checks[-2][2:]
             weight = lasted_s / 2 / (kalman.CHECKED_S + lasted_s / 2)
             sums += weight * (np.array([old_lead @ old_lead, old_lead @ (checked - way / lasted_s)]) - sums)
-            false_share = np.clip(false_lead_gain * sums[1] / (sums[0] + (COUNT_M / kalman.LEAST_LEAD_S) ** 2), 0, 1)
+            false_share = sums[1] / (sums[0] + (COUNT_M / kalman.LEAST_LEAD_S) ** 2) - rules.tolerated_false_lead
+            false_share = np.clip(rules.false_lead_gain * false_share, 0, 1)
         found[k] = v[k] - false_share * lead
     return found
 
 
-@pytest.mark.parametrize("rules", [VERSIONS[9], CURRENT])
+@pytest.mark.parametrize("rules", [VERSIONS[9], VERSIONS[11], CURRENT])
 @pytest.mark.parametrize("delay_ticks", [0, 1, 3])
 def test_it_is_its_definition_with_late_and_missing_samples(delay_ticks, rules):
     random = np.random.default_rng(4)
@@ -117,10 +118,10 @@ def test_it_is_its_definition_with_late_and_missing_samples(delay_ticks, rules):
             found.append(np.array(sample.velocity_mps) / 3.0)
             impulse, since_s = np.zeros(3), 0.0
         sent.append(np.array(sample.device_force_n))
-    expected = literal(np.array(places), intervals, forces, rules.false_lead_gain)
+    expected = literal(np.array(places), intervals, forces, rules)
     assert np.array(found) == pytest.approx(expected, abs=1e-4 * np.abs(expected).max())
     assert np.abs(expected).max() > 0.05
-    blind = literal(np.array(places), intervals, np.zeros((len(places), 3)), 0.0)
+    blind = literal(np.array(places), intervals, np.zeros((len(places), 3)), VERSIONS[9])
     assert np.abs(expected - blind).max() > 0.005 * np.abs(expected).max()
 
 
