@@ -257,12 +257,12 @@ class StudyLiquid(Liquid):
 
     body: OwnBody | None = later(default=None, description="The ball in this liquid, if it differs from scene.body.")
 
-    def _has_no_problem(self, effects: Iterable[EffectDescriptor]) -> None:
+    def _check_effects(self, effects: Iterable[EffectDescriptor]) -> None:
         used = list(effects)
         if self.viscosity_pa_s is not None and any(effect.name == "non_newtonian" for effect in used):
             message = "describes a Newtonian liquid, but the non-Newtonian table specifies another law"
             raise invalid(message, "viscosity_pa_s", kind="surplus")
-        super()._has_no_problem(used)
+        super()._check_effects(used)
 
     @property
     def alone(self) -> Liquid:

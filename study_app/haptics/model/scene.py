@@ -86,7 +86,7 @@ class _Liquid(Frozen):
     @model_validator(mode="after")
     def _effects_have_what_they_need(self) -> Self:
         if self.effects == "auto":
-            self._has_no_problem(
+            self._check_effects(
                 it for it in EFFECTS if it.default is None and getattr(self, it.name, None) is not None
             )
             return self
@@ -105,10 +105,10 @@ class _Liquid(Frozen):
                     raise ValueError(
                         f'"{other}" and "{effect.name}" are two models of the same effect: select one of them'
                     )
-        self._has_no_problem(called_for)
+        self._check_effects(called_for)
         return self
 
-    def _has_no_problem(self, effects: Iterable[EffectDescriptor]) -> None:
+    def _check_effects(self, effects: Iterable[EffectDescriptor]) -> None:
         for effect in effects:
             problem = effect.problem(self) if effect.problem is not None else None
             if problem is not None:

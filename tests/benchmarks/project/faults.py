@@ -615,6 +615,8 @@ def main() -> None:
     if given.command == "judge":
         judge(folder, given.workers, given.seed)
         return
+    if folder.exists():
+        parser.error(f"{folder} exists already: name a new folder, or judge its faults")
     folder.mkdir(parents=True)
     copy_work_tree(folder / "sound")
     options = {"seeds": given.seeds, "functions": given.functions, "package": given.package}

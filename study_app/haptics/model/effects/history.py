@@ -82,8 +82,8 @@ def _fill(record: Any, liquid: Liquid, scene: Scene, first: Mapping[str, int]) -
     record.tail_row = first["exponentials"]
     record.window_s = history.window_s
     record.filter_per_s = rate_per_s(smoothing_s(scene.velocity, history.smoothing_s, SMOOTHING_S))
-    stickiness = math.sqrt(math.pi * liquid.density_kg_m3 * (liquid.viscosity_pa_s or 0.0))
-    record.factor_kg_rs = 1.5 * scene.body.diameter_m**2 * stickiness
+    root_kg_m2_rs = math.sqrt(math.pi * liquid.density_kg_m3 * (liquid.viscosity_pa_s or 0.0))
+    record.factor_kg_rs = 1.5 * scene.body.diameter_m**2 * root_kg_m2_rs
 
 
 def damping_nspm(factor_kg_rs: float, filter_per_s: float) -> float:
