@@ -58,10 +58,10 @@ class UntranslatedText(NamedTuple):
 
 def untranslated_texts(document: Mapping[str, Any]) -> tuple[UntranslatedText, ...]:
     """Return the texts of a document that are in another language than stated."""
-    languages = languages_of(document)
+    languages, own_texts = languages_of(document), _workspace_texts(document)
     return tuple(
         text for pattern in TEXTS for path, value in entries(document, pattern)
-        for text in untranslated_at(document, path, value, languages)
+        for text in _untranslated(path, value, languages, own_texts)
     )  # fmt: skip
 
 
@@ -69,6 +69,12 @@ def untranslated_at(
     document: Mapping[str, Any], path: Path, value: Any, languages: Sequence[str]
 ) -> Iterator[UntranslatedText]:
     """Yield the text at ``path`` for each language into which it is not translated."""
+    return _untranslated(path, value, languages, _workspace_texts(document))
+
+
+def _untranslated(
+    path: Path, value: Any, languages: Sequence[str], own_texts: Mapping[str, frozenset[str]]
+) -> Iterator[UntranslatedText]:
     first = languages[0]
     texts = value if isinstance(value, Mapping) else {first: value}
     for code in languages:
@@ -80,7 +86,7 @@ def untranslated_at(
             yield UntranslatedText(path, code, first, ships=False, is_word=is_word)
         else:
             sentences = [part for part in parts if len(part.split()) >= _SENTENCE_WORDS]
-            if (source := _source_language(sentences, code, _workspace_texts(document))) is not None:
+            if (source := _source_language(sentences, code, own_texts)) is not None:
                 yield UntranslatedText(path, code, source, ships=False, is_word=False)
 
 
