@@ -16,6 +16,7 @@ from study_app.session.preflight import Measurements, Screen
 from study_app.session.start import NewSession, Ready, draw_seed, resumed_choices
 from study_app.store.sessions.open_session import SessionStore
 from study_app.store.workstation import MachineSettings
+from study_app.workspace import workspace
 from tests import studies
 
 
@@ -104,3 +105,88 @@ def test_a_changed_protocol_is_refused_before_any_window(
         app.resume(begun.folder.path, protocol=str(changed))
     assert windows == []
     assert begun.folder.journal.read_bytes() == before
+
+
+def test_a_session_is_named_by_its_participant_group_number_seed_and_whether_it_is_a_pilot() -> None:
+    chosen = NewSession(
+        source="demo",
+        participant="P007",
+        session=3,
+        seed=41,
+        operator="AK",
+        language="en",
+        device="mouse",
+        windowed=True,
+        screen=None,
+        results=Path("nowhere"),
+    )
+    assert chosen.who == "Participant P007  ·  session 3  ·  seed 41"
+    assert replace(chosen, group="young", pilot=True).who == (
+        "Participant P007  ·  group young  ·  session 3  ·  seed 41  ·  pilot"
+    )
+
+
+def test_a_session_is_run_as_it_was_asked_for_and_else_with_the_defaults(
+    windows: list[NewSession], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    results = tmp_path / "own"
+    asked = {
+        "participant": "P007",
+        "session": 1,
+        "operator": "AK",
+        "recordings": False,
+        "screen": 2,
+        "device": "falcon",
+    }
+    firmware: dict[str, str | Path] = {"firmware": "/firmware.bin"}
+    app.run("rek2024", seed=41, language="nl", device_options=firmware, results=results, **asked)  # type: ignore[arg-type]
+    assert windows.pop() == NewSession(
+        source="rek2024",
+        seed=41,
+        language="nl",
+        windowed=False,
+        results=results,
+        device_options=firmware,
+        **asked,  # type: ignore[arg-type]
+    )
+    monkeypatch.setattr("secrets.randbelow", lambda _: 76)
+    folders = {("mouse", False): "", ("scripted", False): "-scripted", ("mouse", True): "-pilot"}
+    for (device, pilot), suffix in folders.items():
+        app.run("rek2024", participant="P008", device=device, pilot=pilot)
+        assert windows.pop() == NewSession(
+            source="rek2024",
+            participant="P008",
+            session=1,
+            seed=77,
+            operator="",
+            language="en",
+            device=device,
+            windowed=pilot,
+            screen=None,
+            results=workspace().results / f"rek2024{suffix}",
+            pilot=pilot,
+        )
+
+
+def test_a_pilot_is_resumed_with_its_language_its_recordings_and_its_device(tmp_path: Path) -> None:
+    given = {"seed": 41, "language": "nl", "device": {"name": "falcon"}, "pilot": True, "recordings": False}
+    begun = studies.begun(tmp_path / "results", "P007", "rek2024", **given)
+    begun.close()
+    chosen = resumed_choices(begun.folder.path, operator="BB", screen=2)
+    assert chosen == NewSession(
+        source="rek2024",
+        participant="P007",
+        session=1,
+        seed=41,
+        operator="BB",
+        language="nl",
+        device="falcon",
+        windowed=True,  # as all pilots
+        screen=2,
+        results=tmp_path / "results",
+        pilot=True,
+        recordings=False,
+        resumes=begun.folder.path,
+    )
+    asked = resumed_choices(begun.folder.path, device="mouse", device_options={"firmware": "/firmware.bin"})
+    assert (asked.device, asked.device_options) == ("mouse", {"firmware": "/firmware.bin"})

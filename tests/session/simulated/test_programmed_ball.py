@@ -10,6 +10,7 @@ from study_app.protocol.trials.tasks import AnyTask, Explore, Follow, Reach
 from study_app.session.simulated import observers
 from study_app.session.simulated.observers import ProgrammedBall
 from study_app.session.simulated.participant import AdjustingObserver
+from study_app.session.tasks import TankView, TaskView
 
 TANK_M = (0.12, 0.1, 0.08)
 REACH = Reach(
@@ -93,6 +94,68 @@ def test_an_explorer_leaves_a_little_after_the_least_time(
     device: Any = SimpleNamespace(follow=lambda *_: None, workspace_m=TANK_M)
     explorer, view = observers.Explorer(task, device, lambda: 0.5, 100.0), cast(Any, None)
     assert [explorer.act(100.0 + stays_s + late_s, view) for late_s in (-0.01, 0.01)] == [False, True]
+
+
+class Hand:
+    """A simulated hand that keeps its orders."""
+
+    workspace_m, moving = TANK_M, False
+
+    def __init__(self) -> None:
+        self.orders: list[Any] = []
+
+    def reach_to(self, *place_m: float) -> None:
+        self.orders.append(place_m)
+
+    def follow(self, times_s: Any, places_m: Any) -> None:
+        self.orders.append((times_s, places_m))
+
+
+def test_a_hand_reaches_for_the_lit_target_after_a_reaction_and_again_if_the_ball_rests_outside_it() -> None:
+    """Drawn numbers of 1 give the slowest reaction, of 0.35 s, and the largest error of aim, 0.3 times 5 mm."""
+    hand = Hand()
+    behaviour = observers.hand_behaviour(REACH, cast(Any, hand), lambda: 1.0, 0.0)
+    inside_m, outside_m = np.array([-0.03, 0.0049, 0.0]), np.array([-0.03, 0.0051, 0.0])
+    acts: tuple[tuple[float, int | None, Any, bool, int], ...] = (
+        (10.0, None, outside_m, False, 0),
+        (11.0, 0, outside_m, False, 0),
+        (11.34, 0, outside_m, False, 0),
+        (11.36, 0, outside_m, False, 1),  # it reaches
+        (12.0, 0, outside_m, True, 1),  # and moves
+        (12.5, 0, inside_m, False, 1),
+        (13.0, 0, outside_m, False, 1),  # it rests outside the target, from now on
+        (13.2, 0, inside_m, False, 1),
+        (14.0, 0, outside_m, False, 1),
+        (14.34, 0, outside_m, False, 1),
+        (14.36, 0, outside_m, False, 2),  # and tries again after 0.35 s
+        (20.0, 1, outside_m, False, 2),
+        (20.36, 1, outside_m, False, 3),
+    )
+    for now_s, lit, place_m, moving, orders in acts:
+        hand.moving = moving
+        task = TaskView(lit=lit, reached=0, of=4, dwell=0.0, elapsed_s=now_s)
+        assert not behaviour.act(now_s, TankView(place_m, task, 0))
+        assert len(hand.orders) == orders, now_s
+    targets = ((-0.03, 0.0, 0.0), (-0.03, 0.0, 0.0), (0.03, 0.01, 0.0))
+    assert hand.orders == [pytest.approx([axis_m + 0.0015 for axis_m in target]) for target in targets]
+
+
+def test_a_hand_follows_a_target_with_an_error_that_grows_within_a_second() -> None:
+    hand, task = Hand(), Follow(kind="follow", amplitude_mm=30, frequency_hz=0.5, cycles=3)
+    observers.hand_behaviour(task, cast(Any, hand), lambda: 1.0, 0.0)
+    ((times_s, places_m),) = hand.orders
+    assert (times_s[0], times_s[-1]) == (0.0, pytest.approx(task.limit_s, abs=0.005))
+    for at_s, share in ((0.0, 0.0), (0.5, 0.5), (1.0, 1.0), (2.5, 1.0)):
+        row = int(np.searchsorted(times_s, at_s - 1e-9))
+        error_m = places_m[row] - np.array(task.target_m(at_s))
+        assert error_m == pytest.approx(share * 0.3 * task.radius_m, abs=1e-12)
+
+
+def test_a_hand_rests_at_the_start_of_a_paced_task_and_else_returns_to_the_middle_within_a_quarter_second() -> None:
+    hand, swing = Hand(), Follow(kind="follow", amplitude_mm=30, frequency_hz=0.5, cycles=3)
+    observers.rest_hand(swing, cast(Any, hand))
+    observers.rest_hand(Explore(kind="explore", min_s=5, max_s=20, instruction="-"), cast(Any, hand))
+    assert hand.orders == [swing.start_m, (0.0, 0.0, 0.0, 0.25)]
 
 
 @pytest.mark.parametrize("delays", [True, False])

@@ -9,7 +9,7 @@ import pytest
 from study_app.errors import SessionError
 from study_app.protocol.load import parse
 from study_app.session.pages import FeedbackPage
-from study_app.session.resume import resume_at
+from study_app.session.resume import Start, resume_at
 from study_app.session.transitions.events import Begin, Finish, ResumeRequested, StartTrial, TaskDone, TimeUp, Write
 from study_app.session.transitions.state import FINAL, Phase, SessionState
 from study_app.session.transitions.table import advance
@@ -115,6 +115,18 @@ def events_of(state: SessionState, fails: frozenset[tuple[int, int]]) -> Iterato
             if isinstance(one, Write):
                 yield state, {"event": one.line.event, "t_s": at_s, **one.line.fields()}
         at_s += 100.0
+
+
+def test_undelivered_attempts_before_an_interruption_count_for_the_interrupted_trial_alone() -> None:
+    steps = pairs.opened().plan.schedule.steps
+    index = next(number for number, step in enumerate(steps) if getattr(step, "block", "") == "viscosity")
+    start = Start(index, presented={steps[index].number: 2}, invalid=2)
+    state, _ = advance(pairs.opened(start=start), Begin(0.0))
+    assert (state.phase, state.index) == (Phase.PAUSED, index)
+    state, _ = advance(state, ResumeRequested(1.0, "operator"))
+    assert (state.attempt, state.invalid) == (3, 2)
+    state = to_trial(state, "viscosity", 2)
+    assert (state.attempt, state.invalid) == (1, 0)
 
 
 FAILS = frozenset({(8, 0), (9, 0), (9, 1), (10, 0), (10, 1), (10, 2)})
