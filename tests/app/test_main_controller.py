@@ -19,22 +19,11 @@ from study_app.app.session import live_session
 from study_app.errors import DeviceLost, DeviceNotFound
 from study_app.gui.widgets.controls import ActionButton
 from study_app.session.start import NewSession
+from tests.session.small import CHOSEN
 
 pytestmark = pytest.mark.slow
 
 ALT = Qt.KeyboardModifier.AltModifier
-CHOSEN = NewSession(
-    source="demo",
-    participant="P001",
-    session=1,
-    seed=7,
-    operator="AK",
-    language="en",
-    device="mouse",
-    windowed=True,
-    screen=None,
-    results=Path("nowhere"),
-)
 
 
 class Machine:

@@ -28,6 +28,7 @@ from study_app.store.workstation import load_settings
 from study_app.workers.server import Crashed, Refused
 from tests.golden import as_on_linux, check_kept, what_comes
 from tests.golden_values import changed, value_lines
+from tests.session.small import CHOSEN
 
 KEPT = Path(__file__).parent / "places"
 STUDY, OTHER = Path("results", "one"), Path("results", "two")
@@ -304,18 +305,6 @@ def go(name: str) -> Any:
     return lambda visit: visit.window.go(name)
 
 
-CHOSEN = NewSession(
-    source="demo",
-    participant="P001",
-    session=1,
-    seed=7,
-    operator="AK",
-    language="en",
-    device="mouse",
-    windowed=True,
-    screen=None,
-    results=Path("nowhere"),
-)
 STAY: dict[str, Any] = {
     "home": go("home"), "begin": home("session_asked", CHOSEN), "begin twice": home("session_asked", CHOSEN),
     "bug meanwhile": lambda visit: visit.show_bug(ValueError("x")), "called off": ends(),

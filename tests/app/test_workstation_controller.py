@@ -1,6 +1,6 @@
 """What is set for this machine: kept at once, taken back, told in the receipt."""
 
-from pathlib import Path
+from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
@@ -11,10 +11,10 @@ from study_app.app.session.live_session import NOT_EXAMINED, LiveSession
 from study_app.devices.descriptor import READY, Backend
 from study_app.gui.kit.devices import described_screens, settings_here, text_scale_on
 from study_app.gui.theme.theme import DARK, LIGHT
-from study_app.session.start import NewSession
 from study_app.store import workstation
 from study_app.store.workstation import DEFAULTS, DisplayOffset, MachineSettings, save_settings
 from study_app.user_folder import settings_file
+from tests.session.small import CHOSEN
 
 pytestmark = pytest.mark.slow
 
@@ -92,21 +92,7 @@ def test_from_the_cockpit_a_falcon_is_examined_and_of_what_is_none_it_is_said(qa
         return SimpleNamespace(show=lambda: None)
 
     monkeypatch.setattr("study_app.gui.devices.open_diagnosis", diagnosis)
-    live = LiveSession(
-        NewSession(
-            source="demo",
-            participant="P001",
-            session=1,
-            seed=7,
-            operator="",
-            language="en",
-            device=device,
-            windowed=True,
-            screen=None,
-            results=Path("nowhere"),
-        ),
-        LIGHT,
-    )
+    live = LiveSession(replace(CHOSEN, device=device), LIGHT)
     live.bridge = SimpleNamespace(operator=SimpleNamespace(theme=DARK, show_message=lambda *said: told.append(said)))
     live.diagnose()
     assert asked == ([] if held is None else [(device, held)])

@@ -1,6 +1,7 @@
 """A small study with everything a session can meet, and the steps to walk through it."""
 
 import tomllib
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from study_app.haptics.runtime.telemetry import Timing
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import build_schedule, draw_key, stream
 from study_app.session.preflight import Measurements, Screen
+from study_app.session.start import NewSession
 from study_app.session.transitions.events import Begin, Chosen, Continue, ItemShown, Submitted, TaskDone
 from study_app.session.transitions.state import Phase, SessionState
 from study_app.session.transitions.table import advance, initial_state
@@ -30,6 +32,19 @@ WELL = Measurements(
     grant=Grant("real-time", "SCHED_FIFO 60", locked=True),
 )
 """What the pre-flight finds on a computer on which everything is well."""
+CHOSEN = NewSession(
+    source="demo",
+    participant="P001",
+    session=1,
+    seed=7,
+    operator="AK",
+    language="en",
+    device="mouse",
+    windowed=True,
+    screen=None,
+    results=Path("nowhere"),
+)
+"""The choices for a first session, in a window."""
 
 TABLES: dict[str, Any] = tomllib.loads(text_of("session"))
 RESPONSES = 2 * 3 + 2 * 1

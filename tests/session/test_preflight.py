@@ -22,7 +22,7 @@ from study_app.protocol.warnings.untranslated import untranslated_on_pages
 from study_app.session import preflight_measurements
 from study_app.session.preflight import Measurements, PredictedDelivery, Screen, preflight_checks, refusal_reasons
 from study_app.session.preflight_measurements import measure_servo_and_disk
-from study_app.session.start import NewSession, late_device_sentence, participant_with_other_contents
+from study_app.session.start import late_device_sentence, participant_with_other_contents
 from study_app.store import receipt
 from study_app.store.files.folders import StudyFolder
 from study_app.store.journals.journal_events import TrialStarted
@@ -278,18 +278,7 @@ def test_another_file_of_the_same_version_is_a_warning(tmp_path: Path, recorded:
     place.path.mkdir(parents=True)
     ran = {"key_hash": "", "protocol_hash": recorded, "protocol": {"study": {"version": version}}}
     receipt.write(place.receipt, ran)
-    chosen = NewSession(
-        source="rek2024",
-        participant="P002",
-        session=1,
-        seed=7,
-        operator="AK",
-        language="en",
-        device="scripted",
-        windowed=True,
-        screen=None,
-        results=tmp_path,
-    )
+    chosen = replace(small.CHOSEN, source="rek2024", participant="P002", results=tmp_path)
     assert participant_with_other_contents(chosen) == who
     found = preflight_checks(replace(small.WELL, ran_otherwise=who), study)
     assert [check.verdict for check in found if check.name == "Study file"] == ["warning"] * bool(who)

@@ -18,6 +18,7 @@ from study_app.store.sessions.open_session import SessionStore
 from study_app.store.workstation import MachineSettings
 from study_app.workspace import workspace
 from tests import studies
+from tests.session.small import CHOSEN
 
 
 def test_what_is_ready_is_measured_with_its_screen_and_its_outlets(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -108,18 +109,7 @@ def test_a_changed_protocol_is_refused_before_any_window(
 
 
 def test_a_session_is_named_by_its_participant_group_number_seed_and_whether_it_is_a_pilot() -> None:
-    chosen = NewSession(
-        source="demo",
-        participant="P007",
-        session=3,
-        seed=41,
-        operator="AK",
-        language="en",
-        device="mouse",
-        windowed=True,
-        screen=None,
-        results=Path("nowhere"),
-    )
+    chosen = replace(CHOSEN, participant="P007", session=3, seed=41)
     assert chosen.who == "Participant P007  ·  session 3  ·  seed 41"
     assert replace(chosen, group="young", pilot=True).who == (
         "Participant P007  ·  group young  ·  session 3  ·  seed 41  ·  pilot"
@@ -153,19 +143,9 @@ def test_a_session_is_run_as_it_was_asked_for_and_else_with_the_defaults(
     folders = {("mouse", False): "", ("scripted", False): "-scripted", ("mouse", True): "-pilot"}
     for (device, pilot), suffix in folders.items():
         app.run("rek2024", participant="P008", device=device, pilot=pilot)
-        assert windows.pop() == NewSession(
-            source="rek2024",
-            participant="P008",
-            session=1,
-            seed=77,
-            operator="",
-            language="en",
-            device=device,
-            windowed=pilot,
-            screen=None,
-            results=workspace().results / f"rek2024{suffix}",
-            pilot=pilot,
-        )
+        folder = workspace().results / f"rek2024{suffix}"
+        defaults = replace(CHOSEN, source="rek2024", participant="P008", seed=77, operator="", results=folder)
+        assert windows.pop() == replace(defaults, device=device, windowed=pilot, pilot=pilot)
 
 
 def test_a_pilot_is_resumed_with_its_language_its_recordings_and_its_device(tmp_path: Path) -> None:
@@ -173,20 +153,8 @@ def test_a_pilot_is_resumed_with_its_language_its_recordings_and_its_device(tmp_
     begun = studies.begun(tmp_path / "results", "P007", "rek2024", **given)
     begun.close()
     chosen = resumed_choices(begun.folder.path, operator="BB", screen=2)
-    assert chosen == NewSession(
-        source="rek2024",
-        participant="P007",
-        session=1,
-        seed=41,
-        operator="BB",
-        language="nl",
-        device="falcon",
-        windowed=True,  # as all pilots
-        screen=2,
-        results=tmp_path / "results",
-        pilot=True,
-        recordings=False,
-        resumes=begun.folder.path,
-    )
+    begun_as = replace(CHOSEN, source="rek2024", participant="P007", seed=41, language="nl", device="falcon")
+    again = replace(begun_as, pilot=True, recordings=False, results=tmp_path / "results", resumes=begun.folder.path)
+    assert chosen == replace(again, operator="BB", screen=2, windowed=True)  # as all pilots are
     asked = resumed_choices(begun.folder.path, device="mouse", device_options={"firmware": "/firmware.bin"})
     assert (asked.device, asked.device_options) == ("mouse", {"firmware": "/firmware.bin"})

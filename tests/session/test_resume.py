@@ -163,20 +163,8 @@ def square(tmp_path: Path) -> Path:
 
 def chosen_for(path: Path, participant: str, row_of: str | None) -> NewSession:
     results = path.parent / "results"
-    return NewSession(
-        source=str(path),
-        participant=participant,
-        session=1,
-        seed=SEED,
-        operator="AK",
-        language="en",
-        device="mouse",
-        windowed=True,
-        screen=None,
-        results=results,
-        recordings=False,
-        row_of=row_of,
-    )
+    chosen = replace(small.CHOSEN, source=str(path), participant=participant, seed=SEED, results=results)
+    return replace(chosen, recordings=False, row_of=row_of)
 
 
 def codes(schedule: Schedule) -> list[str]:

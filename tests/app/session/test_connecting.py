@@ -16,21 +16,10 @@ from study_app.protocol.trials.tasks import Explore
 from study_app.protocol.wording.languages import words
 from study_app.session.pages import Interval, TaskPage, TextPage
 from study_app.session.resume import FIRST, Start
-from study_app.session.start import NewSession
 from tests.journal_lines import event_of
+from tests.session import small
 
-CHOSEN = NewSession(
-    source="demo",
-    participant="P007",
-    session=1,
-    seed=41,
-    operator="AK",
-    language="nl",
-    device="mouse",
-    windowed=False,
-    screen=None,
-    results=Path("nowhere"),
-)
+CHOSEN = replace(small.CHOSEN, participant="P007", language="nl", windowed=False)
 STUDY = load("demo")
 SEEN = STUDY.model_copy(
     update={

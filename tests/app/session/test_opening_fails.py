@@ -21,22 +21,12 @@ from study_app.gui.operator.window import OperatorWindow
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.gui.theme.theme import LIGHT
 from study_app.protocol.load import load
-from study_app.session.start import NewSession, Ready
+from study_app.session.start import Ready
 from study_app.store.blinded.blinding import open_or_draw_key
 from tests.compiled import needs_servo
+from tests.session import small
 
-CHOSEN = NewSession(
-    source="demo",
-    participant="P001",
-    session=1,
-    seed=7,
-    operator="AK",
-    language="en",
-    device="scripted",
-    windowed=True,
-    screen=None,
-    results=Path("nowhere"),
-)
+CHOSEN = replace(small.CHOSEN, device="scripted")
 
 
 class Part:
@@ -148,21 +138,7 @@ def test_changed_conditions_are_refused_before_a_device_opens(qtbot, tmp_path, m
     open_or_draw_key(tmp_path, study.model_copy(update={"liquids": {**study.liquids, "unused": unused}}))
     opened = []
     monkeypatch.setattr(live_session, "open_rig", lambda name, *_, **__: opened.append(name))
-    live = LiveSession(
-        NewSession(
-            source="demo",
-            participant="P001",
-            session=1,
-            seed=7,
-            operator="",
-            language="en",
-            device="mouse",
-            windowed=True,
-            screen=None,
-            results=tmp_path,
-        ),
-        LIGHT,
-    )
+    live = LiveSession(replace(small.CHOSEN, results=tmp_path), LIGHT)
     with qtbot.waitSignal(live.over):
         live.open()
     live.wait()

@@ -3,7 +3,6 @@
 import threading
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -25,27 +24,17 @@ from study_app.outlets.session_outlets import OutletStatus
 from study_app.protocol.load import load
 from study_app.protocol.trials.tasks import Stroke
 from study_app.session.preflight import Measurements, PredictedDelivery
-from study_app.session.start import NewSession, Ready
+from study_app.session.start import Ready
 from tests.session import small
+from tests.session.small import CHOSEN
 
-CHOSEN = NewSession(
-    source="demo",
-    participant="P001",
-    session=1,
-    seed=7,
-    operator="AK",
-    language="en",
-    device="mouse",
-    windowed=True,
-    screen=None,
-    results=Path("nowhere"),
-)
 FACTS = replace(
     small.WELL,
     timing=Timing(ticks=2000, rate_hz=1000.0, lateness_p99_s=6e-5, worst_gap_s=2e-3, overruns=0),
     participant="P001",
     grant=NO_THREAD,
 )
+
 COSTS = Costs(tick_ns=146.0, rest_ns=40.0, effects=())
 
 
