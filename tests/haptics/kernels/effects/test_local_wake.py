@@ -39,11 +39,10 @@ def literal(felt, motion):
 PATHS = {"circle": {}, "stop": {}, "zigzag": {}, "reach": {"distance_m": 0.2}, "reverse": {}}
 
 
-@pytest.mark.nightly
 @pytest.mark.slow
 @pytest.mark.skipif(not COMPILED, reason="seconds of motion are for compiled code")
 @pytest.mark.parametrize("name", PATHS)
-@pytest.mark.parametrize(("length", "worst"), [(300, 0.01), (1700, 0.06)])
+@pytest.mark.parametrize(("length", "worst"), [(300, 0.01), pytest.param(1700, 0.06, marks=pytest.mark.nightly)])
 def test_cells_stand_for_their_elements(name, length, worst):
     felt = tank(length=length, scaling=length, decay=0.999975, spreading_m2ps=1e-3)
     motion = programmed_motion(name, **PATHS[name])
