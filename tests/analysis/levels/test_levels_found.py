@@ -1,6 +1,7 @@
 """The answers to levels of each design are those that are counted here from the table of trials."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -14,6 +15,7 @@ from study_app.analysis.levels import thresholds, tracks
 from study_app.analysis.levels.answers import Answers
 from study_app.analysis.levels.evaluate import level_results
 from study_app.analysis.levels.statistic import statistics
+from study_app.analysis.results import LevelsResult
 from study_app.protocol.trials.designs import Rated
 from study_app.protocol.trials.stimuli import Stimulus
 from tests.analysis.levels.level_studies import ONE, STIMULUS, block
@@ -130,10 +132,136 @@ def test_incorrect_answers_to_catch_trials_are_counted_by_session(most: float | 
     frame = pd.DataFrame(found, columns=["participant", "session", "block", "catch", "right"])
     opened = frame.astype(dict.fromkeys(("catch", "right"), "boolean"))
     counted = [] if most is None else [("P001", 1, 3, 2, most), ("P001", 2, 4, 1, most), ("P002", 1, 1, 1, most)]
-    (catches,) = (statistic for statistic in statistics() if statistic.key == "catches")
-    nothing: Any = None
-    rows = catches.compute(replace(BLOCKS["forced choice"], wrong_most=most), opened, nothing, nothing)
-    assert [tuple(row.values()) for row in rows] == counted
+    rows = keyed("catches").compute(replace(BLOCKS["forced choice"], wrong_most=most), opened, None, None)
+    names = ("participant", "session", "n", "wrong", "most")
+    assert list(rows) == [dict(zip(names, count, strict=True)) for count in counted]
+
+
+VISIT = {"participant": "P001", "session": 1, "block": "b"}
+LEVEL_ERROR = (
+    "Level error is the delivered level minus the requested level, computed from the recorded samples (for delays, "
+    "from the frames); fits use the delivered levels."
+)
+
+
+def keyed(key: str) -> Any:
+    """Return a statistic by its key in report.json."""
+    return next(statistic for statistic in statistics() if statistic.key == key)
+
+
+def shown(key: str, rows: Sequence[Any], **about: Any) -> Any:
+    """Return a statistic with these rows, to be shown in the report."""
+    about = {"summary": "share", "counts": "correct", "statistics": {key: tuple(rows)}, **about}
+    result = LevelsResult(block="b", title="B", design="2ifc", revealed=True, times=(), **about)
+    return keyed(key)(result, estimator="kalman")
+
+
+def cells(statistic: Any) -> list[list[str]]:
+    """Return the headings of a statistic's table in the report, and the cells of its rows."""
+    columns = [column for column in statistic.table_columns() if column is not None]
+    return [[heading for heading, _ in columns], *([cell(row) for _, cell in columns] for row in statistic.rows)]
+
+
+def test_the_delivery_of_each_standard_counts_analysed_trials_and_averages_their_last_attempts() -> None:
+    asked = [  # trial, standard, level, level_delivered, analysed; a level of 0 has no error
+        (1, 4.0, 0.2, 0.25, True), (2, 4.0, 0.4, 0.31, True), (3, 4.0, 0.0, 0.9, True), (4, 4.0, 0.3, None, True),
+        (5, 8.0, 0.5, 0.44, True), (6, 8.0, 0.1, 0.7, False), (7, math.nan, 0.6, 0.61, True),
+    ]  # fmt: skip
+    names = ["trial", "standard", "level", "level_delivered", "analysed"]
+    opened = pd.DataFrame(asked, columns=names).astype({"level_delivered": "Float64"}).assign(**VISIT)
+    other = opened.assign(block="other", trial=opened["trial"] + 20)
+    presented = [  # trial, attempt, counted, reasons, speed, mass
+        (1, 1, False, "slip pace_error_percent", 5.0, 1.0), (1, 1, False, "slip slip", 5.0, 1.0),
+        (1, 2, True, None, 0.11, 0.021), (1, 2, True, None, 0.13, 0.023),
+        (2, 1, True, "pace_error_percent", 0.2, 0.05), (2, 1, True, "pace_error_percent", 0.24, 0.066),
+        (5, 1, False, "slip", 5.0, 1.0), (5, 2, False, "slip", 5.0, 1.0), (5, 3, True, None, 0.31, None),
+        (6, 1, True, "slip", 5.0, 1.0), (6, 2, True, "late", 5.0, 1.0), (21, 1, True, "late", 5.0, 1.0),
+    ]  # fmt: skip
+    names = ["trial", "attempt", "counted", "invalid_reasons", "pace_mps", "apparent_mass_kg"]
+    intervals = pd.DataFrame(presented, columns=names).assign(**VISIT)
+    intervals["block"] = np.where(intervals["trial"] > 20, "other", "b")
+    study, delivery = SimpleNamespace(intervals=intervals), keyed("conduct")
+    first, second, third = delivery.compute(block(), pd.concat([opened, other]), study, None)
+    rows = first, second, third
+    assert [row.pop("reasons") for row in map(dict, rows)] == [{"pace_error_percent": 3, "slip": 2}, {"slip": 2}, {}]
+    of_4 = {"trials": 4, "repeated": 1, "measured": 2, "error_mean": -0.02, "error_largest": 0.09}
+    of_8 = {"trials": 1, "repeated": 2, "measured": 1, "error_mean": -0.06, "error_largest": 0.06}
+    last = {"trials": 1, "repeated": 0, "measured": 1, "error_mean": 0.01, "error_largest": 0.01}
+    for row, expected in (
+        (first, of_4 | {"standard": 4.0, "pace_mps": 0.17, "apparent_mass_kg": 0.04}),
+        (second, of_8 | {"standard": 8.0, "pace_mps": 0.31, "apparent_mass_kg": None}),
+        (third, last | {"standard": None, "pace_mps": None, "apparent_mass_kg": None}),
+    ):
+        assert {name: value for name, value in row.items() if name != "reasons"} == pytest.approx(expected)
+    assert list(delivery.compute(replace(block(), stimulus=None), opened, study, None)) == []
+    section = shown("conduct", rows, level_kind="difference", unit="mN")
+    assert cells(section) == [
+        ["Standard [mN]", "trials", "repeated attempts", "measured", "mean level error [mN]", "largest",
+         "RMS hand speed [m/s]", "apparent mass [kg]"],
+        ["4", "4", "1", "2", "−0.020", "0.090", "0.170", "0.040"],
+        ["8", "1", "2", "1", "−0.060", "0.060", "0.310", "–"],
+        ["–", "1", "0", "1", "0.010", "0.010", "–", "–"],
+    ]  # fmt: skip
+    assert cells(shown("conduct", [third], level_kind="weber", unit="mN"))[0][:4] == [
+        "trials", "repeated attempts", "measured", "mean level error",
+    ]  # fmt: skip
+    assert section.explanation() == (
+        f"{LEVEL_ERROR} Apparent mass is the coefficient m in a least-squares fit of F = −b v − m a to the force sent "
+        "to the device, using the velocity estimator “kalman”. Some intervals exceeded a limit: slip in four intervals "
+        "and pace error in three intervals."
+    )
+    assert shown("conduct", [third]).explanation() == f"{LEVEL_ERROR} All intervals were within the limits."
+
+
+def test_a_session_is_excluded_if_more_catch_trials_than_the_limit_are_incorrect() -> None:
+    counts = [("P001", 1, 2), ("P001", 3, 3)]
+    rows = [
+        {"participant": person, "session": session, "n": 8, "wrong": wrong, "most": 0.25}
+        for person, session, wrong in counts
+    ]
+    assert cells(shown("catches", rows)) == [
+        ["Participant", "session", "n", "incorrect", "percentage", "rule"],
+        ["P001", "1", "8", "2", "25 %", "kept: at most 25 %"],
+        ["P001", "3", "8", "3", "38 %", "excluded: more than 25 %"],
+    ]
+
+
+def test_the_force_held_back_is_given_for_comparisons_at_each_level_of_a_link() -> None:
+    """Neighbouring ones of more than eight levels share a row."""
+    shares = {
+        (10.0, 20.0): (0.01, 0.03), (10.0, 40.0): (0.05,), (10.0, 60.0): (0.06, 0.41), (10.0, 80.0): (0.02,),
+        (20.0, 50.0): (0.3,), **{(30.0, float(level)): (level / 1000,) for level in range(1, 10)},
+    }  # fmt: skip
+    rows = [(standard, level, "comparison", "b", share) for (standard, level), held in shares.items() for share in held]
+    rows += [(10.0, 20.0, "standard", "b", 0.9), (10.0, 20.0, "comparison", "other", 0.8)]
+    rows += [(10.0, 20.0, "comparison", "b", None), (10.0, None, "comparison", "b", 0.7)]
+    frame = pd.DataFrame(rows, columns=["standard", "level", "presented", "block", "withheld_share"])
+    study, withheld = SimpleNamespace(intervals=frame), keyed("withheld")
+    unknown = frame[:2].assign(standard=np.nan)
+    found = list(withheld.compute(replace(block(), stimulus=LINK), None, study, None))
+    assert [list(row.values()) for row in found[:5]] == [
+        pytest.approx([10.0, 20.0, 20.0, 2, 2.0, 3.0]), pytest.approx([10.0, 40.0, 40.0, 1, 5.0, 5.0]),
+        pytest.approx([10.0, 60.0, 60.0, 2, 23.5, 41.0]), pytest.approx([10.0, 80.0, 80.0, 1, 2.0, 2.0]),
+        pytest.approx([20.0, 50.0, 50.0, 1, 30.0, 30.0]),
+    ]  # fmt: skip
+    assert list(found[0]) == ["standard", "low", "high", "n", "mean_percent", "most_percent"]
+    assert [(row["low"], row["high"], row["n"]) for row in found[5:]] == [(1, 2, 2), *((n, n, 1) for n in range(3, 10))]
+    (row,) = withheld.compute(replace(block(), stimulus=LINK), None, SimpleNamespace(intervals=unknown), None)
+    assert (row["standard"], row["n"]) == (None, 2)
+    for stimulus in (None, STIMULUS):
+        assert list(withheld.compute(replace(block(), stimulus=stimulus), None, study, None)) == []
+    section = shown("withheld", found, unit="ms")
+    table = cells(section)
+    assert table[0] == ["Standard [ms]", "Level [ms]", "intervals", "mean", "maximum"]
+    assert [table[3], table[6]] == [["10", "60", "2", "23.5 %", "41.0 %"], ["30", "1 – 2", "2", "0.2 %", "0.2 %"]]
+    never = "the safety layer never held back more than 5 % of the force."
+    assert section.explanation().startswith(
+        f"In comparisons of up to 40 ms at a standard of 10 ms, {never} In at least one comparison at the lowest level "
+        "at a standard of 20 ms, the safety layer held back more than 5 % of the force. In comparisons of up to 9 ms "
+        f"at a standard of 30 ms, {never} The table shows"
+    )
+    alone = [row | {"standard": None} for row in found[:1]]
+    assert shown("withheld", alone).explanation().startswith(f"In comparisons of up to 20, {never}")
 
 
 def test_the_mean_of_reversals_is_that_of_the_tracks_in_the_coordinate_of_the_stimulus(
