@@ -32,9 +32,11 @@ from study_app.analysis.report.first_page import Presented, cards, first_page
 from study_app.analysis.report.methods import methods
 from study_app.analysis.report.sections import limits
 from study_app.analysis.report.write_report import report
-from study_app.analysis.results import Results
+from study_app.analysis.results import ContrastResult, ContrastSide, Results
+from study_app.analysis.statistics.effect_sizes import EffectSize
 from study_app.analysis.statistics.equivalence import tost
 from study_app.analysis.statistics.mean_tests import equivalence_power, means_of, p_differs
+from study_app.analysis.statistics.outcome import Interval
 from study_app.analysis.statistics.thresholds import group_mean
 from study_app.errors import ProtocolError
 from study_app.number_text import counted
@@ -779,6 +781,85 @@ def test_an_order_that_is_the_same_for_all_is_a_limit_of_a_comparison_of_blocks(
         "effects of the order, such as practice."
     ]
     assert told(block_order="balanced") == []
+
+
+def test_each_column_of_a_hypothesis_has_its_value_in_the_tables_and_in_the_report() -> None:
+    values = {"first": {"P1": 2.0, "P2": 3.5, "P3": 9.0}, "second": {"P1": 1.0, "P2": 5.0, "P3": 3.0}}
+    sides = (
+        ContrastSide(name="c2", values=values["first"], mean=4.21, low=3.6, high=4.9, sd=1.61, standard_error=0.83),
+        ContrastSide(name="c1", values=values["second"], mean=3.59, low=3.1, high=4.2, sd=1.42, standard_error=0.72),
+    )
+    warm = ContrastResult(
+        test="contrast, paired t test", n=23, dropped=2, statistic_name="t", statistic=2.31, p=0.031, effect=0.62,
+        method="two-sided", effect_name="difference", no_interval="", note="", compared=("c2", "c1"), ratio=False,
+        interval=Interval(low=0.06, high=1.18, level=0.95, method="t(22)"), p_adjusted=0.074, members=2, higher=14,
+        contrast=Contrast(measure="warm", blocks=("b",), conditions=("c2", "c1"), bound=1.5), verdict="not shown",
+        equivalent=False, p_bootstrap=0.037, p_skewed=0.029, p_equivalent=0.21, not_excluded=None, sides=sides,
+        left_out={"P7": "no answer", "P9": "asleep", "P8": "no answer"}, sd=1.29, bayes_factor=1.87,
+        standardised=EffectSize(name="d_z", value=0.48, low=0.04, high=0.91, t=2.31), measure_name="warmth",
+        ordinal=EffectSize(name="delta", value=0.35, low=-0.02, high=0.66), block_title="Oil", standard_error=0.27,
+        freedom=22,
+    )  # fmt: skip
+    late = replace(
+        warm, contrast=Contrast(blocks=("late", "prompt"), expected="higher"), compared=("Late", "Prompt"), ratio=True,
+        interval=None, no_interval="all equal", note="too few", sides=(), standardised=None, ordinal=None, left_out={},
+        verdict="shown", measure_name="",
+    )  # fmt: skip
+    results: Any = SimpleNamespace(contrasts=(warm, late), decided=SimpleNamespace(binding=True))
+    rows = list(contrasts.contrast_rows(results))
+    assert [[row[name] for row in rows] for name in ("block", "item", "interval", "note", "verdict")] == [
+        ["b", "late"], ["warm", None], ["t(22)", "all equal"], [None, "too few"], ["not shown", "shown"],
+    ]  # fmt: skip
+    assert rows[0] == {
+        "block": "b", "question": "Warmth differs between c2 and c1 in Oil, with an equivalence bound of 1.5",
+        "item": "warm", "comparison": None, "test": "contrast, paired t test", "n": 23, "dropped": 2,
+        "statistic_name": "t", "statistic": 2.31, "p": 0.031, "p_adjusted": 0.074, "smallest_p": None,
+        "family": "hypotheses", "members": 2, "correction": "Holm", "primary": True, "verdict": "not shown",
+        "effect_name": "difference", "effect": 0.62, "low": 0.06, "high": 1.18, "level": 0.95, "interval": "t(22)",
+        "method": "two-sided", "note": None, "codes": "",
+    }  # fmt: skip
+    lines = list(page_lines("".join(contrast_section(results))))
+    for line in (
+        "Comparison | n | t | df | t-test p | p | adjusted p | equivalence p | mean difference or ratio | SE | 95 % CI "
+        "lower | 95 % CI upper | BF₁₀ | Verdict",
+        "1. Warmth: c2 − c1 | 23 | 2.31 | 22 | .031 | .037 | .074 | .210 | 0.62 | 0.27 | 0.06 | 1.18 | 1.87 | "
+        "not significant",
+        "2. Threshold: Late ÷ Prompt | 23 | 2.31 | 22 | .031 | .037 | .074 | .210 | 0.62 | 0.27 | – | – | 1.87 | "
+        "significant",
+        "1. Warmth: c2 − c1 | d z | 0.48 | 0.04 | 0.91",
+        "1. Warmth: c2 − c1 | delta | 0.35 | −0.02 | 0.66",
+        "1. Warmth: c2 | 3 | 4.21 | 3.50 | 1.61 | 0.83",
+        "1. Warmth: c1 | 3 | 3.59 | 3.00 | 1.42 | 0.72",
+        "1. Warmth: c2 − c1 | 3 | 0.62 | 1.00 | 1.29 | 0.27",
+    ):
+        assert line in lines
+    excluded = "excluded P7, P8 (no answer); P9 (asleep)."
+    assert any(line.endswith(f"equivalence bound of 1.5: {excluded}") for line in lines)
+
+
+def test_the_measure_of_a_hypothesis_is_named_by_the_texts_of_its_own_block_or_form() -> None:
+    def block(name: str, **shorts: str) -> Any:
+        return SimpleNamespace(id=name, items=[SimpleNamespace(id=item, short=text) for item, text in shorts.items()])
+
+    load, after = SimpleNamespace(id="load", title="Load"), SimpleNamespace(id="after", title="After")
+    others = SimpleNamespace(
+        scores=[SimpleNamespace(where=form, name="raw", title=f"{form.title} raw") for form in (after, load)],
+        questions=[
+            SimpleNamespace(where=form, id=name, short=f"{name} of {form.id}")
+            for name in ("calm", "sure")
+            for form in (after, load)
+        ],
+    )
+    blocks = [block("a", warm="Hot"), block("b", thick="Thick", warm="Warm"), block("c", warm="Lukewarm")]
+    study: Any = SimpleNamespace(blocks=blocks, others=others)
+    for named, name in (
+        ({"measure": "warm", "blocks": ("b",), "conditions": ("c2", "c1")}, "agreement with “Warm”"),
+        ({"measure": "warm", "blocks": ("c",), "conditions": ("c2", "c1")}, "agreement with “Lukewarm”"),
+        ({"measure": "raw", "form": "load", "blocks": ("a", "b")}, "Load raw score"),
+        ({"measure": "sure", "form": "load", "blocks": ("a", "b")}, "“sure of load” (Load)"),
+        ({"measure": "threshold", "blocks": ("a", "b")}, ""),
+    ):
+        assert contrasts._measure_name(study, Contrast.model_validate(named)) == name
 
 
 @pytest.mark.parametrize(
