@@ -17,7 +17,7 @@ import pyreadstat
 import pytest
 from pyarrow import parquet
 
-from study_app.analysis.data.blocks import Item, Setting
+from study_app.analysis.data.blocks import Item, OtherQuestions, PlacedScore, Setting
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.export import psychds_dataset, spss, table_files
 from study_app.analysis.export.table_files import codebook_bytes, credit_lines, file_name
@@ -184,6 +184,89 @@ def test_a_text_in_the_wide_table_is_that_of_the_last_session(made: Study, monke
     others: Any = SimpleNamespace(questions=(asked,), scores=())
     wide = wide_table(replace(made, others=others))[0].frame.set_index("participant")["end__why"]
     assert wide.dropna().to_dict() == {"A-P002": "last"}
+
+
+def test_questions_and_scores_have_their_answers_and_texts_in_the_wide_table_spss_and_codebook(
+    made: Study, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    form: Any = SimpleNamespace(
+        id="end", title="End", is_form=True, settings=(Setting(code="stir"), Setting(code="again")),
+        name=lambda setting: f"After {setting.code}",
+    )  # fmt: skip
+    mild = (Setting(code="Q1", condition="mild"),)
+    block: Any = SimpleNamespace(id="q", title="Oils", is_form=False, settings=mild, name=lambda it: it.condition)
+    shown: Any = SimpleNamespace(model_dump=lambda mode: {"item": "pick", "mode": mode})
+    sure: Any = SimpleNamespace(
+        where=form, id="sure", text="How sure?", short="Sure", levels={"2": "low", "9": "high"}, bounds=(2, 9),
+        cannot_judge="no idea", question=SimpleNamespace(value_type="number", kind_id="scale", show_if=shown),
+    )  # fmt: skip
+    options: Any = SimpleNamespace(value_type="text", kind_id="choice", show_if=None, names_several=False)
+    pick: Any = SimpleNamespace(
+        where=block, id="pick", text="Pick one", short="Pick", levels={"o": "Oil", "w": "Water"}, bounds=None,
+        cannot_judge=None, question=options,
+    )  # fmt: skip
+    score: Any = SimpleNamespace(model_dump=lambda mode, exclude_defaults: {"mean_of": ["sure"]})
+    raw = PlacedScore(form, "raw", "tlx", score, ())
+    given = pd.DataFrame(
+        [
+            ("A-P001", "stir", 3), ("A-P001", "stir", 6), ("A-P002", "stir", 7), ("A-P001", "again", 8),
+            ("A-P002", "again", None), ("B-P001", "again", None),
+        ],
+        columns=["participant", "code", "value"],
+    )  # fmt: skip
+    given = given.assign(counted=given["participant"] != "B-P001", excluded=given["participant"] == "B-P001")
+    given = given.assign(cannot_judge=given["counted"] & given["value"].isna(), score=given["value"] * 10 + 1)
+    picked = pd.DataFrame(
+        [
+            ("A-P001", "Q1", "o", 2, 1),
+            ("A-P001", "Q1", "w", 1, 9),
+            ("A-P002", "Q1", "w", 1, 2),
+            ("B-P001", "Q2", "o", 1, 1),
+        ],
+        columns=["participant", "code", "response", "session", "trial"],
+    ).assign(counted=True, excluded=False, cannot_judge=False)
+    for method in ("answers_to", "rows_of"):
+        monkeypatch.setattr(Study, method, lambda _study, question: given if question is sure else picked)
+    monkeypatch.setattr("study_app.analysis.export.tables.scored", lambda _study, _score: given)
+    asked = replace(made, others=OtherQuestions(questions=(sure, pick), scores=(raw,)))
+    table, cells = wide_table(asked)
+    expected = {
+        "end__sure__stir": (4.5, 7, "How sure? In End. After stir.", 2, 9),
+        "end__sure__again": (8, None, "How sure? In End. After again.", 2, 9),
+        "q__pick__mild": ("o", "w", "Pick one. In Oils. About mild.", None, None),
+        "end__raw__stir": (46, 71, "Score raw of tlx, in End. After stir.", None, None),
+        "end__raw__again": (81, None, "Score raw of tlx, in End. After again.", None, None),
+    }
+    columns = {column.name: column for column in table.columns if column.name in expected}
+    assert list(columns) == [*expected]
+    for name, (first, second, description, minimum, maximum) in expected.items():
+        held = [None if pd.isna(cell) else cell for cell in table.frame[name]]
+        assert held == [first, second, None, None], name
+        column = columns[name]
+        assert (column.description, column.minimum, column.maximum) == (description, minimum, maximum)
+    (tmp_path / "wide.sav").write_bytes(spss.wide_sav(asked, table, cells))
+    frame, about = pyreadstat.read_sav(tmp_path / "wide.sav", user_missing=True)
+    assert frame[["end__sure__stir", "end__sure__again", "q__pick__mild", "end__raw__stir"]].fillna(
+        -1
+    ).T.to_numpy().tolist() == [[4.5, 7, 99, 99], [8, 98, 97, 99], [1, 2, 99, 99], [46, 71, -1, -1]]
+    off = {97: "Excluded", 99: "No answer"}
+    labels = {"end__sure__again": {2: "low", 9: "high", 98: "no idea", **off}}
+    labels["q__pick__mild"] = {1: "Oil", 2: "Water", 98: "Cannot judge", **off}
+    assert {name: about.variable_value_labels[name] for name in labels} == labels
+    measures = {"end__sure__again": "ordinal", "q__pick__mild": "nominal", "end__raw__stir": "scale"}
+    assert {name: about.variable_measure[name] for name in measures} == measures
+    book = json.loads(codebook_bytes(asked, {}))
+    assert book["questions"] == [
+        {
+            "form": "end", "id": "sure", "kind": "scale", "text": "How sure?", "short": "Sure", "range": [2, 9],
+            "levels": {"2": "low", "9": "high"}, "cannot_judge": "no idea", "show_if": {"item": "pick", "mode": "json"},
+        },
+        {
+            "block": "q", "id": "pick", "kind": "choice", "text": "Pick one", "short": "Pick",
+            "levels": {"o": "Oil", "w": "Water"},
+        },
+    ]  # fmt: skip
+    assert book["scores"] == [{"form": "end", "name": "raw", "instrument": "tlx", "mean_of": ["sure"]}]
 
 
 def test_the_codebook_counts_answers_and_names_conditions_with_the_same_delay(
