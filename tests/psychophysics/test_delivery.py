@@ -12,7 +12,16 @@ from study_app.haptics.model.estimators import Ewma, Kalman
 from study_app.haptics.model.motion import Motion as Path
 from study_app.haptics.model.scene import ForceLink, Liquid, Scene, Velocity
 from study_app.haptics.runtime.offline import samples_along
-from study_app.psychophysics.delivery import EARLIER, damping, interpolate_vectors, lag, motion
+from study_app.psychophysics.delivery import (
+    EARLIER,
+    Motion,
+    damping,
+    difference,
+    interpolate_vectors,
+    lag,
+    motion,
+    sent_share,
+)
 from tests.compiled import needs_servo
 
 RATE_HZ = 1000.0
@@ -146,6 +155,30 @@ def test_the_lag_of_a_force_is_found_within_a_tenth_of_a_row(rows: float) -> Non
     assert lag(0.4 * sent, model, 260) == pytest.approx(rows, abs=0.1)  # a share of it is as late
     noisy = sent + np.random.default_rng(3).normal(0, 0.05, sent.shape)
     assert lag(noisy, model, 260) == pytest.approx(rows, abs=1.0)
+
+
+def test_the_share_of_a_force_that_was_sent_ignores_what_is_across_it() -> None:
+    model = np.array([[2.0, 0.0, 1.0], [0.0, 3.0, 0.0]])
+    across = np.array([[1.0, 5.0, -2.0], [4.0, 0.0, 7.0]])
+    assert sent_share(0.4 * model + across, model) == pytest.approx(0.4)
+    assert sent_share(-0.3 * model, model) == pytest.approx(-0.3)
+    assert sent_share(model, 0 * model) is None
+
+
+def test_the_error_of_the_comparison_is_relative_to_that_of_the_standard() -> None:
+    errors, comparisons = [0.5, 0.7, None, 0.1, 1.0], [True, False, True, True, False]
+    assert difference(errors, comparisons) == pytest.approx(0.3 - 0.85)
+    assert difference(errors[:1], comparisons[:1]) is None
+    assert difference(errors[1:3], comparisons[1:3]) is None
+
+
+def test_a_part_of_a_motion_has_both_of_its_ends() -> None:
+    vectors = np.arange(12.0).reshape(4, 3)
+    part = Motion(np.array([0.1, 0.2, 0.4, 0.8]), vectors, 100 + vectors).after(0.2, 0.4)
+    assert part.times_s.tolist() == [0.2, 0.4]
+    assert part.velocity_mps.tolist() == [[3, 4, 5], [6, 7, 8]]
+    assert part.acceleration_mps2.tolist() == [[103, 104, 105], [106, 107, 108]]
+    assert part.rms_speed_mps == pytest.approx(np.sqrt((9 + 16 + 25 + 36 + 49 + 64) / 2))
 
 
 def test_a_force_in_the_other_direction_or_none_has_no_lag() -> None:
