@@ -1,22 +1,27 @@
 """The report: whole, self-contained, the same each time."""
 
 import csv
+import hashlib
 import random
 import re
 import shutil
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
 from study_app.analysis.data.study_tables import load_study
 from study_app.analysis.evaluate import evaluate
+from study_app.analysis.report import write_report
 from study_app.analysis.report.sections import conduct
 from study_app.analysis.report.write_report import report
 from study_app.errors import AnalysisError
 from study_app.store.exclusions import exclude, include, keep
 from tests.analysis.conftest import HIDDEN, Results, twelve
 from tests.analysis.report.read_report import answered_by_two, numbers, read, run_in_r
+from tests.golden_values import page_lines
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("quick_pdf")]
 
@@ -179,6 +184,37 @@ def test_what_progress_raises_ends_the_report_at_every_step_and_nothing_is_writt
             report(small.folder, tmp_path / "not", progress=cancel)
         assert len(asked) == step + 1
         assert not (tmp_path / "not").exists()
+
+
+def test_the_settings_versions_and_hashes_of_a_report_are_listed(monkeypatch: pytest.MonkeyPatch) -> None:
+    reveals = [
+        {"at": "2026-03-04", "by": "AK", "reason": "closed", "site": "Delft"},
+        {"at": "5", "by": "B", "reason": "c"},
+    ]
+    hashes = {"data/b.csv": "2e", "data/a.csv": "1f"}
+    for name, value in (("files", hashes), ("plug_ins", {"oil": ["thin", "wax"]}), ("reveals_of", reveals)):
+        monkeypatch.setattr(write_report, name, lambda _study, value=value: value)
+    monkeypatch.setattr(write_report, "versions", lambda: {"numpy": "2.1"})
+    decided = SimpleNamespace(
+        binding=True, alpha_words=lambda: "0.04", equivalence_bound=0.5, primary=("warm", "thick")
+    )
+    asked: Any = SimpleNamespace(folder=Path("nowhere"))
+    results: Any = SimpleNamespace(decided=decided, seed=731)
+    lines = list(page_lines("".join(write_report._reproduction_sentences(asked, results))))
+    assert lines[:12] == [
+        "Reproducing this report", "Setting | Value", "Analysis decided before the first session | yes", "Alpha | 0.04",
+        "Equivalence bound for statements | ±0.5 points", "Primary statements | warm, thick",
+        "Seed of the analysis | 731", "Version of numpy | 2.1", "Plug-in oil | thin, wax",
+        "Key opened | site Delft, 2026-03-04 by AK: closed; 5 by B: c", "File | SHA-256", "data/b.csv | 2e",
+    ]  # fmt: skip
+    together = hashlib.sha256(b"1f  data/a.csv\n2e  data/b.csv\n").hexdigest()
+    assert f"based on two files. The combined SHA-256 of the files' hashes and names is {together}." in lines[13]
+    decided.binding, decided.equivalence_bound = False, None
+    lines = list(page_lines("".join(write_report._reproduction_sentences(asked, results))))
+    assert [lines[2], *lines[4:6]] == [
+        "Analysis decided before the first session | no; all results are exploratory",
+        "Equivalence bound for statements | none", "Primary statements | none",
+    ]  # fmt: skip
 
 
 def test_an_unreadable_place_leaves_nothing(small: Results, tmp_path: Path) -> None:
