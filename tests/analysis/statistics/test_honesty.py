@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.stats import binom
+from scipy.stats import binom, ttest_1samp
 
 from study_app.analysis.statistics.equivalence import tost
-from study_app.analysis.statistics.outcome import Outcome
+from study_app.analysis.statistics.outcome import Outcome, draws_for, student_interval
 from study_app.analysis.statistics.rank_tests import friedman, global_permutation, signed_rank_test
 from study_app.analysis.statistics.recognition_tests import (
     UNANSWERED,
@@ -82,8 +82,26 @@ def test_every_result_holds_what_it_promises(test: str, table: str) -> None:
         assert result.smallest_p is None or result.smallest_p <= result.p + 1e-12
     if result.interval is not None:
         assert result.interval.low <= result.interval.high
+        assert result.effect is None or result.interval.low <= result.effect <= result.interval.high
     said = " ".join(str(part) for part in dataclasses.astuple(result))
     assert "no effect" not in said
+
+
+def test_the_interval_of_a_mean_is_that_of_t_and_needs_values_that_differ() -> None:
+    values = np.array([0.5, 2.0, 2.5, 7.0])
+    for level in (0.9, 0.95):
+        ends = ttest_1samp(values, 0.0).confidence_interval(level)
+        assert student_interval(values, level) == pytest.approx((ends.low, ends.high))
+    for few in (values[:0], values[:1], np.full(4, 0.1)):
+        assert student_interval(few) == (None, None)
+
+
+def test_a_stricter_alpha_and_more_tests_need_more_permutations() -> None:
+    usual, strict, many = draws_for(0.05, 1000), draws_for(0.001, 1000), draws_for(0.001, 1000, 3)
+    assert usual == 1000
+    assert strict > 5000
+    assert many == pytest.approx(3 * strict, abs=3)
+    assert many < draws_for(1e-12, 1000) == draws_for(1e-15, 1000), "there is an upper limit"
 
 
 # Fewest hits in all with p ≤ .05: participants, by matching, by the binomial distribution (too liberal).

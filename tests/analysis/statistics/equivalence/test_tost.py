@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from study_app.analysis.statistics.equivalence import tost
+from study_app.analysis.statistics.equivalence import fewest_participants, tost
 from study_app.errors import AnalysisError
 
 
@@ -75,3 +75,23 @@ def test_published_power_at_no_difference(n: int, power: float) -> None:
     rng = np.random.default_rng(n)
     shown = [(tost(rng.normal(0, 2.36, n), 1.0).p or 0.0) <= 0.05 for _ in range(1000)]
     assert np.mean(shown) == pytest.approx(power, abs=0.05)
+
+
+@pytest.mark.parametrize(
+    ("alpha", "bound", "largest", "n"),
+    [
+        (0.05, 1.0, 6.0, 17),
+        (0.01, 1.0, 6.0, 26),
+        (0.4096, 3.0, 6.0, 4),
+        (0.4, 3.0, 6.0, 5),
+        (0.05, 1.0, 12.0, 35),
+        (0.05, 1.0, None, 14),
+    ],
+)
+def test_a_minority_that_could_shift_the_mean_by_the_bound_must_be_improbable_in_the_sample(
+    alpha: float, bound: float, largest: float | None, n: int
+) -> None:
+    """A share of bound / largest, at most a fifth, is missing from n people with a probability of (1 − share)^n."""
+    assert fewest_participants(alpha, bound, largest) == n
+    share = min(0.2, bound / (largest or bound))
+    assert (1 - share) ** n <= alpha * (1 + 1e-9) < (1 - share) ** (n - 1)
