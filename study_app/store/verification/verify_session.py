@@ -354,7 +354,7 @@ def _is_valid_protocol(session_receipt: Mapping[str, Any], start: events.Session
         is_earlier = start.version != study_app.__version__ or needs_upgrade(session_receipt["protocol"])
     except PlugInError:  # the plug-in is missing; `verify` reports it
         return True
-    except (KeyError, TypeError, AttributeError, ValueError):
+    except (StoreError, KeyError, TypeError, AttributeError, ValueError):  # StoreError: the key lacks a code
         return False
     return is_earlier or _without_own_texts(parse_json(json.dumps(protocol))) == _without_own_texts(
         session_receipt["protocol"]

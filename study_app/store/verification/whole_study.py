@@ -472,7 +472,8 @@ def _check_blinding(study: StudyFolder, key: Key | None, findings: Findings) -> 
     if key is None or blinding.reveals(study.path) or published is None:
         return
     levels: frozenset[float] = frozenset()
-    with contextlib.suppress(KeyError, TypeError, AttributeError, ValueError):  # a receipt that lacks required fields
+    # A receipt that lacks required fields, or has a code that the key lacks, is reported with its session.
+    with contextlib.suppress(StoreError, KeyError, TypeError, AttributeError, ValueError):
         protocol = complete_protocol(published, key)
         levels = presented_numbers(protocol)
         for session in study.sessions() if has_intervals(published) else ():  # others present no levels

@@ -14,8 +14,11 @@ from study_app.errors import StoreError
 from study_app.session.simulated.rehearsal import rehearse
 from study_app.store import receipt
 from study_app.store.blinded import blinding
+from study_app.store.files.folders import StudyFolder
+from study_app.store.integrity.folder_lock import lock_folder
 from study_app.store.journals import journal_events
-from study_app.store.verification import verify_session
+from study_app.store.sessions.open_session import Place
+from study_app.store.verification import Discrepancy, session_discrepancies, verify_session
 from study_app.store.verification.whole_study import verify_study
 from tests.faults.support import short
 from tests.platforms import needs_fork
@@ -107,6 +110,64 @@ def test_a_column_that_was_removed_from_a_table_is_found(study: Path) -> None:
         "".join(f"{','.join([*row[:at], *row[at + 1 :]])}\n" for row in rows), encoding="utf-8", newline="\n"
     )
     assert f"{path.name}: has changed since the session ended" in told(verify_study(study))
+
+
+def test_each_difference_of_a_receipt_and_a_recording_from_the_journal_is_named(study: Path) -> None:
+    session = study / P007
+    path, held = session / "receipt.json", receipt.read(session / "receipt.json")
+    blocks = held["protocol"]["blocks"]
+    name, block = next((name, block) for name, block in blocks.items() if len(block["codes"]) > 1)
+
+    def errors(**changes: object) -> set[str]:
+        receipt.write(path, held | changes)
+        return {line.partition(": ")[2] for line in told(verify_study(study)).splitlines() if path.name in line}
+
+    changed = "has changed since the session ended (its checksum differs)"
+    settings = "differs from the journal in the settings used when the session began"
+    assert errors() == set()
+    for codes in (block["codes"][::-1], ["Z9"]):  # in another order, and one that the key does not have
+        protocol = held["protocol"] | {"blocks": blocks | {name: block | {"codes": codes}}}
+        assert errors(protocol=protocol) == {
+            changed, settings, "its protocol has been changed: restore it from a backup",
+        }  # fmt: skip
+    assert errors(seed=9, operator="XY", key_hash="ab" * 32) == {
+        changed, "contains the hash of a different key", "differs from the journal in seed, operator, key_hash",
+    }  # fmt: skip
+    assert errors(device=held["device"] | {"name": "mouse"}) == {changed, "differs from the journal in device"}
+    assert errors(row_of="P001", group="g") == {changed, "differs from the journal in row_of, group"}
+    receipt.write(path, held)
+    first, second = (session / "recordings" / f"trial-00{trial}.parquet" for trial in (1, 3))
+    contents = first.read_bytes(), second.read_bytes()
+    first.write_bytes(contents[1])
+    second.write_bytes(contents[0])
+    findings = told(verify_study(study))
+    for recording, trial, other_trial in ((first, 1, 3), (second, 3, 1)):
+        for sentence in (
+            f"has changed since it was recorded (trial {trial}, attempt 1)",
+            f"contains trial {other_trial}, but the journal says {trial}",
+            f"contains rows {500 + other_trial}, but the journal says {500 + trial}",
+        ):
+            assert f"{P007}/recordings/{recording.name}: {sentence}" in findings
+
+
+def test_an_analysis_is_told_each_file_of_a_session_that_differs_once_with_its_remedy(study: Path) -> None:
+    place = Place(StudyFolder(study), StudyFolder(study).session("P007", 1), "brackish")
+    table = place.folder.table("brackish", "trials")
+    advice = f"run liquid-study verify {study} to check everything"
+    assert session_discrepancies(place) == ()
+    place.folder.crash.write_text("Fatal Python error", encoding="utf-8", newline="\n")
+    table.write_bytes(table.read_bytes().replace(b"999.98", b"-9.0"))
+    difference = "differs from the journal, starting at line 2; the rebuild command recreates it"
+    assert session_discrepancies(place) == (Discrepancy(table, difference, advice),)
+    place.folder.rebuilt.write_text("rewritten", encoding="utf-8", newline="\n")
+    first, *others = session_discrepancies(place)
+    assert (first.path, first.what) == (
+        place.folder.rebuilt, "states that the checksums or the fingerprint were rewritten after the session ended",
+    )  # fmt: skip
+    assert first.remedy.startswith("compare it with fingerprints stored elsewhere: liquid-study verify --fingerprints")
+    assert {(each.path, each.remedy) for each in others} == {(table, advice), (place.folder.rebuilt, advice)}
+    with lock_folder(place.folder.path):
+        assert session_discrepancies(place) == ()
 
 
 ENOUGH = 1  # looks
