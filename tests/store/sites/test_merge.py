@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import shutil
 import signal
 from collections.abc import Callable
@@ -93,6 +94,60 @@ def test_the_proof_of_a_merged_study_has_the_sessions_of_every_site(labs: dict[s
     fewer = [line for line in text.splitlines(keepends=True) if min(sessions) not in line]
     kept.write_text("".join(fewer), encoding="utf-8", newline="\n")
     assert not verify_study(pooled, kept).is_sound
+
+
+def edit_receipts(lab: Path, **fields: object) -> Path:
+    for path in lab.glob("data/sub-*/ses-*/receipt.json"):
+        path.write_text(json.dumps(json.loads(path.read_text("utf-8")) | fields), encoding="utf-8", newline="\n")
+    return lab
+
+
+def test_each_merge_that_is_refused_names_the_site_and_changes_nothing(
+    labs: dict[str, Path], results: Path, tmp_path: Path
+) -> None:
+    a, b, c = (labs[site] for site in "ABC")
+    pooled, new = results / "pooled", results / "new"
+    merge_sites({"A": a, "B": b}, pooled)
+    before = contents(results)
+    names = "half", "other", "mixed", "pilot", "empty"
+    half, other, mixed, pilot, empty = (Path(shutil.copytree(b, tmp_path / name)) for name in names)
+    shutil.rmtree(half / "data/sub-P001")
+    edit_receipts(other, protocol_hash="ab" * 32)
+    edit_receipts(mixed, protocol_hash="cd" * 32)
+    shutil.copy(b / "data/sub-P001/ses-01/receipt.json", mixed / "data/sub-P001/ses-01/receipt.json")
+    edit_receipts(pilot, pilot=True)
+    for folder in empty.glob("data/sub-*"):
+        shutil.rmtree(folder)
+    same = json.loads((b / "data/sub-P001/ses-01/receipt.json").read_text("utf-8"))["protocol_hash"]
+    refusals: tuple[tuple[dict[str, Path], Path, str], ...] = (
+        ({}, new, "no sites were specified"),
+        ({"A": a, "a": b}, new, "site 'a' is specified twice (case is ignored)"),
+        ({"b": c}, pooled, "site 'b' has already been merged (case is ignored)"),
+        ({"A-1": a}, new, "'A-1' cannot be used as the name of a site: use at most 16 letters"),
+        ({"S" * 17: a}, new, f"'{'S' * 17}' cannot be used as the name of a site"),
+        ({"nul": a}, new, "site 'nul' is reserved for a device on Windows"),
+        ({"A": a}, a.parent, f"{a.parent} is not a merged study and is not empty"),
+        ({"C": c}, a / "x" / "y", f"{a / 'x' / 'y'} is, or lies within, the results folder {a}"),
+        ({"A": a, "D": pooled}, new, f"site D: {pooled} belongs to a merged study"),
+        ({"A": a, "D": pooled / "sites/B"}, new, f"site D: {pooled / 'sites/B'} belongs to a merged study"),
+        ({"A": a, "D": a / "data"}, new, f"site D: {a / 'data'} is not the results folder of a study (dataset_descr"),
+        ({"A": a, "D": empty}, new, f"site D: {empty} does not contain any sessions yet"),
+        ({"D": mixed}, new, f"site D: sessions in {mixed} used 2 different protocols (SHA-256 "
+         f"{same}, {'cd' * 32})"),
+        ({"A": a, "D": other}, new, f"site D ran the protocol demo with SHA-256 {'ab' * 32}, but site A ran demo with "
+         f"SHA-256 {same}"),
+        ({"A": a, "D": pilot}, new, "site D contains pilot sessions, but site A contains rehearsals"),
+        ({"B": b, "D": half}, new, f"{half / 'data/sub-P002/ses-01'} is a copy of {b / 'data/sub-P002/ses-01'}, so"),
+        ({"D": half}, pooled, f"{half / 'data/sub-P002/ses-01'} is a copy of "
+         f"{pooled / 'sites/B/data/sub-P002/ses-01'}, so"),
+    )  # fmt: skip
+    for folders, to, sentence in refusals:
+        with pytest.raises(StoreError, match=re.escape(sentence)):
+            merge_sites(folders, to)
+    assert contents(results) == before
+    inside = Path(shutil.copytree(c, pooled / "lab"))
+    with pytest.raises(StoreError, match=re.escape(f"site C: {inside} lies within {pooled}: specify a folder outside")):
+        merge_sites({"C": inside}, pooled)
 
 
 def merge_until(count: int, lab: Path, to: Path) -> None:
