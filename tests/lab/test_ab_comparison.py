@@ -23,6 +23,34 @@ def test_a_refused_edit_says_why_and_leaves_everything() -> None:
         bench().change("wake.length", 1701.0)
 
 
+def test_each_edit_names_its_parameters_and_is_one_step_for_undo_and_redo() -> None:
+    steps = [bench()]
+    steps.append(steps[-1].change("wake.length", 900.0))
+    steps.append(steps[-1].choose("B", "Honey", SCENES["honey"]))
+    steps.append(steps[-1].change("wake.exponent", 1.25))
+    states = [(step.a, step.b) for step in steps]
+    last = steps[-1]
+    assert (last.setting("A").name, last.setting("B").name) == ("Water", "Honey")
+    assert {*last.changed_names("A")} == {"wake.length", "wake.exponent"}
+    assert last.changed_names("B") == ()
+    assert (last.shown_name("A"), last.shown_name("B")) == ("Water, edited", "Honey")
+    assert (last.a.value("wake.length"), last.a.chosen_value("wake.length")) == (900.0, 1700)
+    undone = [last, last.undo(), last.undo().undo(), last.undo().undo().undo()]
+    assert [(step.a, step.b) for step in undone] == states[::-1]
+    assert [(step.may_undo, step.may_redo) for step in undone] == [
+        (True, False), (True, True), (True, True), (False, True),
+    ]  # fmt: skip
+    redone = undone[-1].redo()
+    assert (redone.a, redone.b, redone.redo().b) == (*states[1], states[2][1])
+    assert not redone.choose("A", "Honey", SCENES["honey"]).may_redo
+    dragged = bench().change("wake.length", 800.0, held=True).change("wake.length", 700.0, held=True)
+    assert (dragged.undo().a, dragged.a.value("wake.length")) == (bench().a, 700.0)
+    two_drags = dragged.change("wake.length", 600.0).change("wake.length", 500.0, held=True)
+    assert two_drags.undo().a.value("wake.length") == 600.0
+    copied = last.switch().copy_to_other()
+    assert (copied.a, copied.b, copied.presented, copied.undo().a) == (last.b, last.b, "B", last.a)
+
+
 edits = st.lists(
     st.one_of(
         st.tuples(st.just("density"), st.floats(1.0, 25_000.0)),
