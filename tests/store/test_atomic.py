@@ -1,4 +1,5 @@
 import os
+import re
 import sys
 import time
 from collections.abc import Callable
@@ -10,7 +11,9 @@ from study_app.errors import StoreError
 from study_app.store.files.atomic import (
     OLD_S,
     append_line,
+    copy_folder,
     create_folder,
+    make_folder,
     probe_free_bytes,
     read_if_there,
     remove_old_temporary_files,
@@ -18,6 +21,7 @@ from study_app.store.files.atomic import (
     write_file,
 )
 from study_app.store.integrity.checksums import sha256
+from study_app.store.journals.journal import Journal
 from tests.platforms import files_up_to, needs_posix
 
 
@@ -112,3 +116,38 @@ def test_a_huge_file_is_refused_before_memory_or_time_runs_out(read: Callable[[P
         file.truncate(1 << 40)
     with pytest.raises(StoreError, match="cannot be read"):
         read(path)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems flush folders or files in their own way")
+def test_each_writer_flushes_the_content_first_and_then_the_entry_in_the_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    flushed: list[str] = []
+
+    def record_flush(descriptor: int) -> None:
+        name = Path(f"/proc/self/fd/{descriptor}").readlink().name
+        flushed.append(re.sub(r"^\.(.*)\.[0-9a-f]{8}\.tmp$", r"\1 (temporary)", name))
+
+    monkeypatch.setattr("os.fsync", record_flush)
+    top = tmp_path / "top"
+    top.mkdir()
+    (tmp_path / "source" / "inner").mkdir(parents=True)
+    (tmp_path / "source" / "inner" / "leaf").write_bytes(b"leaf")
+    writers: tuple[tuple[Callable[[], object], list[str]], ...] = (
+        (lambda: write_file(top / "file", b"1"), ["file (temporary)", "top"]),
+        (lambda: write_file(top / "cache", b"1", waits=False), []),
+        (lambda: append_line(top / "list", b"1\n"), ["list", "top"]),
+        (lambda: append_line(top / "list", b"2\n", waits=False), []),
+        (lambda: Journal.create(top / "journal").close(), ["top"]),
+        (lambda: make_folder(top / "a" / "b"), ["a", "top"]),
+        (lambda: make_folder(top / "c" / "d", waits=False), []),
+        (lambda: create_folder(top / "claim", {"entry": b"1"}), ["entry", "claim (temporary)", "top"]),
+        (lambda: create_folder(top / "probe", {"entry": b"1"}, waits=False), []),
+        (lambda: copy_folder(tmp_path / "source", top / "copy"), ["leaf", "copy (temporary)", "inner", "top"]),
+    )
+    for write, expected in writers:
+        flushed.clear()
+        write()
+        assert flushed == expected
+    assert (top / "list").read_bytes() == b"1\n2\n"
+    assert (top / "copy" / "inner" / "leaf").read_bytes() == b"leaf"
