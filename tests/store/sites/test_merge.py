@@ -1,5 +1,6 @@
 """Merging sites: folders are copied unchanged, whole or not at all."""
 
+import hashlib
 import json
 import os
 import re
@@ -148,6 +149,37 @@ def test_each_merge_that_is_refused_names_the_site_and_changes_nothing(
     inside = Path(shutil.copytree(c, pooled / "lab"))
     with pytest.raises(StoreError, match=re.escape(f"site C: {inside} lies within {pooled}: specify a folder outside")):
         merge_sites({"C": inside}, pooled)
+
+
+def test_the_list_of_sites_states_sessions_withdrawals_and_key_of_each_site(
+    labs: dict[str, Path], results: Path, tmp_path: Path
+) -> None:
+    folders = {"A": labs["A"], "C": Path(shutil.copytree(labs["C"], tmp_path / "lab"))}
+    withdraw(folders["C"], "P002", by="AK", reason="asked")
+    steps: list[tuple[str, float]] = []
+    merged = merge_sites(folders, results / "pooled", lambda step, done: steps.append((step, done)))
+    assert steps == [("copying site A", 0.0), ("copying site C", 0.0)]
+    assert read_merged(results / "pooled") == merged
+    keys = {
+        site: hashlib.sha256((lab / "blinding/key.sealed").read_bytes()).hexdigest() for site, lab in folders.items()
+    }
+    assert [(site.name, site.sessions, site.withdrawals, site.key_hash) for site in merged.sites] == [
+        ("A", 2, 0, keys["A"]), ("C", 1, 1, keys["C"]),
+    ]  # fmt: skip
+    receipt = json.loads((labs["A"] / "data/sub-P001/ses-01/receipt.json").read_text("utf-8"))
+    assert (merged.study, merged.protocol_hash) == ("demo", receipt["protocol_hash"])
+    content = merged.manifest.read_text("utf-8")
+    for field, value, error in (
+        ("study", "demo", "sites/C: contains study demo, but sites.json lists the sites of x"),
+        ("key_hash", keys["C"], "sites/C/blinding/key.sealed: is not the key that site C was merged with: restore it "
+         "from a backup"),
+        ("protocol_hash", merged.protocol_hash, "sites/C/data/sub-P001/ses-01/receipt.json: has protocol "
+         f"{merged.protocol_hash}, but was merged with {'ab' * 32}"),
+    ):  # fmt: skip
+        other = "x" if field == "study" else "ab" * 32
+        text = content.replace(f'"{field}": "{value}"', f'"{field}": "{other}"')
+        merged.manifest.write_text(text, encoding="utf-8", newline="\n")
+        assert error in list(map(str, verify_study(merged.path).errors))
 
 
 def merge_until(count: int, lab: Path, to: Path) -> None:
