@@ -28,7 +28,7 @@ Patch = Callable[..., None]
 
 @pytest.fixture
 def calls() -> list[tuple[Any, ...]]:
-    """The functions that were called, each with its arguments; progress functions are left out."""
+    """The functions that were called, each with its arguments; a function, which shows progress, as “show”."""
     return []
 
 
@@ -40,7 +40,7 @@ def patch(monkeypatch: pytest.MonkeyPatch, calls: list[tuple[Any, ...]]) -> Patc
         for name, value in values.items():
 
             def called(*arguments: Any, _name: str = name, _value: Any = value, **options: Any) -> Any:
-                stated = [argument for argument in arguments if not callable(argument)]
+                stated = ["show" if callable(argument) else argument for argument in arguments]
                 kept = {key: option for key, option in options.items() if not callable(option)}
                 calls.append((_name, *stated, *([kept] if kept else [])))
                 return _value(*arguments, **options) if callable(_value) else _value
@@ -82,21 +82,24 @@ def fluid(patch: Patch) -> None:
 @pytest.mark.parametrize(
     ("words", "expected", "printed"),
     [
-        ("", ["load_tables None", "load_steady None", "fit_all (1, 2)", "fits_evidence (1, 2) drag fits"], ["fitted"]),
+        ("",
+         ["load_tables None", "load_steady None", "fit_all (1, 2) show", "fits_evidence (1, 2) drag fits"],
+         ["fitted"]),
         ("--refit",
          ["load_tables None", "load_steady None", "training None", "held_out None",
-          "refit_law (1, 2, 'training None') held out None", "law_fit_evidence law"],
+          "refit_law (1, 2, 'training None') held out None show", "law_fit_evidence law"],
          ["refitted"]),
         ("--materials", ["stored_materials None", "yield_flow_evidence materials"], ["yielding"]),
-        ("--score", ["score_all"], ["scored"]),
+        ("--score", ["score_all show"], ["scored"]),
         ("--solve --workers 3 --to TO",
-         ["solve TO 3 workers", "load_tables TO", "load_steady TO", "fit_all (1, 2)", "fits_evidence (1, 2) drag fits"],
+         ["solve TO 3 workers show", "load_tables TO", "load_steady TO", "fit_all (1, 2) show",
+          "fits_evidence (1, 2) drag fits"],
          ["solved.csv", "TO/made.md"]),
         ("--solve --materials --workers 3 --to TO",
-         ["solve_materials TO 3 workers", "stored_materials TO", "yield_flow_evidence materials"],
+         ["solve_materials TO 3 workers show", "stored_materials TO", "yield_flow_evidence materials"],
          ["yield.csv", "TO/made.md"]),
         ("--materials --to TO", ["stored_materials None", "yield_flow_evidence materials"], ["TO/made.md"]),
-        ("--score --to TO", ["score_all"], ["scored", "TO/made.md"]),
+        ("--score --to TO", ["score_all show"], ["scored", "TO/made.md"]),
     ],
 )  # fmt: skip
 def test_cfd_reads_or_solves_flows_and_fits_what_was_asked_for(
@@ -128,9 +131,9 @@ STABILITY = "study_app.evidence.stability"
                          "delivered_force_evidence delivered"]),
         ("--delivered --whole", ["measure_delivered_force {'whole': True, 'executor': '2 workers'}",
                                  "delivered_force_evidence delivered"]),
-        ("--velocity", ["measure_velocities", "velocity_evidence velocities"]),
+        ("--velocity", ["measure_velocities show", "velocity_evidence velocities"]),
         ("--delayed TO/late.csv", ["measure_force_delays", "force_delay_evidence delays late.csv"]),
-        ("--table TO/limits.csv", ["slope_limits_evidence 2 workers limits.csv"]),
+        ("--table TO/limits.csv", ["slope_limits_evidence 2 workers show limits.csv"]),
     ],
 )  # fmt: skip
 def test_stability_measures_the_part_that_was_asked_for(

@@ -4,7 +4,6 @@ import sys
 import typing
 from collections import namedtuple
 from collections.abc import Callable, Iterator
-from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -16,19 +15,11 @@ from study_app.evidence.accuracy import accuracy_report, comparison, survey
 from study_app.evidence.soak import soak
 from study_app.evidence.table import Evidence
 from study_app.evidence.thresholds import noticed_delays
-from study_app.evidence.timing import delays, report
-from study_app.evidence.timing.delays import Shown
 from tests.filled import filled
 from tests.golden import CHANGING, compare, each_once
 from tests.golden_figures import figure_words, stub_png
 
 GOLDEN = Path(__file__).parent / "golden"
-
-
-def shown(rng: np.random.Generator) -> tuple[Any, ...]:
-    """Return a trial of every screen, load and delay."""
-    places = product(("60 Hz", "144 Hz"), typing.get_args(typing.get_type_hints(Shown)["load"]), (0.0, 0.1))
-    return tuple(filled(Shown, rng, screen=screen, load=load, delay_s=late) for screen, load, late in places)
 
 
 def candidate(rng: np.random.Generator) -> Any:
@@ -64,12 +55,11 @@ def soaked(to: Path) -> tuple[Path, ...]:
 
 
 GIVEN: dict[str, Any] = {
-    "shown": shown, "candidate": candidate, "truths": (),
+    "candidate": candidate, "truths": (),
     "delay": lambda rng: int(rng.integers(1, 4)),
 }  # fmt: skip
 QUICK = {"noticed_delays-markdown": noticed_delays.noticed_delays_evidence}
 SLOW = {
-    "timing_report-write": report.timing_evidence, "delay_report-write": delays.delays_evidence,
     "accuracy_report-write": accuracy_report.accuracy_evidence, "liquid_survey-survey_markdown": survey.survey_evidence,
     "test_reports_of_results-soaked": soaked,
 }  # fmt: skip
