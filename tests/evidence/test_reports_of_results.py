@@ -1,6 +1,5 @@
 """Texts and figures of results made up from their types, compared with reviewed files."""
 
-import sys
 import typing
 from collections import namedtuple
 from collections.abc import Callable, Iterator
@@ -12,7 +11,6 @@ import pytest
 from matplotlib.figure import Figure
 
 from study_app.evidence.accuracy import accuracy_report, comparison, survey
-from study_app.evidence.soak import soak
 from study_app.evidence.table import Evidence
 from study_app.evidence.thresholds import noticed_delays
 from tests.filled import filled
@@ -29,31 +27,6 @@ def candidate(rng: np.random.Generator) -> Any:
     return namedtuple("Candidate", "name label family rate_hz counted")(name, name[:4], family, rate, bool(rate < 500))
 
 
-COUNTS = sys.modules[soak.Audit.__module__]._COUNTS
-FAULTS = sys.modules[soak.FaultyDevice.__module__].FAULTS
-
-
-def soaked(to: Path) -> tuple[Path, ...]:
-    """Write soaks that passed, were cut short and failed."""
-    paths: list[Path] = []
-    for name, share in (("clean", 0), ("some", 1), ("failed", 9)):
-        rng = np.random.default_rng(share)
-        counts, device = (np.zeros(1, kind).view(np.recarray)[0] for kind in (COUNTS, FAULTS))
-        for record in (counts, device):
-            for field in record.dtype.names if share else ():
-                record[field] = rng.integers(0, share + 1, record.dtype[field].shape)
-        drift, rests = (
-            soak.Drift(comparisons=7, worst=1e-12 * 10**share, longest_s=30.0),
-            soak.Rests(count=share, pushed_s=0.1 * share, wake_mps=1e-5 * share, force_n=0.001 * share),
-        )
-        made = filled(
-            soak.SoakResult, rng, drift=drift, rests=rests, counts=counts, device=device, rate_hz=1000.0, seed=share,
-            memory=(2**20, 2**21, 2**21 + share * 2**18), planned=3600, ticks=3600 - share, stops=share,
-        )  # fmt: skip
-        paths += [path.rename(to / f"{name}-{path.name}") for path in made.evidence().write(to)]
-    return tuple(paths)
-
-
 GIVEN: dict[str, Any] = {
     "candidate": candidate, "truths": (),
     "delay": lambda rng: int(rng.integers(1, 4)),
@@ -61,7 +34,6 @@ GIVEN: dict[str, Any] = {
 QUICK = {"noticed_delays-markdown": noticed_delays.noticed_delays_evidence}
 SLOW = {
     "accuracy_report-write": accuracy_report.accuracy_evidence, "liquid_survey-survey_markdown": survey.survey_evidence,
-    "test_reports_of_results-soaked": soaked,
 }  # fmt: skip
 REPORTS = (*QUICK.items(), *(pytest.param(*one, marks=pytest.mark.slow) for one in SLOW.items()))
 
@@ -91,6 +63,5 @@ def test_reports_of_results(
 ) -> None:
     monkeypatch.setattr(Figure, "savefig", lambda figure, to, **_: to.write(stub_png(figure)))
     files = name.endswith("write")
-    seeds = 1 if make is soaked else 2
-    found = [line for seed in range(seeds) for line in (f"== {seed}", *lines_of(make, seed, tmp_path, files=files))]
+    found = [line for seed in range(2) for line in (f"== {seed}", *lines_of(make, seed, tmp_path, files=files))]
     compare(GOLDEN / f"{name}.txt", each_once(found), pytestconfig, mask=CHANGING)
