@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from study_app.evidence.accuracy import accuracy_report, comparison, survey
+from study_app.evidence.accuracy import accuracy_report, comparison
 from study_app.evidence.table import Evidence
 from study_app.evidence.thresholds import noticed_delays
 from tests.filled import filled
@@ -33,7 +33,7 @@ GIVEN: dict[str, Any] = {
 }  # fmt: skip
 QUICK = {"noticed_delays-markdown": noticed_delays.noticed_delays_evidence}
 SLOW = {
-    "accuracy_report-write": accuracy_report.accuracy_evidence, "liquid_survey-survey_markdown": survey.survey_evidence,
+    "accuracy_report-write": accuracy_report.accuracy_evidence,
 }  # fmt: skip
 REPORTS = (*QUICK.items(), *(pytest.param(*one, marks=pytest.mark.slow) for one in SLOW.items()))
 

@@ -1,5 +1,9 @@
 """Motions of the accuracy table, and its survey of liquids."""
 
+import math
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 from click.testing import CliRunner
@@ -7,7 +11,7 @@ from click.testing import CliRunner
 from study_app.cli import commands
 from study_app.errors import StudyError
 from study_app.evidence.accuracy.comparison import accuracy
-from study_app.evidence.accuracy.survey import PUBLISHED, survey_scenes
+from study_app.evidence.accuracy.survey import PUBLISHED, Surveyed, survey_evidence, survey_scenes
 from study_app.evidence.table import Evidence
 from study_app.haptics.model.motion import Motion
 from study_app.protocol.load import load_scenes
@@ -72,3 +76,31 @@ def test_each_liquid_is_compared_with_what_is_known_of_it(found):
         assert it.expected.causes.law < 0.08
         assert 0.04 < it.expected.error_share < 0.16 + it.expected.causes.limits
         assert it.expected.cost_ns > 0
+
+
+def surveyed(name: str, model: str, **keys: Any) -> Surveyed:
+    """Return a liquid with 2 m/s at a Reynolds number of 40, and an own value for each column."""
+    expected: Any = SimpleNamespace(causes=SimpleNamespace(law=0.021), error_share=0.173, cost_ns=187.4)
+    values: dict[str, Any] = {"creeping": 0.011, "steady": 0.12, "solver": 0.034, "solver_reynolds": (1.5, 27.0)}
+    return Surveyed(
+        liquid=name, speed_mps=2.0, mps_per_reynolds=0.05, model=model, expected=expected, **values | keys
+    )  # fmt: skip
+
+
+def test_each_column_of_the_survey_has_its_own_value() -> None:
+    thick = surveyed("syrup", "unsteady drag")
+    thin = surveyed("water", "drag", creeping=None, steady=None, solver=None, solver_reynolds=(math.nan, math.nan))
+    lines = [line.split(" | ") for line in survey_evidence((thick, thin)).text.splitlines() if line.startswith("| ")]
+    ratios = [law(40.0) for law in PUBLISHED.values()]
+    spread = f"{100 * (max(ratios) - min(ratios)) / np.mean(ratios):.2g} %"
+    ends = [spread, "2.1 %", "17 %", "187 |"]
+    assert lines[2] == [
+        "| syrup", "40 (2 m/s)", "unsteady drag", "1.1 %", "12 %", "3.4 % (Re 1.5 to 27)", "2 m/s", *ends,
+    ]  # fmt: skip
+    assert lines[3] == ["| water", "40 (2 m/s)", "drag", "–", "–", "–", "–", *ends]
+    assert lines[4][1:7] == [*PUBLISHED]
+    assert lines[6][:4] == ["| 1", "27.6", "27.6", "28.2"]
+    drags = [24 / 100 * law(100.0) for law in PUBLISHED.values()]
+    assert lines[8][:7] == ["| 100", *(f"{drag:.3g}" for drag in drags)]
+    assert float(lines[8][8]) == pytest.approx(1.09, rel=0.05)
+    assert lines[8][9] == f"{100 * (max(drags) - min(drags)) / np.mean(drags):.2g} % |"
