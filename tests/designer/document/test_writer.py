@@ -199,6 +199,43 @@ liquid = "water"
         pytest.param("[a]\nx = 1", Set(("b",), {"y": 2}), "[a]\nx = 1\n\n[b]\ny = 2", id="no last line break"),
         pytest.param("[a.b]\n", Set(("a", "x"), 1), "[a]\nx = 1\n\n[a.b]\n", id="a table without a header of its own"),
         pytest.param("a = 1\r\n", Set(("a",), "x\n\ny\n"), 'a = """\r\nx\r\n\r\ny\r\n"""\r\n', id="paragraphs, \\r\\n"),
+        pytest.param(
+            "# study\n\n[b]\ny = 2\n", Set(("a",), 1), "# study\n\na = 1\n\n[b]\ny = 2\n", id="above the first header"
+        ),
+        pytest.param("", Set(("a",), 1), "a = 1\n", id="the first line"),
+        pytest.param("a = 1", Set(("b",), 2), "a = 1\nb = 2", id="a line after the last one without a line break"),
+        pytest.param(
+            "x = { a.b = 1, c = 3 }\n", Set(("x", "a", "d"), 2), "x = { a.b = 1, a.d = 2, c = 3 }\n", id="dotted pair"
+        ),
+        pytest.param("[a]\nx = 1\n", Set(("a", "y", "z"), 3), "[a]\nx = 1\ny = { z = 3 }\n", id="table in a table"),
+        pytest.param(
+            "x = { a = 1, c = 3 }\n", Duplicate(("x", "a"), "e"), "x = { a = 1, e = 1, c = 3 }\n", id="copy of a pair"
+        ),
+        pytest.param(
+            "a.x = 1\na.y = 2 # two\nb = 3\n",
+            Duplicate(("a",), "e"),
+            "a.x = 1\na.y = 2 # two\ne.x = 1\ne.y = 2 # two\nb = 3\n",
+            id="copy of dotted keys",
+        ),
+        pytest.param("x = { a = 1, c = 3 }\n", Unset(("x", "c")), "x = { a = 1 }\n", id="remove the last pair"),
+        pytest.param("x = { a = 1, c = 3 }\n", Unset(("x", "a")), "x = { c = 3 }\n", id="remove the first pair"),
+        pytest.param("l = [1, 2]\n", Insert(("l", 1), 7), "l = [1, 7, 2]\n", id="insert on one line"),
+        pytest.param("l = []\n", Insert(("l", 0), 7), "l = [7]\n", id="the first entry"),
+        pytest.param("l = [1, 2, 3]\n", Unset(("l", 2)), "l = [1, 2]\n", id="remove the last entry"),
+        pytest.param("l = [\n  1,\n  2, # two\n  3\n]\n", Unset(("l", 1)), "l = [\n  1,\n  3\n]\n", id="remove a line"),
+        pytest.param(
+            "l = [\n  1,\n  2,\n  3\n]\n", Move(("l", 2), 0), "l = [\n  3,\n  1,\n  2\n]\n", id="move the last line up"
+        ),
+        pytest.param(
+            "[[a]]\nx = 1\n\n[b]\n",
+            Insert(("a", 1), {"x": 2}),
+            "[[a]]\nx = 1\n\n[[a]]\nx = 2\n\n[b]\n",
+            id="table after the last one of its list",
+        ),
+        pytest.param(
+            "[[a]]\nx = 1\n", Insert(("a", 0), {"x": 2}), "[[a]]\nx = 2\n\n[[a]]\nx = 1\n", id="table before the first"
+        ),
+        pytest.param("[a]\nx = 1\n\n[b]\ny = 2\n", Unset(("b",)), "[a]\nx = 1\n", id="no blank line at the end"),
     ],
 )
 def test_apply_writes_as_the_neighbours_do(before: str, edit: Edit, after: str) -> None:
@@ -217,11 +254,13 @@ def test_apply_writes_as_the_neighbours_do(before: str, edit: Edit, after: str) 
         (Move(("l", 0), 2), "cannot be moved to position 3"),
         (Insert(("l", 4), 1), "cannot be inserted at position 4"),
         (Unset(("l", 7)), "no longer contains entry 8"),
+        (Rename(("l", 0), "m"), "entries of an array do not have names"),
+        (Insert(("t", 0), 5), "each entry in an array of tables must be a table"),
     ],
 )
 def test_apply_refuses_what_makes_no_sense(edit: Edit, sentence: str) -> None:
     with pytest.raises(StudyError, match=sentence):
-        apply_edit("a = 1\nl = [1, 2]\n", edit)
+        apply_edit("a = 1\nl = [1, 2]\n[[t]]\nx = 1\n", edit)
 
 
 def test_apply_refuses_its_own_mistakes(monkeypatch: pytest.MonkeyPatch) -> None:
