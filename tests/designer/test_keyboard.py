@@ -232,3 +232,23 @@ def test_a_key_leads_from_a_questionnaire_to_the_text_of_each_question_and_back(
         assert designer.editing.selected == ("questionnaires", "after", "items", number)
         (line,) = designer.field("questionnaires", "after", "items", number, "text").lines.values()
         assert (designer.keyboard, line.textCursor().selectedText()) == (line, line.typed_text())
+
+
+def test_each_key_leads_to_its_part_and_f6_goes_around(designer: Any) -> None:
+    designer.open("kitchen", "blocks", "liquids")
+    place = designer.place
+    parts = {"header": place.header, "outline": place.outline, "form": place.form, "views": place.pane,
+             "problems": place.problems}  # fmt: skip
+
+    def part_after(keys: str) -> str:
+        focused = designer.hit(keys)
+        return next(name for name, part in parts.items() if part.isAncestorOf(focused))
+
+    assert [part_after(f"ctrl+{number}") for number in (5, 1, 2, 3, 4)] == [*parts]
+    assert [part_after("F6") for _ in range(6)] == [*parts, "header"]
+    assert [part_after("shift+F6") for _ in range(5)] == [*reversed(parts)]
+    designer.hit("ctrl+2")
+    field = designer.keyboard
+    assert designer.hit("ctrl+e") is place.file.editor
+    assert (place.pane.tab, designer.hit("ctrl+e")) == ("file", field)
+    assert designer.hit("ctrl+f") is place.outline.search_field

@@ -94,13 +94,17 @@ def test_settings_of_the_whole_study_are_named_when_a_liquid_is_put_back(designe
     returned: list[None] = []
     feeling.returned.connect(lambda: returned.append(None))
     scene = designer.study.protocol.scene_of("thick")
-    feeling.feel_liquids(THICK)
+    feeling.feel_liquids(("blocks", "liquids"))
     liquid = scene.liquids[0].model_copy(update={"density_kg_m3": 1234.0})
     body = scene.body.model_copy(update={"diameter_m": 0.071})
     changed = scene.model_copy(update={"liquids": (liquid,), "body": body})
     feeling.put_liquid_back("B", Setting("Thick", scene, changed))
+    thin = designer.study.protocol.scene_of("thin")
+    lighter = thin.liquids[0].model_copy(update={"density_kg_m3": 890.0})
+    feeling.put_liquid_back("A", Setting("Thin", thin, thin.model_copy(update={"liquids": (lighter,)})))
+    assert [designer.value(*path, "density_kg_m3") for path in (THIN, THICK)] == [890, 1234]
     assert re.search(r"^density_kg_m3 = 1234\b(?!\.)", designer.text, re.M), "a whole number is written without a point"
-    assert (designer.editing.selected, len(returned)) == (THICK, 1)
+    assert (designer.editing.selected, len(returned)) == (THIN, 2)
     assert designer.messages == [
         ("Thick was put back into the study", "These settings apply to all liquids in the study: diameter.")
     ]
