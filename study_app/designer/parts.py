@@ -11,6 +11,7 @@ from study_app.gui.theme import Themed, TypeRole, font, remove_widget
 from study_app.gui.widgets import ActionButton, Choice, Elided, Ink, PressedByEnter, hbox, plain_tip
 
 SEGMENTS_MARGIN_PX, SEGMENT_GAP_PX, SEGMENT_PX = 3, 4, 28
+_ARROWS = {Qt.Key.Key_Left: -1, Qt.Key.Key_Right: 1}
 
 
 class _Segment(PressedByEnter):
@@ -29,6 +30,12 @@ class _Segment(PressedByEnter):
 
     def nextCheckState(self) -> None:
         """Do nothing: `Segments` decides which segment is checked."""
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if event.key() in _ARROWS:
+            event.ignore()  # else Qt moves the focus; `Segments` also chooses the next segment
+        else:
+            super().keyPressEvent(event)
 
     def sizeHint(self) -> QSize:
         return QSize(round(QFontMetricsF(font("label", weight=600)).horizontalAdvance(self.text())) + 18, SEGMENT_PX)
@@ -74,7 +81,7 @@ class Segments(Themed, QWidget):
         self.buttons.append(button)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        step = {Qt.Key.Key_Left: -1, Qt.Key.Key_Right: 1}.get(Qt.Key(event.key()), 0)
+        step = _ARROWS.get(Qt.Key(event.key()), 0)
         index = next((number for number, button in enumerate(self.buttons) if button.hasFocus()), None)
         if step and index is not None and 0 <= index + step < len(self.buttons):
             self.buttons[index + step].setFocus(Qt.FocusReason.TabFocusReason)

@@ -252,3 +252,21 @@ def test_each_key_leads_to_its_part_and_f6_goes_around(designer: Any) -> None:
     assert designer.hit("ctrl+e") is place.file.editor
     assert (place.pane.tab, designer.hit("ctrl+e")) == ("file", field)
     assert designer.hit("ctrl+f") is place.outline.search_field
+
+
+def test_arrow_keys_change_the_last_digit_of_a_number_and_the_chosen_segment(designer: Any) -> None:
+    designer.open("kitchen", "conditions", "late")
+    line = designer.field("conditions", "late", "delay_ms").line
+    for typed, keys, number in (("19.95", "Up", 19.96), ("20.1", "Down", 20.0), ("7", "Up", 8), ("7", "Down", 6)):
+        designer.fill(line, typed, keys)
+        assert designer.value("conditions", "late", "delay_ms") == pytest.approx(number), (typed, keys)
+    designer.place.show_tab("measures")
+    tabs = designer.place.pane.tabs
+    names = [page.name for page in designer.place.pane.pages]
+    shown = []
+    for name, keys in ((names[1], "Right"), (names[1], "Left"), (names[-1], "Right"), (names[0], "Left")):
+        designer.place.show_tab(name)
+        tabs.buttons[names.index(name)].setFocus()
+        designer.hit(keys)
+        shown.append(designer.place.pane.tab)
+    assert shown == [names[2], names[0], names[-1], names[0]]
