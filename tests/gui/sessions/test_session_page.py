@@ -84,6 +84,18 @@ def measured(study):
     return StudyFolder(study).session("P007", 1).path
 
 
+CELLS = {
+    unconfirmed: [
+        ["1", "Part 1, L1", "complete", "Open", "1", ""],
+        ["2", "Part 1, L2", "complete", "Open", "0 + 1?", ""],
+    ],
+    measured: [
+        ["1", "Part 1, L1", "complete", "Valid", "0", "recording lost"],
+        ["2", "Part 1, L2", "complete", "Out of limits", "0", "phone rang"],
+    ],
+}
+
+
 def page_of(qtbot, study, participant=None):
     window = QWidget()
     qtbot.addWidget(window)
@@ -103,6 +115,7 @@ def test_a_page_says_what_each_trial_has_and_why_a_session_cannot_be_read(qtbot,
         study = tmp_path / hold.__name__ / "demo"
         folder = hold(study)
         page = page_of(qtbot, study)
+        assert [[page.model.index(row, column).data() for column in range(6)] for row in range(2)] == CELLS[hold]
         for row in range(page.model.rowCount()):
             page.trials.selectRow(row)
             # Qt before 6.12 tells the name of a table as its value, too.
