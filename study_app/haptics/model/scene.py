@@ -86,9 +86,7 @@ class _Liquid(Frozen):
     @model_validator(mode="after")
     def _effects_have_what_they_need(self) -> Self:
         if self.effects == "auto":
-            self._check_effects(
-                it for it in EFFECTS if it.default is None and getattr(self, it.name, None) is not None
-            )
+            self._check_effects(it for it in EFFECTS if it.default is None and getattr(self, it.name, None) is not None)
             return self
         if len(set(self.effects)) < len(self.effects):
             raise ValueError(f"an effect is listed twice in {list(self.effects)}")
