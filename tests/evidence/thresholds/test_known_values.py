@@ -9,6 +9,7 @@ from statistics import NormalDist
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from scipy.stats import beta
 
 from study_app.cli import commands
 from study_app.evidence.thresholds import known_values
@@ -194,6 +195,8 @@ def test_intervals_of_means_and_of_shares_agree_with_tables() -> None:
     assert (low, high) == pytest.approx((2.5 - 3.182446 * 0.645497, 2.5 + 3.182446 * 0.645497), rel=1e-5)  # t of 3, SE
     one_each = share_interval([True] * 8 + [False] * 2, 1)(0.95)
     assert one_each == pytest.approx((0.4439, 0.9748), abs=0.03)  # Clopper and Pearson 1934: 8 of 10; 9 instead of 10
+    nine_cases = beta.ppf(0.025, 7.2, 2.8), beta.ppf(0.975, 8.2, 1.8)  # variance 8/45: 0.16 / (8/45 / 10) = 9 cases
+    assert one_each == pytest.approx(nine_cases, rel=1e-9)
     assert share_interval([1.0] * 10, 5)(0.95) == pytest.approx((0.025**0.1, 1.0))
     alike, apart = [1.0, 0.5] * 10, [1.0, 0.0] * 10  # four answers of each study
     assert share_interval(apart, 4)(0.95)[1] - share_interval(apart, 4)(0.95)[0] > 0.4
