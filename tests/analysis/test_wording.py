@@ -90,6 +90,27 @@ def test_what_is_said(pytestconfig: pytest.Config) -> None:
 
 
 @pytest.mark.parametrize(
+    ("primary", "adjustment"),
+    [
+        ((), ["p adjusted (Holm) across 2 tests (family “b: trend over delay”)"]),
+        (
+            ("harder",),
+            [
+                "p not adjusted (family “b: trend over delay, exploratory”)",
+                "p not adjusted (family “b: trend over delay”)",
+            ],
+        ),
+    ],
+    ids=["two primary items", "one primary item"],
+)
+def test_p_is_adjusted_across_the_items_of_a_family(primary: tuple[str, ...], adjustment: list[str]) -> None:
+    results = evaluate(plain(8, primary=primary))
+    lines = page_lines("".join(block(results.blocks[0], results, ())))
+    (trend_line,) = (line for line in lines if "family “b: trend" in line)
+    assert [phrase for phrase in trend_line.split(".")[0].split("; ") if phrase.startswith("p ")] == adjustment
+
+
+@pytest.mark.parametrize(
     ("conditions", "names"),
     [
         (["8/1", "8/2", "12/1"], ["Standard 8, track 1", "Standard 8, track 2", "Standard 12"]),
