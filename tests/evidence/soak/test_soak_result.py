@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from study_app.devices.faulty import FAULTS, KINDS
-from study_app.evidence.soak.ledger import Drift
-from study_app.evidence.soak.result import Rests, SoakResult
+from study_app.evidence.soak.result import Drift, Rests, SoakResult
 from study_app.evidence.soak.sample_audit import _COUNTS
 from study_app.haptics.model.layout import LIMITER_NAMES
 
