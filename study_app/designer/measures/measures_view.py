@@ -193,7 +193,7 @@ def _balance_card(study: Study, protocol: Protocol, block: Block) -> list[Measur
     places = tuple(str(number + 1) for number in range(len(shown)))
     tables = Table("position", codes, places, shown), Table("comes after", codes, codes, evenness.follows)
     hidden_count = len(evenness.positions) - len(shown)
-    note = (f"and {hidden_count} more positions",) if hidden_count else ()
+    note = (f"and {counted(hidden_count, 'more position')}",) if hidden_count else ()
     return [MeasureCard("Balance", aside, (tables, *note, verdict), wide=len(codes) > FEW_CODES)]
 
 

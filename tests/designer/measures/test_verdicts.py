@@ -81,6 +81,7 @@ def test_the_balance_counts_positions_and_successions_of_each_code() -> None:
     assert len(card.parts) == 2
     six_of_nine = balance_card(study_with_order("fixed", 3, repetitions=3)).parts
     assert (six_of_nine[0][0].places, six_of_nine[1]) == (tuple("123456"), "and 3 more positions")
+    assert balance_card(study_with_order("latin", 7)).parts[1] == "and 1 more position"
 
 
 @pytest.mark.parametrize(
