@@ -8,12 +8,23 @@ import shiboken6
 from PySide6.QtCore import QEvent, QPoint, QPointF, Qt
 from PySide6.QtGui import QFocusEvent, QTextCursor
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QFileDialog, QLabel, QLineEdit, QPlainTextEdit, QWidget, QWidgetItem
+from PySide6.QtWidgets import (
+    QAbstractButton,
+    QApplication,
+    QFileDialog,
+    QLabel,
+    QLineEdit,
+    QPlainTextEdit,
+    QWidget,
+    QWidgetItem,
+)
 
+from study_app.designer.document.document import Answers, template
 from study_app.designer.document.elements import title_of
 from study_app.designer.document.steps import AddElement, AddKey, ChangeLanguage, RemoveKey, RenameElement
 from study_app.designer.document.toml_edits import Set, Unset
-from study_app.designer.form.special import Hypothesis
+from study_app.designer.form.special import Compared, Hypothesis
+from study_app.designer.new_study_page import Questions, TemplateQuestion, template_choice
 from study_app.designer.window import focus_stops
 from study_app.gui.widgets.controls import IconButton
 from tests.gui.walk import settle
@@ -455,3 +466,116 @@ def test_the_caret_is_at_the_end_of_a_text_that_is_not_or_completely_selected(de
         cursor.setPosition(caret, QTextCursor.MoveMode.KeepAnchor)
         text.setTextCursor(cursor)
         assert text.is_at_end() == is_at_end, (anchor, caret)
+
+
+def test_a_hypothesis_shows_what_it_compares_and_names_what_is_not_in_the_study(qtbot: Any) -> None:
+    shared, own = ("like_honey", "Like honey"), ("thickness", "Thickness")
+    thin = Compared(key="conditions", block="liquids", name="thin", label="Thin in Liquids", measures=(own, shared))
+    thick, warm = (
+        replace(thin, name=name, label=f"{name.capitalize()} in Liquids", measures=(shared,))
+        for name in ("thick", "warm")
+    )
+    line = Hypothesis("Hypothesis 1")
+    qtbot.addWidget(line)
+    table = {"blocks": ("liquids",), "conditions": ("thin", "warm"), "measure": "like_honey", "expected": "lower"}
+    line.show_value(table, (thin, thick, warm))
+    shown = [box.currentText() for box in (line.measure, line.first, line.relation, line.second)]
+    assert shown == ["Like honey", "Thin in Liquids", "is lower than", "Warm in Liquids"]
+    assert line.bound.isHidden()
+    line.show_value({**table, "conditions": ("thin", "gone"), "form": "after", "bound": 0.75}, (thin, thick, warm))
+    assert (line.first.currentText(), line.second.currentIndex(), line.measure.currentIndex()) == (
+        "Thin in Liquids", -1, -1
+    )  # fmt: skip
+    placeholders = [box.placeholderText() for box in (line.measure, line.first, line.second)]
+    assert placeholders == ["after/like_honey", "thin", "gone"]
+    assert [line.measure.itemText(index) for index in range(line.measure.count())] == ["Thickness", "Like honey"]
+    assert (line.bound.isHidden(), line.bound.typed_text()) == (False, "0.75")
+
+
+def test_each_point_of_a_list_is_typed_kept_and_removed_by_itself(designer: Any) -> None:
+    path = ("tasks", "reach", "targets_mm")
+    designer.open()
+    points = ((-31, 2, 3), (34, 5, 6), (7, -8, 9))
+    designer.editing.make_step("Change", Set(path, points))
+    designer.go_to("tasks", "reach")
+    field = designer.field(*path)
+    assert [line.typed_text() for line in field.lines] == ["-31  2  3", "34  5  6", "7  -8  9"]
+    designer.fill(field.lines[1], "34, five, 6")
+    assert designer.value(*path) == points
+    assert [bool(line.property("state")) for line in field.lines] == [False, True, False]
+    sentence = "The study still contains 34  5  6; press Esc to restore it."
+    assert [label.text() for label in designer.form_row(*path).findChildren(QLabel) if sentence in label.text()]
+    designer.fill(field.lines[1], "34.5, -5, 0")
+    assert designer.value(*path) == (points[0], (34.5, -5, 0), points[2])
+    assert not any(line.property("state") for line in field.lines)
+    field.list.setCurrentRow(1)
+    field.list.clearSelection()
+    field.list.setFocus(Qt.FocusReason.TabFocusReason)
+    assert field.chosen == 1, "the keyboard returns to the current row"
+    designer.hit("Delete")
+    assert designer.value(*path) == (points[0], points[2])
+    assert field.chosen == 1
+
+
+def test_each_language_is_copied_and_removed_by_its_own_buttons(designer: Any) -> None:
+    designer.open()
+    for code in ("fr", "nl"):
+        designer.editing.handle_request(ChangeLanguage("add", code))
+    designer.go_to("study")
+    field, asked = designer.field("study", "languages"), list[Any]()
+    field.asked.disconnect()
+    field.asked.connect(asked.append)
+    languages = {"en": "English", "fr": "French", "nl": "Dutch"}
+    names = [[button.accessibleName() for button in row.findChildren(QAbstractButton)] for row in field.rows]
+    removals = [f"Remove {language} from every text" for language in languages.values()]
+    write, copy = "Write the texts that are missing in {}", "Copy the English text wherever {} is missing"
+    assert names == [
+        [removals[0]], *([write.format(language), copy.format(language), removal]
+                         for language, removal in zip(("French", "Dutch"), removals[1:], strict=True))
+    ]  # fmt: skip
+    for row in field.rows:
+        row.findChildren(QAbstractButton)[-1].click()
+    for copy_button in field.copies.values():
+        copy_button.click()
+    assert list(field.copies) == ["fr", "nl"]
+    removed, copied = (
+        (ChangeLanguage("remove", code) for code in languages),
+        (ChangeLanguage("copy", code) for code in ("fr", "nl")),
+    )
+    assert asked == [*removed, *copied]
+    offered = [field.names.itemData(index) for index in range(field.names.count())]
+    assert offered
+    assert not {*offered} & {*languages}
+    field.names.activated.emit(len(offered) - 1)
+    assert asked[-1] == ChangeLanguage("add", offered[-1])
+
+
+def test_an_answer_on_the_page_of_a_new_study_that_is_no_number_is_refused_with_its_question(qtbot: Any) -> None:
+    asked = {"text": "Trials", "unit": "", "bounds": "at least 1"}
+    trials = TemplateQuestion(path=("methods", "adaptive", "trials"), value="40", **asked)
+    standards = TemplateQuestion(path=("stimuli", "damping", "standards"), value="4, 8", several=True,
+                                 **{**asked, "text": "Standards"})  # fmt: skip
+    choice = replace(template_choice("empty", template("empty")), languages=("nl",), questions=(trials, standards))
+    questions = Questions()
+    qtbot.addWidget(questions)
+    questions.show_choice(choice)
+    assert questions.answers() == Answers("", ("nl",), ())
+    for question, text, sentence in (
+        (trials, "many", "Trials: “many” is not a number"),
+        (trials, "1,500", "Trials: “1,500” can be read as 1.5 or 1500: write 1.5 or 1500"),
+        (standards, "4; x", "Standards: “x” is not a number"),
+        (standards, " ; ", "Standards: Enter at least one number"),
+    ):
+        field = questions.template_fields[question]
+        field.setText(text)
+        assert questions.answers() == sentence
+        field.setText(question.value)
+    questions.title.setText("  Two oils ")
+    questions.languages["en"].setChecked(True)
+    questions.template_fields[trials].setText(" 60 ")
+    questions.template_fields[standards].setText("3, 5.5")
+    answers = Answers("Two oils", ("en", "nl"), ((trials.path, 60), (standards.path, [3, 5.5])))
+    assert questions.answers() == answers
+    for check in questions.languages.values():
+        check.setChecked(False)
+    assert questions.answers() == "choose at least one language"

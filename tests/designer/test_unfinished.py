@@ -10,12 +10,14 @@ from PySide6.QtWidgets import QApplication, QWidget
 
 from study_app.designer.document.elements import outline
 from study_app.designer.document.steps import (
+    AddElement,
     AddEntry,
     AddKey,
     AddNamed,
     ChangeLanguage,
     DuplicateElement,
     RemoveKey,
+    SetText,
     SetValue,
     SwitchKey,
 )
@@ -311,3 +313,18 @@ def test_a_second_hypothesis_begins_with_a_statement_without_one(designer: Any) 
     for other in others:
         designer.field(*contrasts).add.click()
         assert designer.value(*contrasts)[-1] == {"measure": other, "form": "after", "blocks": ("liquids", "liquids_2")}
+
+
+def test_the_id_that_a_title_gives_an_entry_is_selected_and_stays_unfinished(designer: Any) -> None:
+    designer.open()
+    designer.editing.handle_request(AddElement(("pages",)))
+    added = designer.editing.selected
+    designer.editing.handle_request(SetText((*added, "title"), "en", "A short rest"))
+    designer.editing.suggest_id()
+    assert designer.value("pages", "a_short_rest", "title") == "A short rest"
+    assert added[1] not in designer.value("pages")
+    assert designer.editing.selected == ("pages", "a_short_rest")
+    assert [entry.path for entry in designer.study.unfinished] == [("pages", "a_short_rest")]
+    designer.editing.handle_request(SetText(("pages", "a_short_rest", "title"), "en", "A long rest"))
+    designer.editing.suggest_id()
+    assert designer.editing.selected == ("pages", "a_short_rest"), "the ID follows the text only once"

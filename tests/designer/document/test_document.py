@@ -3,6 +3,7 @@
 import itertools
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -15,6 +16,7 @@ from study_app.designer.document.document import Document, check_version, next_v
 from study_app.designer.document.fields import rows
 from study_app.designer.document.study import read_study
 from study_app.designer.document.toml_edits import Insert, Set
+from study_app.designer.document.toml_text import Refused
 from study_app.errors import ProtocolError, StoreError, StudyError
 from study_app.protocol.load import load, parse
 from study_app.protocol.source.files import protocol_hash, shipped
@@ -351,3 +353,32 @@ def test_two_programs_that_save_one_file_lose_nothing(tmp_path: Path) -> None:
     expected = {f"{name}{number} = 1" for name in "ab" for number in range(20)}
     assert set(file.read_text("utf-8").splitlines()) == expected
     assert len(list(Path(os.environ["LIQUID_STUDY_DATA"], "contents").glob("*.toml"))) == 41
+
+
+SYRUP, FILM = "format = 2\n[liquids.any]\ndensity_kg_m3 = 1234\n", b"frames of waves"
+
+
+def test_a_study_of_another_folder_is_saved_with_its_liquid_files_and_videos(tmp_path: Path) -> None:
+    source, target = tmp_path / "source", tmp_path / "target"
+    for folder in (source / "films", target / "films"):
+        folder.mkdir(parents=True)
+    (source / "syrup.toml").write_text(SYRUP, encoding="utf-8", newline="\n")
+    (source / "films" / "waves.mp4").write_bytes(FILM)
+    own = '[liquids.thick]\ndensity_kg_m3 = 1400\neffects = ["drag"]'
+    text = DEMO.text.replace(own, '[liquids.thick]\nfile = "syrup.toml"')
+    text = text.replace("[conditions.late]\n", '[conditions.late]\nview = "films/waves.mp4"\n')
+    study, syrup, film = read_study(text.encode(), source), target / "syrup.toml", target / "films" / "waves.mp4"
+    for path, content, kind in ((syrup, SYRUP.encode() + b"# another\n", "liquid"), (film, FILM + b"!", "video")):
+        path.write_bytes(content)
+        with pytest.raises(Refused, match=f"{re.escape(str(path))} already exists and contains a different {kind}"):
+            Document(study, (), target / "refused.toml").save(())
+        assert path.read_bytes() == content
+        path.unlink()
+    assert not (target / "refused.toml").exists()
+    for name in ("first", "second"):  # the second one finds the same files there
+        opened = Document(study, (), target / f"{name}.toml")
+        opened.save(())
+        assert (target / f"{name}.toml").read_text(encoding="utf-8") == text
+        assert (syrup.read_text(encoding="utf-8"), film.read_bytes()) == (SYRUP, FILM)
+        assert opened.study.folder == target.resolve()
+    assert {path.name for path in source.iterdir()} == {"films", "syrup.toml"}, "the other folder is only read"

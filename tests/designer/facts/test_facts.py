@@ -183,3 +183,11 @@ def test_every_key_of_every_element_is_in_its_form_with_its_value(file: pathlib.
             around = next((leaf[:length] for length in range(len(leaf), 0, -1) if leaf[:length] in rows), None)
             assert around is not None, leaf
             assert rows[around] == value_at(study.document, around)
+
+
+def test_the_form_of_an_unreadable_file_says_in_which_line_the_problem_is() -> None:
+    made = form_of(Study("format = 1\n\n[study\nname = 5\n"), ("pages", "welcome"))
+    (sentence,) = made.faults
+    assert sentence.startswith("Line 3: ")
+    assert sentence[len("Line 3: ")].isupper()
+    assert (made.path, made.kind, made.unreadable) == (("study",), "Correct the text in the File tab", True)

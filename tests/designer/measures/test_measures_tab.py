@@ -194,3 +194,25 @@ def test_cards_fill_two_columns_and_a_wide_or_last_one_takes_both(qtbot: Any) ->
         assert {title: grid.grid.getItemPosition(grid.grid.indexOf(part)) for title, part in shown.items()} == places
         assert not any(grid.grid.rowStretch(row) for row, *_ in places.values())
     assert (shown["a"], shown["C"] is before["C"]) == (before["a"], False), "the same card at the same place is kept"
+
+
+def test_a_process_that_has_ended_is_replaced_and_a_late_answer_is_ignored(
+    qtbot: Any, designer: Any, worker: Worker
+) -> None:
+    open_viscosity_block(designer)
+    power = designer.place.measures.power
+    qtbot.waitUntil(lambda: bool(worker.orders))
+    worker.works, second = False, Worker()
+    designer.controller.measures.make = lambda: second
+    designer.editing.make_step("Change", Set(("methods", "adaptive", "trials"), 60))
+    qtbot.waitUntil(lambda: bool(second.orders))
+    assert second.orders[0].protocol.methods["adaptive"].trials == 60
+    second.given += [(7, Simulated(table="the answer to another order"))]
+    second.answer()
+    qtbot.waitUntil(lambda: not power.progress.isVisible())
+    assert "| 12 | 80% |" in power.table.text()
+    designer.controller.begin_study("template:delay-detection", "later")
+    designer.place.pane.show_tab("measures")
+    qtbot.waitUntil(lambda: len(second.orders) == 2)
+    qtbot.waitUntil(lambda: power.progress.text() == WAITING)
+    assert not power.table.isVisible(), "the numbers of the other study are forgotten"
