@@ -25,6 +25,7 @@ from study_app.designer.document.steps import AddElement, AddKey, ChangeLanguage
 from study_app.designer.document.toml_edits import Set, Unset
 from study_app.designer.form.special import Compared, Hypothesis
 from study_app.designer.new_study_page import Questions, TemplateQuestion, template_choice
+from study_app.designer.problems import problem_rows
 from study_app.designer.window import focus_stops
 from study_app.gui.widgets.controls import IconButton
 from tests.gui.walk import settle
@@ -579,3 +580,33 @@ def test_an_answer_on_the_page_of_a_new_study_that_is_no_number_is_refused_with_
     for check in questions.languages.values():
         check.setChecked(False)
     assert questions.answers() == "choose at least one language"
+
+
+def test_the_balance_of_an_order_is_shown_beside_it_with_its_reason(designer: Any) -> None:
+    block = ("blocks", "liquids")
+    designer.open("kitchen", *block)
+    chip = designer.field(*block, "order").extra
+    fixed = "The effects of condition and position cannot be separated."
+    latin = "Positions and carry-over are balanced for any multiple of 2 participants."
+    for order, text, sentence in (("fixed", "same for everyone", fixed), ("latin", "balanced for 2, 4, 6 …", latin)):
+        designer.editing.make_step("Change", Set((*block, "order"), order))
+        QApplication.processEvents()
+        assert (chip.accessibleName(), chip.accessibleDescription(), chip.isHidden()) == (text, sentence, False)
+        assert sentence in chip.toolTip()
+    designer.editing.make_step("Change", Set((*block, "conditions"), ["thin"]))
+    QApplication.processEvents()
+    assert chip.isHidden(), "the order of a single condition has no balance"
+
+
+def test_a_read_only_study_shows_its_problems_without_repairs(qtbot: Any, designer: Any) -> None:
+    path = ("liquids", "thin", "density_kg_m3")
+    designer.open()
+    designer.editing.make_step("Remove a key", Unset(path))
+    designer.go_to("liquids", "thin")
+    qtbot.waitUntil(lambda: bool(designer.form_row(*path).repairs))
+    form = designer.place.form
+    form.show_form(form.form, read_only=True)
+    form.show_repairs(dict.fromkeys(problem_rows(designer.study), ("Repair",)))
+    row = designer.form_row(*path)
+    assert row.repairs == []
+    assert not row.fault_line.isHidden()

@@ -207,8 +207,8 @@ def test_a_process_that_has_ended_is_replaced_and_a_late_answer_is_ignored(
     designer.editing.make_step("Change", Set(("methods", "adaptive", "trials"), 60))
     qtbot.waitUntil(lambda: bool(second.orders))
     assert second.orders[0].protocol.methods["adaptive"].trials == 60
-    second.given += [(7, Simulated(table="the answer to another order"))]
     second.answer()
+    second.given += [(7, Simulated(table="the answer to another order"))]
     qtbot.waitUntil(lambda: not power.progress.isVisible())
     assert "| 12 | 80% |" in power.table.text()
     designer.controller.begin_study("template:delay-detection", "later")
