@@ -109,7 +109,9 @@ def certain_telltales(tables: Tables, published: Any, levels: Iterable[float] = 
     columns = [column.variable for column in every_column(intervals=True)]
     harmless_text = " ".join(text for _, text in _texts([published, columns, _COMMON_VALUES], "", frozenset()))
     words = _revealing_words(tables) | _all_notations(levels)
-    certain = (word for word in words if not word[0].isdigit() or _count_digits(word) >= _MIN_CERTAIN_DIGITS)
+    certain = (
+        word for word in words if not word.lstrip("-")[:1].isdigit() or _count_digits(word) >= _MIN_CERTAIN_DIGITS
+    )
     return Telltales(word for word in certain if not Telltales([word]).in_text(harmless_text))
 
 

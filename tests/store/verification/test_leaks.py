@@ -125,6 +125,13 @@ def test_levels_standards_and_comparisons_are_looked_for_in_every_unit(tmp_path:
     assert certain.in_text(f"{comparison!r} and 0.2371") == [repr(comparison)], "short numbers stand anywhere"
 
 
+def test_numbers_of_fewer_than_five_digits_are_not_certain_whatever_their_sign() -> None:
+    pond = {"region": {"centre_m": [-1.0, 0.25, -1.23456]}, "density_kg_m3": 1013.7, "viscosity_pa_s": 1.234}
+    words = certain_telltales({"liquids": {"pond": pond}, "conditions": {}}, {}).words
+    assert {"pond", "1013.7", "1013700", "-1.23456", "-0.00123456"} < words
+    assert not {"-1", "-1.0", "-1000", "-0.001", "0.25", "250", "1.234", "1234"} & words
+
+
 def test_the_words_to_look_for_are_the_conditions(protocol: Protocol) -> None:
     words = telltales(protocol).words
     assert {"quagmire", "mildew", "see_tardy", "learn", "1013.7", "1391.3", "1717", "137", "0.137"} < words
