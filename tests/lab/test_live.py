@@ -10,11 +10,13 @@ if numba.config.DISABLE_JIT:
 from study_app.devices.rig import Rig
 from study_app.devices.simulated import MouseDevice
 from study_app.errors import ServoFault, StudyError
-from study_app.haptics.model.layout import LIMITER_ENERGY, LIMITER_FADE
+from study_app.haptics.model.layout import LIMITER_ENERGY, LIMITER_FADE, SAMPLE, records
+from study_app.haptics.model.scene import Scene
 from study_app.haptics.runtime.clocks import VirtualClock
 from study_app.haptics.runtime.servo import Servo
 from study_app.lab.live import Live, open_live
 from study_app.lab.programmed_paths import REACHED, TITLES, lead_to_path, programmed_path
+from study_app.lab.shadow import Shadow
 from tests.lab.benches import SCENES, bench, live_with, run, scripted
 
 
@@ -237,6 +239,64 @@ def test_programmed_paths_fit_the_workspace_and_the_hand_goes_along_them(name: s
     live.play(None)
     run(live, 50)
     assert not live.hand.moving
+    live.close()
+
+
+@pytest.mark.slow
+def test_a_hand_that_a_person_holds_is_not_moved_but_both_sides_are_computed_along_the_path() -> None:
+    live = live_with(scripted())
+    live.hand = None
+    live.feel(sides := bench())
+    run(live, 100)
+    live.play("line")
+    run(live, 1000)
+    assert live.path == "line"
+    assert np.abs(live.servo.telemetry.ring.position_m[:1100]).max() < 2e-3
+    path = programmed_path("line", SCENES["water"], live.device.workspace_m)
+    lead = lead_to_path(path, path.position_m[-1])
+    samples = records(SAMPLE, 1000)
+    samples.time_ns, samples.scene, samples.fresh = np.arange(1000) * 1_000_000, 1, 1
+    samples.position_m = lead.position_m[:1000]
+    alone = Shadow(Scene(), 10_000, live.device.force_limit_n, without_servo=True)
+    alone.expect(1, "A", SCENES["water"], SCENES["light_oil"])
+    alone.process_samples(samples)
+    trace, expected = live.trace(), alone.trace()
+    assert trace is not None
+    assert expected is not None
+    assert trace.t_s == pytest.approx(np.arange(-999, 1) * 1e-3)
+    for column in ("force_a_n", "force_b_n", "body_mps", "wake_a_mps", "wake_b_mps"):
+        assert getattr(trace, column) == pytest.approx(getattr(expected, column), abs=1e-6), column
+    steps_mps = 1000 * SCENES["water"].scale * np.linalg.norm(np.diff(samples.position_m, axis=0), axis=1)
+    assert trace.body_mps.max() == pytest.approx(steps_mps.max(), rel=0.05)
+    assert np.abs(trace.force_b_n - trace.force_a_n).max() > 0.1
+
+    live.feel(sides := sides.choose("B", "honey", SCENES["honey"]))
+    assert live.tail("B") is None, "the other side is exchanged at once"
+    before = live.tail("A")
+    live.feel(sides := sides.change("liquid.density_kg_m3", 2000.0))
+    run(live, 100)
+    changed = live.tail("A")
+    assert before is not None
+    assert changed is not None
+    assert changed.alive == before.alive + 100, "the wake goes on while a number is dragged"
+    assert changed.positions_m[-1] == pytest.approx(lead.position_m[1099], abs=2e-4)
+
+    live.feel(sides.choose("A", "light_oil", SCENES["light_oil"]))
+    run(live, 20)
+    begun_again = live.tail("A")
+    assert begun_again is not None
+    assert begun_again.alive == 20, "another liquid begins without a wake"
+    live.servo.advance(3000)
+    live.poll()
+    trace = live.trace()
+    assert trace is not None
+    assert trace.t_s == pytest.approx(np.arange(-199, 1) * 1e-3), "overdue ticks are left out"
+
+    live.play(None)
+    trace = live.trace()
+    assert live.path is None
+    assert trace is not None
+    assert trace.t_s[0] == pytest.approx(-2.499), "the servo's own samples"
     live.close()
 
 

@@ -10,6 +10,7 @@ if numba.config.DISABLE_JIT:
 from study_app.haptics.model.estimators import Kalman
 from study_app.haptics.model.layout import SAMPLE, records
 from study_app.haptics.model.scene import Scene
+from study_app.lab import shadow as module
 from study_app.lab.ab_comparison import Setting, Workbench
 from study_app.lab.parameters import with_parameter
 from study_app.lab.shadow import Shadow
@@ -117,6 +118,21 @@ def test_a_tail_is_the_path_that_was_left_and_breaks_where_it_turns() -> None:
     assert tail.ages[-1] == 0.0
     assert tail.ages[0] == pytest.approx(598 / 1699, abs=2 / 1699)
     assert (np.diff(tail.positions_m.sum(axis=1)) > 0).all()
+
+
+def test_a_long_tail_is_drawn_with_all_corners_or_the_newest_200_and_even_rows() -> None:
+    breaks = np.zeros(1000, bool)
+    breaks[[0, 5, 778]] = True
+    rows = module._rows_to_draw(breaks)
+    assert {0, 5, 778, 999} < {*rows}
+    assert 397 <= len(rows) <= 400
+    assert set(np.diff(rows)) == {1, 2, 3}, "999 / 396 = 2.5 rows apart, and the corners between them"
+    breaks[:300] = True
+    rows = module._rows_to_draw(breaks)
+    assert {*range(100, 300)} < {*rows}
+    assert list(rows[:4]) == [0, 5, 10, 15], "999 / 199 = 5.02 rows apart"
+    assert (rows[-1], (np.diff(rows) > 0).all()) == (999, True)
+    assert list(module._rows_to_draw(breaks[:400])) == [*range(400)]
 
 
 def test_a_tail_forgets_what_falls_off_it() -> None:

@@ -1,5 +1,8 @@
 """Flow curves from a rheometer, and strokes in non-Newtonian liquids: planted parameters are recovered."""
 
+import hashlib
+import re
+
 import numpy as np
 import pytest
 from click.testing import CliRunner
@@ -143,8 +146,12 @@ def test_from_a_rheometer_file_to_a_preset(tmp_path):
     for field in STARTS["ketchup"]:
         assert getattr(written, field) == pytest.approx(getattr(PRESETS["ketchup"][1], field), rel=0.05)
     text = (tmp_path / "out" / "ketchup.toml").read_text(encoding="utf-8")
-    assert "# Fitted to rheometer.csv (SHA-256 " in text
-    assert "  # 95 %: " in text
+    digest = hashlib.sha256(path.read_bytes()).hexdigest()
+    assert f"# Fitted to rheometer.csv (SHA-256 {digest[:16]}…), " in text
+    for field in STARTS["ketchup"]:
+        value, lower, upper = re.search(rf"\b{field} = (\S+?),?  # 95 %: (\S+) … (\S+)", text).groups()
+        assert float(value) == getattr(written, field)
+        assert float(lower) < float(value) < float(upper) < 1.5 * float(value)
     rows = np.genfromtxt(tmp_path / "out" / "ketchup-fit.csv", delimiter=",", names=True)
     assert rows["residual_pa"] == pytest.approx(rows["shear_stress_pa"] - rows["fitted_pa"])
     assert (tmp_path / "out" / "ketchup-fit.png").stat().st_size > 10_000

@@ -13,7 +13,7 @@ from study_app.haptics.model.motion import Motion
 from study_app.haptics.model.overrides import override_all
 from study_app.haptics.model.scene import Box, Liquid, Scene
 from study_app.lab.identify import measured_force, preset
-from study_app.lab.identify.fit import fit
+from study_app.lab.identify.fit import Fit, fit
 from study_app.protocol.load import load_scene
 from tests.haptics.scenes import COMPILED
 from tests.lab.identify.measurements import OIL, REACH, REVERSE, TANK, force_of, noisy, write_csv
@@ -116,6 +116,42 @@ def test_the_figure_of_a_fit_shows_forces_and_residuals_of_each_axis(fitted):
     assert np.column_stack(behind) == pytest.approx(result.measured_n[:, list(result.axes)])
     along_n = residual_n @ [0.48, 0.6, -0.64]
     assert along.lines[1].get_xydata() == pytest.approx(np.column_stack([speed_mps, along_n]))
+
+
+def test_the_residual_along_the_motion_is_shown_with_medians_of_speeds_with_twenty_rows():
+    """12 intervals of 0.1 m/s: 25 rows in the first, 19 in the sixth, 20 in the last; hands at rest are left out."""
+    share = np.arange(25) / 25
+    slow_mps, middle_mps, quick_mps = 0.1 + 0.09 * share**2, np.linspace(0.61, 0.69, 19), 1.3 - 0.09 * share[:20] ** 3
+    speed_mps = np.concatenate([quick_mps, np.zeros(3), slow_mps, middle_mps])
+    along_n = np.sin(37 * np.arange(len(speed_mps))) - 2 * speed_mps
+    residual_n = np.outer(along_n, [0.6, 0, -0.8]) + np.outer(np.cos(np.arange(len(speed_mps))), [0.8, 0, 0.6])
+    t_s = np.arange(len(speed_mps)) / 100
+    motion = Motion(t_s, np.zeros((len(t_s), 3)), velocity_mps=np.outer(speed_mps, [0.6, 0, -0.8]))
+    result = Fit(
+        scene=TANK,
+        liquid_id="tank",
+        parameters=(),
+        values={},
+        intervals={},
+        autocorrelation=0.0,
+        correlation=np.zeros((0, 0)),
+        distinguishable=True,
+        warnings=(),
+        motion=motion,
+        measured_n=residual_n + 3.0,
+        fitted_n=np.full(residual_n.shape, 3.0),
+        axes=(0, 2),
+    )
+    *_, along = preset.figures.draw_force(result).axes
+    _, dots, medians = along.lines
+    moves = speed_mps > 0
+    assert dots.get_xydata() == pytest.approx(np.column_stack([speed_mps, along_n])[moves])
+    slow, quick = slice(23, 48), slice(0, 20)
+    slow_medians = [sorted(values[slow])[12] for values in (speed_mps, along_n)]
+    quick_medians = [sum(sorted(values[quick])[9:11]) / 2 for values in (speed_mps, along_n)]
+    assert medians.get_xydata() == pytest.approx(np.array([slow_medians, quick_medians]))
+    assert along.get_xlim() == pytest.approx((0, 1.05 * 1.3))
+    assert along.get_ylim() == pytest.approx((-1.05 * np.abs(residual_n).max(), 1.05 * np.abs(residual_n).max()))
 
 
 def test_places_along_a_line_follow_from_the_velocity(tmp_path):
