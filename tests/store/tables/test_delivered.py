@@ -17,6 +17,7 @@ from study_app.store.session_progress.delivered import (
     beyond_limits,
     broken_interval_limits,
     broken_trial_limits,
+    delay_error_ms,
     delivered_error,
     delivered_values,
     judged_fields,
@@ -35,6 +36,7 @@ SLOW = (
 )
 DAMPING = Stimulated("damper", "damping_nspm", 8.0)
 DELAY = Stimulated("damper", "delay_ms", 50.0)
+FORCE_DELAY = Stimulated("damper", "force_delay_ms", 40.0)
 
 
 def samples(b_nspm: float = 8.0, *, pace: float = 1.0, lasts_s: float = 4.0) -> Any:
@@ -131,6 +133,37 @@ def test_delays_are_judged_by_the_difference_of_their_errors(
         *broken_trial_limits(limits, Presentation(10.0, 50.0, 0, (DELAY, DELAY)), holds, errors_ms, 1000.0)
     ] == broken
     assert [*broken_trial_limits(limits, Presentation(0.1, 8.0, 0, (DAMPING, DAMPING)), holds, errors_ms, 1000.0)] == []
+
+
+@pytest.mark.parametrize("lag_ms", [0, 37, 255])
+def test_the_delivered_delay_of_a_force_is_its_measured_lag(lag_ms: int) -> None:
+    protocol = parse(STUDY.encode(), "delivered.toml")
+    task, samples_late = protocol.tasks["follow"], judged_fields(late(lag_ms) if lag_ms else samples())
+    delivery = delivered_values(protocol, FORCE_DELAY, task, samples_late)
+    assert (delivery.value_delivered, delivery.force_share) == (
+        pytest.approx(lag_ms, abs=0.2),
+        pytest.approx(1, abs=1e-3),
+    )
+    assert delivered_values(protocol, FORCE_DELAY, task, samples_late, adjusted=True).value_delivered is None
+    short = samples_late[: round(1000 * task.lead_s) + 200]
+    assert delivered_values(protocol, FORCE_DELAY, task, short).value_delivered == pytest.approx(lag_ms, abs=0.5)
+    resting = samples(0.0)
+    assert delivered_values(protocol, FORCE_DELAY, task, judged_fields(resting)).value_delivered is None
+    assert delivered_values(protocol, DELAY, task, samples_late).value_delivered is None
+
+
+def test_a_delay_of_the_force_may_deviate_by_one_more_tick() -> None:
+    """At 250 ticks per second by the limit of 2 ms and a tick of 4 ms; a visual delay by the limit."""
+    limits, holds = parse(STUDY.encode(), "delivered.toml").limits, (True, False)
+    for presented, permitted_ms in ((FORCE_DELAY, 6.0), (DELAY, 2.0)):
+        due = Presentation(10.0, 50.0, 0, (presented, presented))
+        for sign in (1, -1):
+            inside, outside = ([sign * (permitted_ms + by_ms) + 7.0, 7.0] for by_ms in (-0.1, 0.1))
+            assert [*broken_trial_limits(limits, due, holds, inside, 250.0)] == []
+            assert [*broken_trial_limits(limits, due, holds, outside, 250.0)] == ["level_error_ms"]
+    measured = {"value_delivered": 37.0, "delay_error_mean_ms": 1.25}
+    assert [delay_error_ms(presented, measured) for presented in (FORCE_DELAY, DELAY)] == [-3.0, 1.25]
+    assert [delay_error_ms(presented, {}) for presented in (FORCE_DELAY, DELAY)] == [None, None]
 
 
 @pytest.mark.parametrize(

@@ -71,6 +71,43 @@ def test_two_files_under_one_version_are_named(study: Path) -> None:
     assert "version 1.0 used 2 different study files" in warned(verify_study(study))
 
 
+def test_each_difference_from_a_list_of_fingerprints_names_its_session(study: Path, tmp_path: Path) -> None:
+    path, copy = study / "fingerprints.txt", tmp_path / "copy.txt"
+    first, second = path.read_text("utf-8").splitlines()
+    proof, other = first.split()[0], second.split()[0]
+    missing, record = "aaaa-bbbb-cccc  data/sub-P009/ses-01", "dddd-eeee-ffff  exclusions.csv/sub-P007"
+    forged = f"cccc-bbbb-aaaa  {P007}"
+    begins = f"{P007}: is not the session that "
+
+    def errors(*, own: list[str], kept: list[str]) -> list[str]:
+        path.write_text("\n".join([*own, ""]), encoding="utf-8", newline="\n")
+        copy.write_text("\n".join([*kept, ""]), encoding="utf-8", newline="\n")
+        return [str(error) for error in verify_study(study, copy).errors]
+
+    listed = [first, second]
+    assert first.endswith(f"  {P007}")
+    assert errors(own=listed, kept=listed) == []
+    assert errors(own=listed, kept=[second]) == [
+        f"{P007}: (fingerprint {proof}) is not in {copy}: the session was added or ended after that copy was made"
+    ]
+    assert errors(own=listed, kept=[forged, second, missing, record]) == [
+        f"exclusions.csv: does not contain dddd-eeee-ffff (exclusions.csv/sub-P007), although {copy} lists it: it was "
+        "deleted or changed",
+        f"{begins}{copy} lists as cccc-bbbb-aaaa: it has been changed (its fingerprint is {proof})",
+        f"data/sub-P009/ses-01: is missing, but {copy} lists it: the session was deleted after it had ended",
+    ]
+    assert errors(own=[first, "P008"], kept=listed) == [
+        "fingerprints.txt: line 2 is not a fingerprint: restore it from a backup",
+        "fingerprints.txt: does not list data/sub-P008/ses-01, which has ended; the rebuild command adds it",
+    ]
+    assert errors(own=[forged, second], kept=listed) == [
+        f"{begins}fingerprints.txt lists as cccc-bbbb-aaaa: it has been changed (its fingerprint is {proof})"
+    ]
+    with lock_folder(study):
+        assert errors(own=[first], kept=listed) == [], "a program lists a session just after creating it"
+    assert other != proof
+
+
 def test_nothing_of_the_key_is_shown(study: Path) -> None:
     """Whatever is broken, no sentence tells a condition."""
     content = json.loads(base64.b64decode((study / "blinding" / "key.sealed").read_bytes()))
