@@ -18,7 +18,7 @@ import pytest
 from study_app.errors import OutletError
 from study_app.outlets import sinks
 from study_app.outlets.markers import CODES, HIGH_S, LOW_S, SinkThread, TriggerSink
-from study_app.outlets.session_outlets import SINKS, open_sink
+from study_app.outlets.session_outlets import SINKS, is_port, open_sink, port_examples
 from study_app.outlets.sinks import PPCLAIM, PPEXCL, PPRELEASE, PPWCONTROL, PPWDATA, ParallelPort
 from tests.outlets.sinks import Recorder, marker
 from tests.platforms import needs_posix
@@ -159,6 +159,13 @@ def test_an_address_where_nothing_is_is_refused_in_a_line(address: str, words: s
     assert "\n" not in str(refused.value)
 
 
+def test_a_port_has_a_kind_with_places_and_a_place() -> None:
+    ports = [True, True, True, False, False, False, False, False, False]
+    addresses = ["serial:COM3", "parallel:/dev/parport1", "serial:COM3@9600", "serial:", "serial", "lsl", "lsl:x"]
+    assert [is_port(address) for address in (*addresses, "usb:1", "serial:COM\n3")] == ports
+    assert port_examples() == ("parallel:/dev/parport0", "serial:/dev/ttyUSB0")
+
+
 def test_a_serial_port_that_is_missing_on_windows_is_said_in_its_words(monkeypatch: pytest.MonkeyPatch) -> None:
     """The exception of pyserial carries no number there, but the representation of the system's error."""
     serial = pytest.importorskip("serial", reason="pyserial is not installed")
@@ -173,11 +180,13 @@ def test_each_byte_has_left_the_serial_port_before_the_next(monkeypatch: pytest.
     serial = pytest.importorskip("serial", reason="pyserial is not installed")
     monkeypatch.setattr(serial, "Serial", mock.Mock())
     sink = open_sink("serial:COM9@57600", time.perf_counter_ns)
-    assert serial.Serial.call_args.args == ("COM9", 57600)
+    assert (serial.Serial.call_args.args, serial.Serial.call_args.kwargs) == (("COM9", 57600), {"write_timeout": 0.5})
     sink.send(marker(event="responses"))
     sink.close()
     sent = [step for byte in (0, 31, 0) for step in (mock.call.write(bytes([byte])), mock.call.flush())]
-    assert serial.Serial.return_value.mock_calls[: len(sent)] == sent
+    assert serial.Serial.return_value.mock_calls == [*sent, mock.call.close()]
+    open_sink("serial:COM9", time.perf_counter_ns)
+    assert serial.Serial.call_args.args == ("COM9", 115_200)
 
 
 @pytest.mark.parametrize(

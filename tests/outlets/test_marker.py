@@ -2,14 +2,18 @@
 
 import itertools
 import json
+import platform
 import threading
 from collections.abc import Callable
+from types import SimpleNamespace
 
 import pytest
 
+import study_app
 from study_app.outlets import markers as module
 from study_app.outlets.markers import CODES, HANGS_S, SinkThread, marker_of
-from study_app.outlets.streams import ClockMapping
+from study_app.outlets.session_outlets import open_sink
+from study_app.outlets.streams import ClockMapping, SampleStream
 from study_app.store.journals.journal_events import EVENTS
 from tests.haptics.running import wait_until
 from tests.outlets.sinks import Sink, marker
@@ -203,6 +207,82 @@ def test_readings_that_take_long_on_one_side_do_not_bias_beyond_the_bound() -> N
     clocks = Clocks(0.0, lambda: next(turns))
     mapping = ClockMapping(clocks.now_ns, clocks.other_s)
     assert abs(mapping.offset_s) <= mapping.uncertainty_s
+
+
+class Node:
+    """An element of a stream's description."""
+
+    def __init__(self) -> None:
+        self.children: list[tuple[str, object]] = []
+
+    def append_child_value(self, name: str, value: str) -> None:
+        self.children.append((name, value))
+
+    def append_child(self, name: str) -> "Node":
+        child = Node()
+        self.children.append((name, child.children))
+        return child
+
+
+class Library:
+    """Stands in for pylsl: keeps the descriptions of streams and what is pushed; its clock reads 50 s."""
+
+    def __init__(self) -> None:
+        self.created: list[tuple[object, ...]] = []
+        self.nodes: list[Node] = []
+        self.pushed: list[tuple[object, ...]] = []
+        self.consumers = False
+
+    def local_clock(self) -> float:
+        return 50.0
+
+    def StreamInfo(self, *properties: object) -> SimpleNamespace:  # noqa: N802 - pylsl's name
+        self.created.append(properties)
+        self.nodes.append(node := Node())
+        return SimpleNamespace(desc=lambda: node)
+
+    def StreamOutlet(self, _info: object) -> SimpleNamespace:  # noqa: N802 - pylsl's name
+        return SimpleNamespace(
+            push_sample=lambda *sample: self.pushed.append(sample), have_consumers=lambda: self.consumers
+        )
+
+
+def test_both_streams_say_what_they_contain_and_map_times_to_the_librarys_clock(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The servo's clock reads 0, 4, 8, … 60 µs at the start, so the last of 8 readings of 50 s was at 58 ± 2 µs."""
+    library = Library()
+    for user in ("streams", "sinks"):
+        monkeypatch.setattr(f"study_app.outlets.{user}.import_pylsl", lambda: library)
+    empty = SimpleNamespace(read=lambda: (), dropped=0)
+    telemetry = SimpleNamespace(reader=lambda: empty)
+    samples = SampleStream(telemetry, 1234.0, itertools.count(0, 4000).__next__)
+    sink = open_sink("lsl", itertools.count(0, 4000).__next__)
+    assert samples.described == {"stream": "liquid-study samples", "clock_uncertainty_us": 2.0}
+    assert sink.described == {"stream": "liquid-study markers", "clock_uncertainty_us": 2.0}
+    computer = platform.node()
+    assert library.created == [
+        ("liquid-study samples", "Haptics", 11, 1234.0, "float32", f"liquid-study samples of {computer}"),
+        ("liquid-study markers", "Markers", 1, 0.0, "string", f"liquid-study markers of {computer}"),
+    ]
+    units = {"position": "m", "velocity": "m/s", "force": "N"}
+    measured = [[("label", f"{name}_{axis}"), ("unit", unit)] for name, unit in units.items() for axis in "xyz"]
+    head = [("manufacturer", "liquid-study"), ("version", study_app.__version__)]
+    labels = [*measured, [("label", "limiters")], [("label", "tick")]]
+    assert library.nodes[0].children == [*head, ("channels", [("channel", label) for label in labels])]
+    assert library.nodes[1].children == [
+        *head,
+        ("channels", [("channel", [("label", "marker")])]),
+        ("triggers", [(event, str(code)) for event, code in CODES.items()]),
+    ]
+    sink.send(marker(3, time_s=2.0))
+    assert library.pushed == [([marker(3, time_s=2.0).text], pytest.approx(2 + 50 - 58e-6, abs=1e-9))]
+    for consumers in (True, False):
+        library.consumers = consumers
+        assert (samples.listens, sink.listens) == (consumers, consumers)
+    sink.close()
+    samples.close()
+    assert (samples.listens, sink.listens, samples.lost) == (False, False, "")
 
 
 def test_it_is_measured_again_when_it_is_due(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections import deque
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -12,9 +13,9 @@ import pytest
 
 from study_app.haptics.model.layout import LIMITER_ENERGY, LIMITER_SLEW, SAMPLE
 from study_app.outlets.markers import SinkKind, SinkThread
-from study_app.outlets.session_outlets import Outlets, open_sink
+from study_app.outlets.session_outlets import Outlets, OutletStatus, open_sink
 from study_app.outlets.streams import CHANNELS, SampleStream, channels_of
-from tests.outlets.sinks import Recorder, marker
+from tests.outlets.sinks import Recorder, Sink, marker
 from tests.strangers import PATIENCE_S, visited
 
 pylsl = pytest.importorskip("pylsl", reason="pylsl is not installed: pip install 'liquid-study[lsl]'")
@@ -188,6 +189,52 @@ def test_an_unexpected_error_of_a_driver_stops_no_session(monkeypatch: pytest.Mo
     outlets = Outlets(("lsl",), "off", Servo(), "double")
     assert outlets.lost == {"LSL markers": "RuntimeError: could not create the stream outlet"}
     outlets.close()
+
+
+def test_the_state_of_each_outlet_has_its_own_title_and_reason(monkeypatch: pytest.MonkeyPatch) -> None:
+    ports = {"first": Sink(fails_at=7), "second": Sink()}
+    ports["first"].title, ports["second"].title, ports["second"].listens = "First port", "Second port", True
+    samples = SimpleNamespace(title="LSL samples", listens=False, described={"stream": "s"}, lost="busy", closed=False)
+    samples.close = lambda: setattr(samples, "closed", True)
+    stream = SimpleNamespace(opened=[])
+
+    def open_stream(telemetry: Any, rate_hz: float, now_ns: Any) -> Any:
+        stream.opened.append((telemetry, rate_hz, now_ns()))
+        return samples
+
+    open_stream.title = "LSL samples"  # type: ignore[attr-defined]
+    kinds = {
+        name: SinkKind(name, sink.title, example=f"{name}:1", open=lambda _place, _now_ns, sink=sink: sink)
+        for name, sink in ports.items()
+    }
+    monkeypatch.setattr("study_app.outlets.session_outlets.SINKS", kinds)
+    monkeypatch.setattr("study_app.outlets.session_outlets.SampleStream", open_stream)
+    servo = SimpleNamespace(telemetry=Telemetry(), rate_hz=987.0, now_ns=lambda: 456)
+    outlets = Outlets(("first:1", "second:1", "third:1"), "always", servo, "double")
+    assert stream.opened == [(servo.telemetry, 987.0, 456)]
+    for trial in (6, 7, 8):
+        outlets.mark(marker(trial))
+    assert ports["first"].closed.wait(5)
+    unplugged, unknown = "test:port failed: it was unplugged", outlets.lost["Triggers"]
+    assert outlets.lost == {"First port": unplugged, "LSL samples": "busy", "Triggers": unknown}
+    assert unknown == "'third:1' is not a marker address: use one such as first:1, second:1"
+    assert outlets.statuses() == (
+        OutletStatus(title="First port", lost=unplugged),
+        OutletStatus(title="Second port", listens=True),
+        OutletStatus(title="LSL samples", listens=False, lost="busy", shows_force=True),
+        OutletStatus(title="Triggers", lost=unknown),
+    )
+    port = {"address": "test:port"}
+    assert list(outlets.described.items()) == [
+        ("First port", port),
+        ("Second port", port),
+        ("LSL samples", {"stream": "s"}),
+        ("Triggers", {"failed": unknown}),
+    ]
+    outlets.close()
+    assert ports["second"].closed.is_set()
+    assert samples.closed
+    assert [sink.sent for sink in ports.values()] == [[marker(6)], [marker(6), marker(7), marker(8)]]
 
 
 @slow
