@@ -14,6 +14,7 @@ from study_app.errors import VideoError
 pytest.importorskip("av", reason="the optional extra video is not installed")
 
 from study_app.video import sources
+from study_app.video.encoding import VideoWriter
 from study_app.video.sources import Footage
 from tests.video.clips import number_in, write_clip
 
@@ -90,6 +91,29 @@ def test_frames_are_scaled_to_the_tank_with_their_own_ratio(footage: Footage) ->
     assert frame.height == 200
     assert abs(frame.width / frame.height - SIZE[0] / SIZE[1]) < 0.01
     assert number_in(pixels_of(frame)) == 20 % FRAMES
+
+
+def test_a_written_video_has_each_picture_in_its_place_size_and_colour(tmp_path: Path) -> None:
+    """Of odd sizes the last row and column are lost; blue, green and red are exchanged nowhere."""
+    import av
+
+    colours = [(40, 90, 200), (200, 40, 90), (90, 200, 40)]
+    writer = VideoWriter((67, 49), 25)
+    for colour in colours:
+        picture = np.zeros((49, 67, 4), np.uint8)
+        picture[:24, :33, :3] = colour
+        writer.add(picture)
+    file = tmp_path / "written.mp4"
+    file.write_bytes(writer.finish())
+    with av.open(str(file)) as container:
+        stream = container.streams.video[0]
+        assert stream.average_rate == 25
+        pictures = [frame.to_ndarray(format="bgr24").astype(int) for frame in container.decode(stream)]
+    assert [picture.shape for picture in pictures] == [(48, 66, 3)] * 3
+    for picture, colour in zip(pictures, colours, strict=True):
+        assert np.median(picture[4:20, 4:28], axis=(0, 1)) == pytest.approx(colour, abs=12)
+        assert picture[30:, 40:].mean() < 12
+    assert Footage(file).size == (66, 48)
 
 
 def test_a_file_that_fails_later_stops_without_its_name(clip: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -7,6 +7,7 @@ import os
 import threading
 import time
 from collections import deque
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -19,12 +20,13 @@ from study_app.errors import VideoError
 from study_app.protocol.load import parse
 from study_app.protocol.model import Protocol
 from study_app.protocol.source.files import source_bytes
+from study_app.protocol.trials import MOST_DELAY_MS
 from study_app.session.transitions.events import Broke, broken
 from study_app.store import workstation
 from study_app.store.workstation import MachineSettings
 from study_app.video import sources
 from study_app.video.frames import VideoFrame, VideoStatistics, stopped_error
-from study_app.video.sources import NOT_SHOWN, Camera, Videos, without_login
+from study_app.video.sources import NOT_SHOWN, Camera, Videos, missing_on_computer, without_login
 from tests.video.clips import write_clip
 
 
@@ -35,16 +37,19 @@ class FakeCamera:
     made: list[FakeCamera]
     fault = ""
 
-    def __init__(self, source: str, *_: Any) -> None:
+    def __init__(self, source: str, _now_ns: Any, holds_s: float) -> None:
         if self.fault:
             raise VideoError(f"the camera {source} cannot be used: {self.fault}")
         self.made.append(self)
         self.works = True
         assert self.opens.wait(10)
-        self.source, self.size, self.closed = source, (640, 480), False
+        self.source, self.size, self.closed, self.held_s = source, (640, 480), False, holds_s
         self.newest = VideoFrame(
             number=0, width=2, height=2, stride=8, pixels=bytes(16), due_ns=0, age_ns=None, period_ns=33_333_333
         )
+
+    def fit(self, width: int, height: int) -> None:
+        self.fitted = (width, height)
 
     def close(self) -> None:
         self.closed = True
@@ -115,6 +120,61 @@ def test_a_camera_that_opens_after_all_were_closed_is_closed_too(study: Protocol
     opening.join(10)
     (made,) = camera.made
     assert made.closed
+
+
+def test_a_camera_is_described_by_its_size_rate_and_age(study: Protocol, camera: type[FakeCamera]) -> None:
+    camera.opens.set()
+    every = videos(study, "v4l2:/dev/video3")
+    assert every.views == ("camera",)
+    assert every.open().about == "camera, 640 × 480, 30 Hz, age unknown"
+    described = {"source": "v4l2:/dev/video3", "size": [640, 480], "rate_hz": 30.0, "age": "unknown"}
+    assert every.describe() == {"camera": described}
+    (opened,) = camera.made
+    assert every.source("camera") is opened
+    opened.newest = replace(opened.newest, age_ns=12_400_000, period_ns=16_000_000)
+    assert every.open().about == "camera, 640 × 480, 62.5 Hz, 12 ms old"
+    assert every.describe() == {"camera": described | {"rate_hz": 62.5, "age": "from the source's time stamps"}}
+    every.fit(1152, 648)
+    assert opened.fitted == (1152, 648)
+
+
+def test_a_camera_holds_frames_for_the_longest_delay_of_a_condition_that_shows_it(camera: type[FakeCamera]) -> None:
+    camera.opens.set()
+
+    def held_s(*delays_ms: float, varied: str = "force_delay_ms") -> float:
+        shown = [SimpleNamespace(shows_video=True, view="camera", footage_sha256="", delay_ms=ms) for ms in delays_ms]
+        drawn = SimpleNamespace(shows_video=False, view="drawn", footage_sha256="", delay_ms=900.0)
+        study: Any = SimpleNamespace(
+            conditions=dict(enumerate([*shown, drawn])), stimuli={"delays": SimpleNamespace(vary=varied)}
+        )
+        every = videos(study, "")
+        assert every.views == ("camera",)
+        every.open()
+        assert camera.made[-1].source == sources.USUAL
+        return camera.made[-1].held_s
+
+    assert [held_s(250, 137.5), held_s(137.5, 250), held_s(0)] == [0.25, 0.25, 0.0]
+    assert held_s(250, varied="delay_ms") == MOST_DELAY_MS / 1000
+
+
+def test_a_computer_without_a_camera_is_told_and_footage_that_is_missing_is_an_error(
+    study: Protocol, camera: type[FakeCamera], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sources, "is_installed", lambda: True)
+    camera.opens.set()
+    nowhere = Path("/nowhere")
+    assert missing_on_computer(study, nowhere, "v4l2:/dev/video3", lambda: 0) == ""
+    assert [(made.source, made.held_s, made.closed) for made in camera.made] == [("v4l2:/dev/video3", 0.0, True)]
+    camera.fault = "no such device"
+    assert missing_on_computer(study, nowhere, "dshow:video=A", lambda: 0) == (
+        "the camera dshow:video=A cannot be used: no such device"
+    )
+    files: Any = SimpleNamespace(conditions={"sea": SimpleNamespace(shows_video=True, view="waves.mp4")})
+    with pytest.raises(VideoError, match=r"^\S+waves\.mp4 cannot be shown: "):
+        missing_on_computer(files, nowhere, "", lambda: 0)
+    monkeypatch.setattr(sources, "is_installed", lambda: False)
+    assert missing_on_computer(files, nowhere, "", lambda: 0).startswith("a video needs the optional video extra")
+    assert missing_on_computer(parse(source_bytes("demo"), "demo.toml"), nowhere, "", lambda: 0) == ""
 
 
 def test_the_receipt_has_neither_name_nor_password_of_a_camera(study: Protocol, camera: type[FakeCamera]) -> None:
@@ -250,6 +310,33 @@ def test_a_video_that_stops_can_be_reconnected() -> None:
     error = stopped_error("it ended")
     assert isinstance(error, VideoError)
     assert broken(1.0, error) == Broke(1.0, str(error), "device")
+
+
+def test_frames_are_counted_by_the_median_of_ten_gaps_once_there_are_ten() -> None:
+    numbers = sources._FrameNumbers(100_000_000)
+    counted = [numbers.next_number(0.02 * place) for place in range(10)]
+    assert (counted, numbers.period_ns) == ([*range(10)], 100_000_000)
+    assert [numbers.next_number(stamp_s) for stamp_s in (0.20, 0.26, 0.25, 0.27)] == [10, 13, 14, 15]
+    assert numbers.period_ns == 20_000_000
+
+
+@pytest.mark.parametrize(
+    ("average_hz", "guessed_hz", "period_ns"),
+    [
+        (25, 50, 40_000_000),
+        (None, 50, 20_000_000),
+        (0.5, 50, 20_000_000),
+        (90_000, None, 33_333_333),
+        (1, None, 1_000_000_000),
+        (240, None, 4_166_667),
+        (None, 241, 33_333_333),
+    ],
+)
+def test_the_period_is_that_of_the_header_between_1_and_240_hz_else_of_30_hz(
+    average_hz: float | None, guessed_hz: float | None, period_ns: int
+) -> None:
+    stream = SimpleNamespace(average_rate=average_hz, guessed_rate=guessed_hz)
+    assert sources.period_ns(stream) == period_ns
 
 
 @pytest.mark.parametrize(
