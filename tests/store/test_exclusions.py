@@ -1,6 +1,7 @@
 import codecs
 import json
 import shutil
+from dataclasses import replace
 from datetime import datetime, timedelta, timezone
 from pathlib import Path
 
@@ -12,7 +13,7 @@ from hypothesis.stateful import RuleBasedStateMachine, rule, run_state_machine_a
 from study_app.errors import StoreError
 from study_app.store import unblinding
 from study_app.store.exclusions import Exclusion, exclude, exclusions, include, keep, reversals
-from study_app.store.unblinding import late_exclusions, unblind
+from study_app.store.unblinding import RULES, late_exclusions, unblind
 from study_app.store.verification.whole_study import verify_study
 from tests.platforms import files_up_to, needs_links
 from tests.store.conftest import Start
@@ -70,7 +71,8 @@ def test_a_decision_after_unblinding_is_late_although_the_clock_was_set_back(fol
     unblind(folder, "CD", "to analyse")
     assert datetime.now().astimezone() > NOW
     late = exclude(folder, "P007", 1, by="AB", reason="slow", now=NOW)
-    assert late_exclusions(folder, exclusions(folder)) == (late,)
+    by_rule = tuple(replace(late, trial=3, rule_or_person=name) for name in RULES)
+    assert late_exclusions(folder, (*by_rule, *exclusions(folder))) == (late,), "rules decide without a person"
     include(folder, "P008", 1, by="AB", reason="it counts", now=NOW)
     assert late_exclusions(folder, exclusions(folder)) == (late, early)
     assert verify_study(folder).is_sound

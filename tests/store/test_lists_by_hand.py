@@ -21,7 +21,13 @@ from study_app.store.blinded import blinding
 from study_app.store.exclusions import Exclusion
 from study_app.store.files import atomic, csv_files, output_files
 from study_app.store.files.folders import SessionFolder, StudyFolder, kept_pilot_folder, rehearsal_folder
-from study_app.store.integrity.checksums import file_hash, note_rebuilt, read_checksums, renew_checksums
+from study_app.store.integrity.checksums import (
+    file_hash,
+    note_rebuilt,
+    read_checksums,
+    renew_checksums,
+    replace_checksums,
+)
 from study_app.store.integrity.folder_lock import remove_abandoned_claims
 from study_app.store.recorder import Recorder
 from study_app.store.session_progress.delivered import broken_limits, delay_error_ms, is_within_limits
@@ -288,6 +294,18 @@ def test_a_rebuilt_list_of_checksums_names_the_files_that_changed(tmp_path: Path
     assert renew_checksums(session, [session.rebuilt])
     assert read_checksums(session)["rebuilt.txt"] == file_hash(session, "rebuilt.txt")
     assert len(session.rebuilt.read_text("utf-8").splitlines()) == 3
+
+
+def test_only_the_checksum_of_the_content_before_unblinding_is_replaced(tmp_path: Path) -> None:
+    session = SessionFolder(tmp_path, "P007", 2)
+    listed = {"changed.csv": "a" * 64, "opened.csv": "b" * 64, "other.csv": "c" * 64}
+    text = "".join(f"{digest}  {name}\n" for name, digest in listed.items())
+    session.checksums.write_text(text, encoding="utf-8", newline="\n")
+    before = session.checksums.stat().st_mtime_ns
+    replace_checksums(session, {"changed.csv": ("d" * 64, "e" * 64), "unlisted.csv": ("f" * 64, "0" * 64)})
+    assert (session.checksums.read_text("utf-8"), session.checksums.stat().st_mtime_ns) == (text, before)
+    replace_checksums(session, {"changed.csv": ("d" * 64, "e" * 64), "opened.csv": ("b" * 64, "1" * 64)})
+    assert session.checksums.read_text("utf-8") == text.replace("b" * 64, "1" * 64)
 
 
 def test_a_draft_that_another_program_wrote_is_kept_as_a_version(

@@ -17,7 +17,6 @@ from study_app.store.session_progress.delivered import (
     beyond_limits,
     broken_interval_limits,
     broken_trial_limits,
-    delay_error_ms,
     delivered_error,
     delivered_values,
     judged_fields,
@@ -161,9 +160,6 @@ def test_a_delay_of_the_force_may_deviate_by_one_more_tick() -> None:
             inside, outside = ([sign * (permitted_ms + by_ms) + 7.0, 7.0] for by_ms in (-0.1, 0.1))
             assert [*broken_trial_limits(limits, due, holds, inside, 250.0)] == []
             assert [*broken_trial_limits(limits, due, holds, outside, 250.0)] == ["level_error_ms"]
-    measured = {"value_delivered": 37.0, "delay_error_mean_ms": 1.25}
-    assert [delay_error_ms(presented, measured) for presented in (FORCE_DELAY, DELAY)] == [-3.0, 1.25]
-    assert [delay_error_ms(presented, {}) for presented in (FORCE_DELAY, DELAY)] == [None, None]
 
 
 @pytest.mark.parametrize(
