@@ -1,16 +1,12 @@
 """Which limits an interval breaks, by its samples: level, clipping, pace, and the difference of two delays."""
 
-from dataclasses import asdict
-from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from study_app.haptics.model.layout import LIMITER_ENERGY, LIMITER_GLITCH, LIMITER_NORM, SAMPLE
+from study_app.haptics.model.layout import LIMITER_ENERGY, LIMITER_GLITCH, LIMITER_NORM, LIMITER_SATURATED, SAMPLE
 from study_app.protocol.load import parse
-from study_app.protocol.model import Protocol
 from study_app.protocol.presented.presentation import Presentation
 from study_app.protocol.trials.stimuli import Stimulated
 from study_app.store.session_progress.delivered import (
@@ -23,9 +19,7 @@ from study_app.store.session_progress.delivered import (
     late_device_text,
     late_device_ticks,
 )
-from tests.golden import compare
 from tests.protocol.edited_studies import text_of
-from tests.transcripts import acts, played, value_of
 
 STUDY = text_of("delivered")
 SLOW = (
@@ -35,6 +29,8 @@ SLOW = (
 )
 DAMPING = Stimulated("damper", "damping_nspm", 8.0)
 DELAY = Stimulated("damper", "delay_ms", 50.0)
+VISCOSITY = Stimulated("damper", "viscosity_pa_s", 4.0)
+LOSS = Stimulated("damper", "force_loss", 0.3)
 FORCE_DELAY = Stimulated("damper", "force_delay_ms", 40.0)
 
 
@@ -57,60 +53,96 @@ def late(delay: int, b_nspm: float = 8.0) -> Any:
     return found
 
 
-class Interval:
-    """An interval, what may happen to its samples, and what is found of it."""
-
-    def __init__(self, protocol: Protocol, delay: int = 0, task: str = "follow", **made: Any) -> None:
-        self.protocol, self.task, self.found = protocol, task, samples(**made)
-        if delay:
-            self.found = late(delay, made.get("b_nspm", 8.0))
-
-    def weaken(self, share: float, until: int | None = None) -> None:
-        self.found["device_force_n"][:until] *= share
-
-    def clip(self, at: int) -> None:
-        self.found["limiters"][at] = LIMITER_NORM
-
-    def refuse(self, first: int, last: int) -> None:
-        """Refuse positions, which are far off."""
-        self.found["position_m"][first:last] = 1.0
-        self.found["limiters"][first:last] = LIMITER_GLITCH
-
-    def take_back(self) -> None:
-        self.found["limiters"] = 0
-
-    def lose(self, first: int, last: int) -> None:
-        self.found = np.delete(self.found, range(first, last))
-
-    def find(self, vary: str, value: float, condition: str = "damper") -> str:
-        """Tell what was delivered of a level, and which limits that breaks."""
-        presented, task = Stimulated(condition, vary, value), self.protocol.tasks[self.task]
-        found = delivered_values(self.protocol, presented, task, judged_fields(self.found))
-        told = ", ".join(
-            f"{name} {round(one, 4) + 0.0:g}" for name, one in asdict(found).items() if isinstance(one, float)
-        )
-        return f"{told}; broken: {[*broken_interval_limits(self.protocol.limits, presented, task, found)]}"
-
-
-def begun(start: str) -> Interval:
-    protocol = parse((SLOW if start.startswith("slow") else STUDY).encode(), "delivered.toml")
-    interval: Interval = value_of(f"made({start.partition(':')[2]})", {"made": partial(Interval, protocol)})
+def weakened(share: float, until: int | None = None) -> Any:
+    interval = samples()
+    interval["device_force_n"][:until] *= share
     return interval
 
 
-def test_what_is_found_of_an_interval(pytestconfig: pytest.Config) -> None:
-    """100 ms late, a damper of 8 N·s/m would measure as 6.5 at 1 Hz, were its motion not taken as late."""
-    file = Path(__file__).parent / "golden" / "delivered.txt"
-    compare(file, played(file, acts(begun, {})), pytestconfig, rel=1e-3)
+def clipped(at: int, interval: Any = None, limiter: int = LIMITER_NORM) -> Any:
+    interval = samples() if interval is None else interval
+    interval["limiters"][at] = limiter
+    return interval
+
+
+@pytest.mark.parametrize(
+    ("task", "presented", "interval", "value", "broken"),
+    [
+        ("follow", DAMPING, samples(), 8.0, []),
+        ("follow", DAMPING, samples(8.15), 8.15, []),
+        ("follow", DAMPING, samples(7.85), 7.85, []),
+        ("follow", DAMPING, samples(8.17), 8.17, ["level_error_percent"]),
+        ("follow", DAMPING, samples(7.83), 7.83, ["level_error_percent"]),
+        ("follow", VISCOSITY, weakened(0.985), 4.0, []),
+        ("follow", VISCOSITY, weakened(0.97), 4.0, ["level_error_percent"]),
+        ("follow", DELAY, weakened(0.97), None, []),
+        ("follow", DAMPING, samples(pace=0.62), 8.0, []),
+        ("follow", DAMPING, samples(pace=1.38), 8.0, []),
+        ("follow", DAMPING, samples(pace=0.58), 8.0, ["pace_error_percent"]),
+        ("follow", DAMPING, samples(pace=1.42), 8.0, ["pace_error_percent"]),
+        ("stir", DAMPING, samples(pace=0.58), 8.0, []),
+        ("stir", DAMPING, samples(pace=1.42), 8.0, []),
+        ("follow", DAMPING, clipped(900), 8.0, []),
+        ("follow", DAMPING, clipped(1100), 8.0, ["force_limit_n"]),
+        ("follow", DELAY, clipped(1100), None, []),
+        ("stir", DAMPING, clipped(400), 8.0, []),
+        ("stir", DAMPING, clipped(600, limiter=LIMITER_SATURATED), 8.0, ["force_limit_n"]),
+        ("stir", DELAY, clipped(600), None, []),
+        ("stir", FORCE_DELAY, late(15), 15.0, []),
+        ("stir", FORCE_DELAY, late(250), 250.0, []),
+        ("follow", LOSS, late(3), 0.3, []),
+        ("follow", LOSS, clipped(2000, late(3)), 0.3, ["force_limit_n"]),
+    ],
+)
+def test_an_interval_is_judged_by_its_level_pace_and_clipping(
+    task: str, presented: Stimulated, interval: Any, value: float | None, broken: list[str]
+) -> None:
+    """By the limits of 2 % of a level and 40 % of a pace; a force that is taken as requested is judged by its share."""
+    protocol = parse(STUDY.encode(), "delivered.toml")
+    delivery = delivered_values(protocol, presented, protocol.tasks[task], judged_fields(interval))
+    sent, model = (np.linalg.norm(interval[name][1500:-500]) for name in ("device_force_n", "force_n"))
+    speed_mps = interval["position_m"].max() * 2 * np.pi / np.sqrt(2)
+    assert delivery.value_delivered == (None if value is None else pytest.approx(value, rel=2e-3))
+    assert (delivery.force_share, delivery.pace_mps) == (
+        pytest.approx(sent / model, rel=2e-3),
+        pytest.approx(speed_mps, rel=0.02),
+    )
+    assert delivery.apparent_mass_kg is None or abs(delivery.apparent_mass_kg) < 0.01 or presented == LOSS
+    assert [*broken_interval_limits(protocol.limits, presented, protocol.tasks[task], delivery)] == broken
+
+
+def test_the_fade_refused_positions_and_lost_samples_are_not_judged() -> None:
+    protocol = parse(STUDY.encode(), "delivered.toml")
+    task, interval = protocol.tasks["follow"], weakened(0.0, until=1000)
+    interval["position_m"][2000:2003], interval["limiters"][2000:2003] = 1.0, LIMITER_GLITCH
+    delivery = delivered_values(protocol, DAMPING, task, judged_fields(interval))
+    assert (delivery.value_delivered, delivery.force_share) == (pytest.approx(8, rel=1e-3), pytest.approx(1))
+    assert [*broken_interval_limits(protocol.limits, DAMPING, task, delivery)] == []
+    interval["limiters"] = 0
+    delivery = delivered_values(protocol, DAMPING, task, judged_fields(interval))
+    broken = [*broken_interval_limits(protocol.limits, DAMPING, task, delivery)]
+    assert broken == ["level_error_percent", "pace_error_percent"]
+    interval = late(30)
+    interval["position_m"][2100], interval["limiters"][2100] = 1.0, LIMITER_GLITCH
+    delivery = delivered_values(protocol, FORCE_DELAY, task, judged_fields(np.delete(interval, range(2500, 2510))))
+    assert delivery.value_delivered == pytest.approx(30, abs=0.01)
+
+
+def test_a_damping_is_measured_by_the_motion_that_its_late_force_belongs_to() -> None:
+    """100 ms late, a damper of 2 N·s/m would measure as 2 cos 36° = 1.6 at 1 Hz."""
+    protocol = parse(SLOW.encode(), "delivered.toml")
+    presented = Stimulated("late", "damping_nspm", 2.0)
+    delivery = delivered_values(protocol, presented, protocol.tasks["follow"], judged_fields(late(100, 2.0)))
+    assert (delivery.value_delivered, delivery.force_share) == (pytest.approx(2, rel=1e-3), pytest.approx(1, rel=1e-3))
 
 
 def test_the_lead_of_a_paced_task_is_not_judged() -> None:
-    interval = Interval(parse(STUDY.encode(), "delivered.toml"))
-    task = interval.protocol.tasks["follow"]
-    interval.weaken(0.5, until=round(1000 * task.lead_s))
-    found = delivered_values(interval.protocol, DAMPING, task, judged_fields(interval.found))
-    assert task.lead_s > interval.protocol.scene.fade_s
-    assert (found.force_share, found.value_delivered) == (pytest.approx(1.0), pytest.approx(8.0, rel=0.01))
+    protocol = parse(STUDY.encode(), "delivered.toml")
+    task = protocol.tasks["follow"]
+    interval = weakened(0.5, until=round(1000 * task.lead_s))
+    delivery = delivered_values(protocol, DAMPING, task, judged_fields(interval))
+    assert task.lead_s > protocol.scene.fade_s
+    assert (delivery.force_share, delivery.value_delivered) == (pytest.approx(1.0), pytest.approx(8.0, rel=0.01))
 
 
 @pytest.mark.parametrize(
