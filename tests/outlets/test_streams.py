@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from study_app.errors import OutletError
 from study_app.haptics.model.layout import LIMITER_ENERGY, LIMITER_SLEW, SAMPLE
 from study_app.outlets.markers import SinkKind, SinkThread
 from study_app.outlets.session_outlets import Outlets, OutletStatus, open_sink
@@ -207,22 +208,29 @@ def test_the_state_of_each_outlet_has_its_own_title_and_reason(monkeypatch: pyte
         name: SinkKind(name, sink.title, example=f"{name}:1", open=lambda _place, _now_ns, sink=sink: sink)
         for name, sink in ports.items()
     }
+
+    def refuse(place: str, _now_ns: Any) -> Any:
+        raise OutletError(f"{place} is not there")
+
+    kinds["fourth"] = SinkKind("fourth", "Fourth port", example="fourth:1", open=refuse)
     monkeypatch.setattr("study_app.outlets.session_outlets.SINKS", kinds)
     monkeypatch.setattr("study_app.outlets.session_outlets.SampleStream", open_stream)
     servo = SimpleNamespace(telemetry=Telemetry(), rate_hz=987.0, now_ns=lambda: 456)
-    outlets = Outlets(("first:1", "second:1", "third:1"), "always", servo, "double")
+    outlets = Outlets(("first:1", "second:1", "third:1", "fourth:COM7"), "always", servo, "double")
     assert stream.opened == [(servo.telemetry, 987.0, 456)]
     for trial in (6, 7, 8):
         outlets.mark(marker(trial))
     assert ports["first"].closed.wait(5)
     unplugged, unknown = "test:port failed: it was unplugged", outlets.lost["Triggers"]
-    assert outlets.lost == {"First port": unplugged, "LSL samples": "busy", "Triggers": unknown}
-    assert unknown == "'third:1' is not a marker address: use one such as first:1, second:1"
+    lost = {"First port": unplugged, "LSL samples": "busy", "Triggers": unknown, "Fourth port": "COM7 is not there"}
+    assert outlets.lost == lost
+    assert unknown == "'third:1' is not a marker address: use one such as first:1, second:1, fourth:1"
     assert outlets.statuses() == (
         OutletStatus(title="First port", lost=unplugged),
         OutletStatus(title="Second port", listens=True),
         OutletStatus(title="LSL samples", listens=False, lost="busy", shows_force=True),
         OutletStatus(title="Triggers", lost=unknown),
+        OutletStatus(title="Fourth port", lost="COM7 is not there"),
     )
     port = {"address": "test:port"}
     assert list(outlets.described.items()) == [
@@ -230,24 +238,10 @@ def test_the_state_of_each_outlet_has_its_own_title_and_reason(monkeypatch: pyte
         ("Second port", port),
         ("LSL samples", {"stream": "s"}),
         ("Triggers", {"failed": unknown}),
+        ("Fourth port", {"failed": "COM7 is not there"}),
     ]
     outlets.close()
     assert ports["second"].closed.is_set()
     assert samples.closed
+    assert not [thread for thread in threading.enumerate() if thread.name.startswith("outlet")]
     assert [sink.sent for sink in ports.values()] == [[marker(6)], [marker(6), marker(7), marker(8)]]
-
-
-@slow
-def test_outlets_that_fail_are_named_and_the_others_go_on() -> None:
-    pytest.importorskip("serial", reason="pyserial is not installed")
-    outlets = Outlets(("lsl", "serial:/nowhere/ttyUSB7", "usb:1"), "off", Servo(), "double")
-    lost = outlets.lost
-    assert set(lost) == {"Serial port", "Triggers"}
-    assert lost["Serial port"].startswith("serial:/nowhere/ttyUSB7 cannot be opened")
-    assert [one.title for one in outlets.statuses() if not one.lost] == ["LSL markers"]
-    assert outlets.described["Serial port"] == {"failed": lost["Serial port"]}
-    recorder = Recorder("liquid-study markers", 1)
-    outlets.mark(marker())
-    assert recorder.found()["samples"][0][0] == [marker().text]
-    outlets.close()
-    assert not [one for one in threading.enumerate() if one.name.startswith("outlet")]
