@@ -196,9 +196,11 @@ def _clear_program(e: Any) -> None:
     run.homing = 0
     run.lights = 0
     run.stroke = 0
+    run.stalled_ns = 0
     for arm in range(3):
         run.torque[arm] = 0
         run.acting[arm] = 0.0
+        run.shown[arm] = 0
 
 
 @kernel

@@ -171,6 +171,35 @@ def test_only_a_loss_of_power_loses_the_program(turned_on: tuple[bool, ...], *, 
     assert (emulator.powered, emulator.running) == (turned_on[-1], runs)
 
 
+@pytest.mark.parametrize("switched_off", [True, False])
+def test_a_program_that_is_loaded_again_keeps_nothing_of_the_earlier_one(*, switched_off: bool) -> None:
+    """The earlier program hangs for a minute in the middle of a packet and of the hand's motion."""
+    emulator, transport = falcon(running=True)
+    configure(transport)
+    emulator.faults.last(stall_s=60.0)
+    emulator.faults.once("stall")
+    transport.write(constants.quiet_packet(), 0.1)
+    transport.pause(0.01)
+    assert not is_running(transport)
+    run = emulator.state.run
+    run.held, run.homed, run.homing, run.lights, run.stroke = 5, 0b101, 1, constants.FLAG_RED, 2
+    run.torque, run.acting, run.shown = (7, -8, 9), (70.0, -80.0, 90.0), (11, -12, 13)
+    if switched_off:
+        emulator.power(False)
+        emulator.power(True)
+    else:
+        emulator.control(constants.REQUEST_BAUD, constants.BAUD_9600)
+        for value in (constants.DTR_LOW, constants.DTR_HIGH):
+            emulator.control(constants.REQUEST_MODEM, value)
+    assert not emulator.running
+    numbers = (int(run.held), emulator.homed, int(run.homing), emulator.lights, int(run.stroke))
+    assert (numbers, emulator.torques, run.acting.tolist()) == ((0, 0, 0, 0, 0), (0, 0, 0), [0.0, 0.0, 0.0])
+    assert run.shown.tolist() == [0, 0, 0]
+    boot_falcon(transport, stream())
+    configure(transport)
+    assert is_running(transport)
+
+
 def test_asking_whether_it_runs_does_not_undo_its_homing() -> None:
     emulator, transport = falcon(running=True)
     configure(transport)
