@@ -79,7 +79,7 @@ class SensedTrial:
 
     def clear(self) -> None:
         """Discard all samples and frames."""
-        for samples in (self.forces_n, self.velocities_mps, self.ages_s):
+        for samples in (self.forces_n, self.velocities_mps, self.model_n, self.ages_s):
             samples.clear()
 
     def features(self) -> TrialFeatures:

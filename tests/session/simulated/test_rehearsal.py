@@ -112,6 +112,22 @@ def test_senses_tell_drag_from_a_push_and_half_of_each() -> None:
     assert share([1.0, -1.0]) == pytest.approx(0.5)
 
 
+def test_senses_that_were_cleared_contain_only_later_samples() -> None:
+    """The force is sent 3 ms after the model's; before, there was no force, although the model had one."""
+    senses = SensedTrial(scale=10.0, period_s=0.001)
+    rows = np.arange(400)
+    model_n, sent_n = np.zeros((2, 400, 3))
+    model_n[:, 0] = 2.0 * np.sin(rows / 20) * (rows > 50)
+    sent_n[3:] = model_n[:-3]
+    for requested_n, device_n in ((model_n[::-1], 0 * sent_n), (model_n, sent_n)):
+        senses.clear()
+        senses.feel(
+            np.asarray(small.samples(rows / 1000, 0 * sent_n, device_force_n=device_n, force_n=requested_n, scene=1))
+        )
+    assert senses.features().force_delay_s == pytest.approx(0.003, abs=1e-5)
+    assert senses.features().force_mean_n == pytest.approx(np.abs(sent_n).sum() / 400)
+
+
 def test_senses_measure_force_speed_of_the_hand_roughness_and_delay() -> None:
     senses = SensedTrial(scale=10.0)
     force = [(3.0, 0.0, 4.0), (0.0, 0.0, 0.0)] * 50
