@@ -14,7 +14,7 @@
 #include <unistd.h>
 
 enum { NONE, NO_DEVICE, UNCALIBRATED, NO_THRESHOLD, WEAK, STAYS_OFF, ERROR, NOT_A_NUMBER, TURNS_OFF, SLOW, GUARDED,
-       WRITE_ERROR, SATURATED, STATUS_ERROR, HANGS, UNWATCHED, DEAF, UNMODELLED };
+       WRITE_ERROR, SATURATED, STATUS_ERROR, HANGS, UNWATCHED, DEAF, UNMODELLED, PLAIN /* no wrist, synchronous */ };
 
 static struct device {
     volatile int fault;
@@ -100,7 +100,7 @@ int dhdGetStatus(int status[17], char ID) {                                     
 }
 int dhdGetEffectorMass(double *mass, char ID) { (void)ID; *mass = 0.19; return 0; }       /* 244 */
 unsigned int dhdGetButtonMask(char ID) { (void)ID; return d.buttons; }                    /* 247 */
-bool dhdHasWrist(char ID) { (void)ID; return true; }                                      /* 251 */
+bool dhdHasWrist(char ID) { (void)ID; return d.fault != PLAIN; }                           /* 251 */
 bool dhdHasActiveWrist(char ID) { (void)ID; return false; }                               /* 252 */
 bool dhdHasGripper(char ID) { (void)ID; return true; }                                    /* 253 */
 bool dhdHasActiveGripper(char ID) { (void)ID; return true; }                              /* 254 */
@@ -155,7 +155,7 @@ int dhdGetVelocityThreshold(unsigned int *val, char ID) {                       
     *val = d.fault == NO_THRESHOLD ? 0 : 40;
     return d.expert ? 0 : -1;
 }
-int dhdGetComMode(char ID) { (void)ID; return 1; }                                        /* 230; DHD_COM_MODE_ASYNC: 195 */
+int dhdGetComMode(char ID) { (void)ID; return d.fault != PLAIN; } /* 230; DHD_COM_MODE_SYNC, ASYNC: 194, 195 */
 /* a count of each encoder moves the handle by 10 um along its own axis; the middle is at 1000 counts */
 int dhdDeltaEncoderToPosition(int e0, int e1, int e2, double *px, double *py, double *pz, char ID) { /* 331 */
     (void)ID;

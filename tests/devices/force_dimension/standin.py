@@ -36,6 +36,7 @@ FAULTS = (
     "unwatched",
     "deaf",
     "unmodelled",
+    "plain",
 )
 """In the order of the stand-in's enumeration."""
 

@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from study_app.devices.descriptor import NONE, NOT_AVAILABLE
 from study_app.devices.doctor import DeviceFailure
+from study_app.devices.force_dimension import library as library_module
 from study_app.devices.force_dimension.library import LONGEST_WATCHDOG, VARIABLE, Library, probe
 from study_app.devices.registry import doctor_of, open_device
 from study_app.errors import DeviceError, DeviceNotFound, ServoFault
@@ -39,6 +40,21 @@ def ticking(device: Any) -> Any:
     servo.load(load("rek2024").scene_for("honey"))
     servo.advance(1000)
     return servo
+
+
+class RoundTripClock:
+    """A clock on which each round trip after a pause lasts as long as it is told [s]."""
+
+    def __init__(self, durations_s: list[float]) -> None:
+        self._durations_s, self._trip, self._has_begun = durations_s, -1, False
+
+    def sleep(self, _seconds: float) -> None:
+        self._trip, self._has_begun = self._trip + 1, False
+
+    def perf_counter(self) -> float:
+        duration_s = self._durations_s[self._trip] if self._has_begun else 0.0
+        self._has_begun = True
+        return self._trip + duration_s
 
 
 class TestLibrary:
@@ -87,6 +103,29 @@ class TestOpening:
         assert 0.0 < found.delay_s < 1e-3
         assert found.count_m == pytest.approx(10e-6)
         assert found.mass_kg == pytest.approx(0.2)
+
+    @pytest.mark.parametrize(
+        ("fault", "mode", "delay_s"), [("none", 1, 2 * 46e-5), ("guarded", 1, 2 * 45e-5), ("plain", 0, 46e-5)]
+    )
+    def test_the_delay_is_the_90th_percentile_of_new_positions_twice_if_exchanges_overlap(
+        self, standin: StandIn, monkeypatch: pytest.MonkeyPatch, fault: str, mode: int, delay_s: float
+    ) -> None:
+        """Round trips last 10, 20 … 500 µs, or 10, 30 … 490 µs and every second one, without a new position, 9 ms."""
+        steps = [1 + 22 * trip % 25 + 25 * (trip % 2) for trip in range(50)]
+        if fault == "guarded":
+            steps = [900 if trip % 2 else 1 + 14 * trip % 50 for trip in range(50)]
+        monkeypatch.setattr(library_module, "time", RoundTripClock([1e-5 * step for step in steps]))
+        standin.fault(fault)
+        with opened(standin) as device:
+            facts = device.describe()
+            assert device.dynamics.delay_s == pytest.approx(delay_s)
+        has_wrist = fault != "plain"
+        expected = {
+            "com_mode": mode, "system_type": 35, "wrist": has_wrist, "gripper": True, "active_wrist": False,
+            "active_gripper": True, "gravity_compensation": True, "effector_mass_kg": 0.19, "max_force_n": None,
+            "time_guard": "default",
+        }  # fmt: skip
+        assert {name: facts[name] for name in expected} == expected
 
     def test_what_the_library_lacks_comes_from_the_latest_bench_or_is_assumed(
         self, standin: StandIn, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
