@@ -160,6 +160,49 @@ def test_a_sample_that_breaks_a_guarantee_is_counted(changes, violated):
     assert audit.counts.first_tick == (3 if violated else -1)
 
 
+def test_a_hand_draws_reaches_circles_and_zigzags_within_its_range_and_rests_between(scenes, monkeypatch):
+    places, kinds = [], []
+    hand = Soak(scenes, 0.01, virtual=True, seed=3).hand
+
+    def reach_to(x_m, y_m, z_m, duration_s):
+        assert 0.12 <= duration_s <= 1.62
+        places.append((x_m, y_m, z_m))
+        kinds.append("reach")
+
+    def follow(t_s, places_m):
+        legs_m = np.linalg.norm(np.diff(places_m, axis=0), axis=1)
+        across_m = np.hypot(places_m[:, 0], places_m[:, 2])
+        is_circle = np.ptp(across_m) < 1e-9
+        kinds.append("circle" if is_circle else "zigzag")
+        speeds_mps = legs_m / np.diff(t_s)
+        assert speeds_mps.max() <= 1.0 * (1.1 if is_circle else 1 + 1e-9)
+        assert t_s[0] == 0
+        if is_circle:
+            assert 0.004 <= across_m[0] <= 0.04
+            assert np.abs(places_m[:, 1]).max() <= 0.3 * across_m[0] + 1e-12
+            assert t_s[-1] + 0.002 >= 1.0
+        else:
+            assert 4 <= len(t_s) <= 11
+            assert np.ptp(speeds_mps) < 1e-9, "all legs have the same speed"
+            places.extend(map(tuple, places_m))
+
+    monkeypatch.setattr(hand, "reach_to", reach_to)
+    monkeypatch.setattr(hand, "follow", follow)
+    monkeypatch.setattr(hand, "rest", lambda: kinds.append("rest"))
+    durations_s = [hand.start_motion() for _ in range(1000)]
+    assert 0.0 < min(durations_s) <= max(durations_s) <= 8.0
+    shares = {kind: kinds.count(kind) / 1000 for kind in ("reach", "rest", "circle", "zigzag")}
+    assert shares == pytest.approx({"reach": 0.3, "rest": 0.1, "circle": 0.3, "zigzag": 0.3}, abs=0.05)
+    assert hand.state.hand.tremor_m > 0
+    hand.keep_still()
+    assert (hand.state.hand.tremor_m, kinds[-1]) == (0.0, "rest")
+    for coordinates_m in np.transpose(places):
+        assert coordinates_m.min() == pytest.approx(-0.04, abs=0.001)
+        assert coordinates_m.max() == pytest.approx(0.04, abs=0.001)
+        assert np.abs(coordinates_m).max() <= 0.04
+        assert coordinates_m.mean() == pytest.approx(0.0, abs=0.002)
+
+
 def test_liquids_without_a_wake_are_soaked_too():
     found = soak_servo(load_scenes("physical_liquids"), 0.01, virtual=True)
     assert found.findings == ()
