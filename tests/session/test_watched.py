@@ -1,11 +1,13 @@
 """A recorded trial at any moment, from four samples and a few lines of a journal."""
 
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
+from study_app.errors import StoreError
 from study_app.haptics.model.layout import LIMITER_GLITCH
 from study_app.session import watch
 from study_app.session.watch import Mark, Watched
@@ -82,3 +84,106 @@ def test_the_contents_are_named_once_the_study_is_unblinded() -> None:
         "stir L2", "comparison", "standard",
     ]  # fmt: skip
     assert [watch._presented_condition(started, number, None) for number in (None, 1)] == ["", ""]
+
+
+OTHERS = {"duration_s": 2.0, "first_frame_gap_ms": 0.0}
+WHICH = {"trial": 4, "attempt": 2}
+LINES = (
+    event_of("session_started", n=0, t_s=0.0, language="nl", device="falcon", session=1),
+    event_of("trial_started", n=1, t_s=90.0, trial=4, attempt=1, arrangement="CS"),
+    event_of("note", n=2, t_s=91.0, kind="note", text="of the first attempt"),
+    event_of("trial_started", n=3, t_s=100.0, arrangement="SC", block="stir", code="L2", **WHICH),
+    event_of("interval_started", n=4, t_s=101.0, interval=1, **WHICH),
+    event_of("note", n=5, t_s=101.5, kind="note", text="in the first interval"),
+    event_of("interval_ended", n=6, t_s=104.0, interval=1, outcome="timeout", **WHICH, **OTHERS),
+    event_of("interval_started", n=7, t_s=110.0, interval=2, **WHICH),
+    event_of("note", n=8, t_s=110.5, kind="note", text="in the second interval"),
+    event_of("interval_ended", n=9, t_s=113.0, interval=2, outcome="complete", **WHICH, **OTHERS),
+    event_of("trial_started", n=10, t_s=200.0, trial=5, attempt=1, arrangement="SC"),
+    event_of("note", n=11, t_s=201.0, kind="note", text="of the next trial"),
+    *(
+        event_of("recorded", n=12 + number, t_s=300.0, trial=4, attempt=attempt, interval=number,
+                 recording=f"{attempt}-{number}", recording_frames=f"frames of {attempt}-{number}")
+        for attempt in (1, 2) for number in (1, 2)
+    ),
+    event_of("recording_lost", n=17, t_s=300.0, trial=5, attempt=1, interval=1, reason="the disk is full"),
+)  # fmt: skip
+NAMES = {f"{attempt}-{number}": attempt * 10 + number for attempt in (1, 2) for number in (1, 2)}
+
+
+@pytest.fixture
+def session(monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
+    """Return a session with two attempts at a trial of two intervals; each recording has its own scene and place."""
+    key = SimpleNamespace(nonce=b"secret", condition=lambda block, code: f"{block} {code}")
+    made = SimpleNamespace(path=Path("ses"), journal=LINES, receipt=None, key=key, has_frames=True)
+
+    def samples(path: Path, secret: bytes | None) -> Any:
+        assert secret == (None if made.key is None else b"secret")
+        scene = NAMES[path.name]
+        places_m = [(scene * 1e-3, 0.0, 0.0)] * 5
+        return small.samples([9.0, 10.0, 11.0, 12.0, 13.0], places_m, scene=[3, *[scene] * 4])
+
+    def frames(path: Path, _secret: bytes | None) -> Any:
+        if not made.has_frames:
+            raise StoreError("frames.parquet is damaged")
+        assert path.name == "frames of 2-2"
+        return {"painted_ns": np.array([10.25e9, 10.5e9]), "sample_ns": np.array([10.125e9, 10.375e9])}
+
+    page = SimpleNamespace(task=SimpleNamespace(targets_m=()))
+    fed: list[int] = []
+    tracker = SimpleNamespace(feed=lambda samples: fed.extend(samples["time_ns"].tolist()), fed=fed)
+    for name, function in {
+        "locate_session": lambda _folder: ("study", made),
+        "opened_key": lambda _study: made.key,
+        "open_events": lambda lines, _key: lines,
+        "new_tracker": lambda _task: tracker,
+        "_page": lambda *_arguments: page,
+    }.items():
+        monkeypatch.setattr(watch, name, function)
+    monkeypatch.setattr(watch.journal, "read", lambda lines: lines)
+    monkeypatch.setattr("study_app.store.recordings.read_samples", samples)
+    monkeypatch.setattr("study_app.store.recordings.read_frames", frames)
+    return made
+
+
+@pytest.mark.usefixtures("session")
+def test_an_interval_is_read_from_its_own_attempt_recording_and_lines() -> None:
+    read = watch.read_watched(Path("ses"), 4, attempt=2, interval=2)
+    assert (read.language, read.blinded, read.presented, read.intervals) == ("nl", False, "comparison", 2)
+    assert list(read.times_s) == [-1.0, 0.0, 1.0, 2.0, 3.0]
+    assert (read.samples["position_m"][:, 0] == 0.022).all()
+    assert read.tracker.fed == [10_000_000_000, 11_000_000_000, 12_000_000_000], "of the task alone: 2 s"  # type: ignore[attr-defined]
+    assert [(mark.at_s, mark.text) for mark in read.marks] == [
+        (0.5, "note: in the second interval"), (3.0, "task ended: complete"),
+    ]  # fmt: skip
+    assert read.painted_s == pytest.approx([0.25, 0.5])
+    assert read.shown_s == pytest.approx([0.125, 0.375])
+
+
+def test_a_sealed_interval_has_neither_contents_nor_frames_and_missing_frames_are_named(
+    session: SimpleNamespace,
+) -> None:
+    session.has_frames = False
+    read = watch.read_watched(Path("ses"), 4, attempt=2, interval=2)
+    assert (read.lacking, len(read.painted_s)) == (
+        "The frames of the participant's screen are missing: frames.parquet is damaged.", 0,
+    )  # fmt: skip
+    session.key = None
+    read = watch.read_watched(Path("ses"), 4, attempt=2, interval=1)
+    assert (read.blinded, read.presented, read.lacking, len(read.painted_s)) == (True, "", "", 0)
+    assert (read.samples["position_m"][:, 0] == 0.021).all()
+    assert [mark.text for mark in read.marks] == ["note: in the first interval", "task ended: timeout"]
+
+
+def test_a_trial_without_a_recording_is_refused_with_the_reason(session: SimpleNamespace) -> None:
+    for trial, attempt, interval, reason in (
+        (4, 3, 1, "does not contain attempt 3 of trial 4: choose another trial"),
+        (4, 2, 3, r"no recording was requested, or the recording was interrupted\): choose another trial"),
+        (5, 1, 1, r"trial 5 does not have a recording \(the disk is full\)"),
+    ):
+        with pytest.raises(StoreError, match=reason):
+            watch.read_watched(Path("ses"), trial, attempt=attempt, interval=interval)
+    session.key = None
+    session.journal = (event_of("session_started", device="scripted", language="nl"), *LINES[1:])
+    with pytest.raises(StoreError, match="Hidden while the study is blinded"):
+        watch.read_watched(Path("ses"), 4, attempt=2, interval=1)
