@@ -82,3 +82,26 @@ def test_markup_in_texts_of_a_study_is_shown_as_it_is(opening: Opening, page: An
     shown = [button.text().replace("&&", "&") for button in buttons if "img" in button.text()]
     assert all(MARKUP in text for text in shown)
     assert labels or shown or seen.page.accessibleName().count(MARKUP)
+
+
+def test_languages_read_in_their_own_direction_and_enter_or_an_arrow_chooses_one(opening: Opening) -> None:
+    languages = ("ar", "en", "nl")
+    for key, language in ((KEY.Key_Right, "nl"), (KEY.Key_Left, "ar")):
+        seen = opening(consent(*languages), FULL)
+        buttons = {code: seen.find(words(code).name) for code in languages}
+        directions = {code: button.layoutDirection() for code, button in buttons.items()}
+        left, right = Qt.LayoutDirection.LeftToRight, Qt.LayoutDirection.RightToLeft
+        assert directions == {"ar": right, "en": left, "nl": left}
+        assert [code for code, button in buttons.items() if button.isChecked()] == ["en"]
+        focusable = [code for code, button in buttons.items() if button.focusPolicy() & Qt.FocusPolicy.TabFocus]
+        assert focusable == ["en"]
+        assert buttons["ar"].x() < buttons["en"].x() < buttons["nl"].x()
+        buttons["en"].setFocus()
+        seen.press(key)
+        assert seen.kinds == [LanguageChosen]
+        assert seen.told[0].language == language
+    seen = opening(consent(*languages), FULL)
+    seen.find(words("nl").name).setFocus()
+    seen.press(KEY.Key_Return)
+    assert seen.kinds == [LanguageChosen]
+    assert seen.told[0].language == "nl"
