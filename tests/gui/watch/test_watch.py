@@ -165,8 +165,15 @@ def test_keys_mouse_and_speed_move_through_time(opened, whole, qtbot, monkeypatc
         assert window.playing
         clock[0] += 0.5
         qtbot.waitUntil(lambda speed=speed: stage.at_s == pytest.approx(2.0 + 0.5 * speed))
+        assert window.play.text() == "Pause"
+        if speed == 1.0:  # a quarter of a second at another speed follows without a jump
+            window.speed.setCurrentIndex(window.speed.findText("2×"))
+            window.speed.activated.emit(window.speed.currentIndex())
+            clock[0] += 0.25
+            qtbot.waitUntil(lambda: stage.at_s > 2.6)
+            assert stage.at_s == pytest.approx(3.0)
         qtbot.mouseClick(window.play, Qt.MouseButton.LeftButton)
-        assert not window.playing
+        assert (window.playing, window.play.text()) == (False, "Play")
     clock[0] += 100.0
     assert stage.at_s == pytest.approx(4.0), "a pause does not count"
     middle = stage.line.rect().center()
@@ -246,10 +253,14 @@ def test_a_video_shows_what_the_window_shows(opened, whole, qtbot, tmp_path):
     window.go(2.0)
     picture = window.stage.grab().toImage().convertToFormat(QImage.Format.Format_RGB32)  # kept: its bytes are compared
     window.export.click()
+    sentence = "sub-P001_ses-01_trial-003.mp4 will show this view at 4× speed."
+    assert sentence in [part.text() for part in window.export_dialog.findChildren(QLabel)]
+    assert window.export_dialog.value("to") == str(whole.resolve().parent)
     window.export_dialog.editors["to"].show_value(str(tmp_path))
     qtbot.mouseClick(window.export_dialog.go_on, Qt.MouseButton.LeftButton)
     qtbot.waitUntil(lambda: window.export_dialog.over, timeout=60_000)
     (file,) = tmp_path.iterdir()
+    assert window.export_dialog.said.text() == f"The video was saved as {file}."
     assert (file.name, window.stage.at_s) == ("sub-P001_ses-01_trial-003.mp4", 2.0)
     with av.open(str(file)) as video:
         frames = [frame.to_ndarray(format="bgra") for frame in video.decode(video=0)]
