@@ -11,10 +11,11 @@ from PySide6.QtCore import QEvent, QObject, QPoint, QRect
 from PySide6.QtGui import QColor, QPaintEvent, QRegion
 from PySide6.QtWidgets import QApplication
 
+from study_app.gui.participant.tank.captions import Captions
 from study_app.gui.participant.tank_widget import TankWidget
 from study_app.protocol.wording.languages import words
 from tests.gui.drawn import shown
-from tests.gui.small import follow, follow_view, task_page, view
+from tests.gui.small import explore, follow, follow_view, reach, task_page, view
 
 Make = Callable[..., TankWidget]
 PATCH_PX = 88
@@ -182,3 +183,25 @@ def test_a_person_with_the_mouse_is_told_to_click(made: Make) -> None:
     ):
         shown_words = made(by_mouse=by_mouse)._words
         assert (shown_words.continue_now, shown_words.pause_hint) == (now, hint)
+
+
+def test_the_hint_counts_the_seconds_until_a_person_may_or_must_go_on(qtbot: Any) -> None:
+    wording, limit_s = words("en"), reach().limit_s
+    left = {seconds: wording.seconds_left.format(seconds=seconds) for seconds in (1, 10)}
+    for task, elapsed_s, hint_text, text in (
+        (explore(), 0.0, "", wording.continue_in.format(seconds=30)),
+        (explore(), 29.2, "", wording.continue_in.format(seconds=1)),
+        (explore(), 30.0, "", wording.continue_now),
+        (explore(), 109.9, "", wording.continue_now),
+        (explore(), 110.0, "", f"{wording.continue_now} · {left[10]}"),
+        (explore(), 119.5, "", f"{wording.continue_now} · {left[1]}"),
+        (explore(), 120.0, "", wording.time_is_up),
+        (reach(), limit_s - 10.5, "nearer", "nearer"),
+        (reach(), limit_s - 10.0, "nearer", f"nearer · {left[10]}"),
+        (reach(), limit_s - 0.5, "", left[1]),
+        (reach(), limit_s, "nearer", wording.time_is_up),
+        (follow(), follow().limit_s - 5.0, "nearer", "nearer"),
+    ):
+        parts = Captions(task_page(task), wording).parts(view(elapsed_s=elapsed_s, reached=5).task, hint_text)
+        assert (parts["hint"].state, parts["count"].state) == (text, (5, 12))
+    assert Captions(task_page(reach()), wording).parts(None)["count"].state == (0, 12)
