@@ -242,3 +242,28 @@ def test_buttons_notes_and_counts_are_those_of_the_view(window, told, health):
         assert [part.isEnabled() for part in (notes.add, notes.mark, notes.field)] == [not over] * 3
         assert [part.isHidden() for part in (buttons.pause, buttons.repeat, buttons.end)] == [over] * 3
         assert buttons.close_session.isHidden() == (not over)
+
+
+def test_enter_adds_the_note_shift_enter_a_line_and_each_button_asks_for_what_it_says(running, qtbot):
+    requests = []
+    running.asked.connect(lambda request, _details: requests.append(request))
+    written, notes = [], running.notes
+    notes.note_written.connect(written.append)
+    notes.add.click()
+    assert (requests, written, running.focusWidget()) == ([], [], notes.field)
+    qtbot.keyClicks(notes.field, "left hand")
+    qtbot.keyClick(notes.field, Qt.Key.Key_Return, Qt.KeyboardModifier.ShiftModifier)
+    qtbot.keyClicks(notes.field, "tired")
+    assert written == []
+    qtbot.keyClick(notes.field, Qt.Key.Key_Enter)
+    assert (written, requests, notes.field.toPlainText()) == (["left hand\ntired"], ["note"], "")
+    qtbot.keyClick(notes.field, Qt.Key.Key_Return)
+    assert requests == ["note"]
+    for button, text, request in (
+        (notes.mark, "Mark", "mark"),
+        (running.device.diagnose, "Diagnose …", "diagnose"),
+        (running.stop.fade_in, "Fade in again", "resume"),
+    ):
+        requests.clear()
+        button.click()
+        assert (button.text(), requests) == (text, [request])
