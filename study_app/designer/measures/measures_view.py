@@ -1,6 +1,6 @@
 """The cards of the selected element in the tab Measures and below the other tabs."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -157,6 +157,12 @@ def _text_verdicts(study: Study, facts: Facts) -> Sequence[Verdict]:
     return verdicts
 
 
+def _times(counts: Collection[int]) -> str:
+    """Return how often something occurs: "1 time", "1 to 2 times"."""
+    least, most = min(counts), max(counts)
+    return counted(most, "time") if least == most else f"{least} to {most} times"
+
+
 def _balance_card(study: Study, protocol: Protocol, block: Block) -> list[MeasureCard]:
     """Return the card on the balance of a block's orders for the planned participants; none for a single code."""
     planned = planned_participants(study)
@@ -185,8 +191,7 @@ def _balance_card(study: Study, protocol: Protocol, block: Block) -> list[Measur
         cells = [count for line in evenness.positions for count in line]
         following_counts = evenness.after_another
         summary = (
-            f"each code occurs in each position {min(cells)} to {max(cells)} times and follows every other code "
-            f"{min(following_counts)} to {max(following_counts)} times"
+            f"each code occurs in each position {_times(cells)} and follows every other code {_times(following_counts)}"
         )
         return [MeasureCard("Balance", aside, ((*verdict[:2], f"{verdict[2]}; {summary}"),))]
     shown, codes = evenness.positions[:_MOST_ROWS], evenness.codes

@@ -58,6 +58,9 @@ def balance_card(study: Study) -> Any:
         ("latin", 9, 10, "warn",
          "a Latin square would be balanced with 9 or 18 participants; each code occurs in each position 1 to 2 times "
          "and follows every other code 0 to 9 times"),
+        ("latin", 9, 18, "warn",
+         "positions are balanced, but carry-over is not; each code occurs in each position 2 times and follows every "
+         "other code 0 to 16 times"),
     ],
 )  # fmt: skip
 def test_the_balance_of_an_order_is_judged_for_the_planned_participants(
