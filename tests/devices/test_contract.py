@@ -306,7 +306,7 @@ def test_the_tables_of_faults_are_complete() -> None:
         with open_device(f"{name}-emulated") as device, pytest.raises(DeviceError) as refused:
             device.take_fault("none of them")
         assert tried[made] | others == set(str(refused.value).partition("choose from: ")[2].split(", "))
-    elsewhere = {"none", "slow", "hangs", "guarded", "saturated", "unwatched", "deaf", "unmodelled"}
+    elsewhere = {"none", "slow", "hangs", "guarded", "saturated", "unwatched", "deaf", "unmodelled", "plain"}
     assert tried[force_dimension_library] | elsewhere == set(STANDIN)
 
 
