@@ -316,34 +316,3 @@ def test_the_outline_and_the_measures_have_the_same_duration_of_a_session(design
     assert duration(known.expected_s) != duration(sum(known.steps_s.values())), "the form is filled in twice"
     note = next(row.note for row in designer.place.outline.rows if row.title == "Session, in order")
     assert note == duration(known.expected_s)
-
-
-def test_a_dragged_row_goes_before_the_nearest_entry_or_to_the_end_below_the_parts_of_the_last(
-    qtbot: Any, designer: Any
-) -> None:
-    designer.open()
-    names = ["welcome", "liquids", "reaching", "thanks", "delays"]
-    designer.editing.make_step("Change", Set(("sequence",), names))
-    QApplication.processEvents()
-    outline = designer.place.outline
-    tree = outline.tree
-    tree.expandAll()
-    rows = {index.data(ROW_ROLE).step: tree.visualRect(index) for index in outline.indexes()
-            if index.data(ROW_ROLE).step[:1] == ("sequence",)}  # fmt: skip
-    top = {names[step[1]]: rect.top() for step, rect in rows.items()}
-    rects = [tree.visualRect(index) for index in outline.indexes()]
-    end = min(rect.top() for index, rect in zip(outline.indexes(), rects, strict=True)
-              if rect.top() > top["delays"] and not index.parent().isValid())  # fmt: skip
-    bottom = max(rect.bottom() for rect in rects if rect.top() < end) + 1
-    assert bottom > rows["sequence", 4].bottom() + 1, "the last block has parts"
-    start = rows["sequence", 0].center()
-    for y, target in (
-        (top["liquids"] + 3, (("sequence", 1), top["liquids"])),
-        (top["reaching"] - 4, (("sequence", 2), top["reaching"])),
-        (bottom - 2, (("sequence", 5), bottom)),
-    ):
-        drag(qtbot, designer, start, QPoint(start.x(), y), drop=False)
-        assert tree.target == target
-        qtbot.keyClick(tree, Qt.Key.Key_Escape)
-        qtbot.mouseRelease(tree.viewport(), LEFT, pos=start)
-    assert sequence(designer) == tuple(names)
