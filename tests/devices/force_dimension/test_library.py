@@ -43,7 +43,7 @@ def ticking(device: Any) -> Any:
 
 
 class RoundTripClock:
-    """A clock on which each round trip after a pause lasts as long as it is told [s]."""
+    """A clock that gives each round trip, one after every pause, the next of these durations [s]."""
 
     def __init__(self, durations_s: list[float]) -> None:
         self._durations_s, self._trip, self._has_begun = durations_s, -1, False
