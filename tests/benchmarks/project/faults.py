@@ -12,6 +12,7 @@ continues after an interruption. If module and session fixtures run the function
 an import runs it, the tests of the package. Each run is a fork of a process that has loaded the libraries, but nothing
 of the program. The tests rewrite recorded outputs (``--regenerate``), so that only an assertion notices a fault; other
 exceptions, crashes and hanging tests are counted separately. Compiled code is not compiled again for a fault elsewhere.
+Faults that mypy reports are counted separately too, and no tests are run with them.
 
 Neither mutmut nor cosmic-ray exchanges arguments or columns, or chooses tests by function, so the faults are made here.
 Tests of the nightly circle are left out.
@@ -92,6 +93,8 @@ SWAPPED: dict[type[ast.AST], str] = {
     ast.Or: "and", ast.Lt: ">=", ast.LtE: ">", ast.Gt: "<=", ast.GtE: "<", ast.Eq: "!=", ast.NotEq: "==",
     ast.In: "not in", ast.NotIn: "in", ast.Is: "is not", ast.IsNot: "is",
 }  # fmt: skip
+COMMUTATIVE = {"max", "min", "maximum", "minimum", "hypot", "gcd", "isclose", "allclose"}
+"""Functions whose arguments can be exchanged without an effect."""
 
 
 class Fault(NamedTuple):
@@ -197,7 +200,7 @@ class Source:
                 yield "branch", ((*self.span(test), b"False"),)
             case ast.Expr(ast.Call()):
                 yield "call", ((*self.span(node), b"pass"),)
-        arguments = node.args if isinstance(node, ast.Call) else []
+        arguments = node.args if isinstance(node, ast.Call) and _name_of(node.func) not in COMMUTATIVE else []
         for one, two in pairwise(arguments):
             if not isinstance(one, ast.Starred) and not isinstance(two, ast.Starred) and ast.dump(one) != ast.dump(two):
                 yield "argument", self._exchange(one, two)
@@ -206,8 +209,8 @@ class Source:
                 yield "keyword", self._exchange(one, two)
         for condition in (test for loop in getattr(node, "generators", []) for test in loop.ifs):
             yield "filter", ((*self.span(condition), b"True"),)
-        elements = node.keys if isinstance(node, ast.Dict) else getattr(node, "elts", [])
-        for one, two in pairwise(elements):
+        listed: list[Any] = node.elts if isinstance(node, ast.List | ast.Tuple) else []
+        for one, two in pairwise(node.keys if isinstance(node, ast.Dict) else listed):
             last = [part.elts[-1] if isinstance(part, ast.Tuple) and part.elts else part for part in (one, two)]
             if all(isinstance(part, ast.Constant) for part in last) and ast.dump(last[0]) != ast.dump(last[1]):
                 yield "column", self._exchange(*last)
@@ -223,16 +226,26 @@ class Source:
         return (*self.span(one), self.text(two)), (*self.span(two), self.text(one))
 
 
+def _name_of(function: ast.expr) -> str:
+    """Return the last name of a called function; "" without a name."""
+    return str(getattr(function, "attr", getattr(function, "id", "")))
+
+
 def _is_within(span: tuple[int, int], begin: int, end: int) -> bool:
     return span[0] <= begin and end <= span[1]
 
 
 def _walk(nodes: list[ast.stmt]) -> Iterator[ast.expr | ast.stmt]:
-    """Yield statements and expressions, without functions within, annotations, messages of errors and f-strings."""
+    """Yield statements and expressions, without functions within, annotations, messages of errors and f-strings.
+
+    `strict=` of zip is left out as well: it has no effect if the lengths are right.
+    """
     queue: list[ast.AST] = list(nodes)
     while queue:
         node = queue.pop()
         if isinstance(node, ast.Raise | ast.JoinedStr | ast.FunctionDef | ast.Assert):
+            continue
+        if isinstance(node, ast.keyword) and node.arg == "strict":
             continue
         if isinstance(node, ast.expr | ast.stmt):
             yield node
@@ -488,12 +501,19 @@ def _run_tests(copy: Path, tests: list[str], environment: dict[str, str], file: 
 
 
 def judge_fault(folder: Path, temporary: Path, name: str) -> dict[str, Any]:
-    """Return the circle whose tests notice a fault and how, or "none"; a test that fails without it does not count."""
+    """Return the circle whose tests notice a fault and how, or "none"; a test that fails without it does not count.
+
+    The circle is "types" if mypy reports the fault.
+    """
     copy, fault, begun_s = _own_copy(folder, temporary), drawn_faults(folder)[name], time.perf_counter()
     sound, compiles = (copy / fault.path).read_bytes(), is_compiled(folder, fault)
     own_cache = copy.parent / "compiled"
     shutil.rmtree(own_cache, ignore_errors=True)
     verdict = {"fault": name, "circle": "none", "how": "not run", "test": ""}
+    write_source(copy / fault.path, apply_edits(sound, fault.edits))
+    if check_types(copy):
+        verdict |= {"circle": "types", "how": "types"}
+    write_source(copy / fault.path, sound)
 
     def failure(tests: list[str], run: str, source: bytes) -> tuple[str, str]:
         uses_own = compiles and run != UNCOMPILED and source != sound
@@ -506,7 +526,8 @@ def judge_fault(folder: Path, temporary: Path, name: str) -> dict[str, Any]:
             write_source(copy / fault.path, sound)
             restore_recordings(folder, copy, since_s)
 
-    for run in (UNCOMPILED, *CIRCLES) if compiles else CIRCLES:
+    circles = (UNCOMPILED, *CIRCLES) if compiles else CIRCLES
+    for run in circles if verdict["circle"] == "none" else ():
         tests = choose_tests(folder, name, fault, run)
         while tests and verdict["circle"] == "none":
             verdict["how"] = "passed"
@@ -519,6 +540,12 @@ def judge_fault(folder: Path, temporary: Path, name: str) -> dict[str, Any]:
             else:
                 verdict |= {"circle": run, "how": how, "test": failed}
     return verdict | {"took_s": round(time.perf_counter() - begun_s, 1)}
+
+
+def check_types(copy: Path) -> bool:
+    """Return whether mypy reports something in a copy of the program; a condition `False` alone is not reported."""
+    command = [sys.executable, "-m", "mypy", "--no-warn-unreachable", "--no-error-summary"]
+    return subprocess.run(command, check=False, cwd=copy, stdout=subprocess.DEVNULL).returncode != 0
 
 
 @cache
@@ -589,11 +616,13 @@ def _row(verdict: dict[str, Any], fault: Fault) -> str:
 
 def _shares(verdicts: list[dict[str, Any]]) -> str:
     circles, ways = (Counter(verdict[key] for verdict in verdicts) for key in ("circle", "how"))
-    total = len(verdicts)
+    total = len(verdicts) - circles["types"]
     counts = ", ".join(f"{name} {count}" for counter in (circles, ways) for name, count in sorted(counter.items()))
+    if not total:
+        return f"no faults but those that mypy reports ({counts})"
     return (
-        f"{total} faults, noticed {1 - circles['none'] / total:.0%}, by an assertion {ways['assertion'] / total:.0%}"
-        f" ({counts})"
+        f"{total} faults that mypy does not report, noticed {1 - circles['none'] / total:.0%},"
+        f" by an assertion {ways['assertion'] / total:.0%} ({counts})"
     )
 
 
@@ -619,6 +648,8 @@ def main() -> None:
         parser.error(f"{folder} exists already: name a new folder, or judge its faults")
     folder.mkdir(parents=True)
     copy_work_tree(folder / "sound")
+    if check_types(folder / "sound"):  # also fills mypy's cache, which the copies get
+        parser.error("mypy reports faults in the program as it stands")
     options = {"seeds": given.seeds, "functions": given.functions, "package": given.package}
     (folder / "draw.json").write_bytes(json.dumps(options).encode())
     record_tests(folder, given.tests)
