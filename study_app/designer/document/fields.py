@@ -288,8 +288,13 @@ def _can_name_item(place: Path, item: Path) -> bool:
 
 
 def _matches_pattern(place: Path, pattern: str) -> bool:
-    steps = pattern.split(".")
-    return len(steps) == len(place) and all(step in {"*", str(key)} for step, key in zip(steps, place, strict=True))
+    steps = _steps_of(pattern)
+    return len(steps) == len(place) and all(step in ("*", str(key)) for step, key in zip(steps, place, strict=True))
+
+
+@cache
+def _steps_of(pattern: str) -> tuple[str, ...]:
+    return tuple(pattern.split("."))
 
 
 _Node: TypeAlias = Mapping[str, Any]
@@ -299,12 +304,17 @@ OWN = "own description"
 
 def node_at(document: Any, path: Path) -> tuple[_Node, ...]:
     """Return the schema's alternatives for the value at ``path``, present or not; empty if no value is permitted."""
-    nodes: list[_Node] = [schema()]
+    nodes: tuple[_Node, ...] = (schema(),)
     for step in path:
-        nodes = [child for node in (table_of(tuple(nodes), document),) if node for child in _children(node, step)]
-        nodes = [alternative for node in nodes for alternative in alternatives(node)]
+        nodes = _nodes_below(table_of(nodes, document), step)
         document = document[step] if has(document, step) else None
-    return tuple(nodes)
+    return nodes
+
+
+def _nodes_below(table: _Node | None, step: Any) -> tuple[_Node, ...]:
+    """Return the alternatives for a key or an entry of a table or array."""
+    children = () if table is None else _children(table, step)
+    return tuple(alternative for child in children for alternative in alternatives(child))
 
 
 def table_of(nodes: tuple[_Node, ...], value: Any) -> _Node | None:
@@ -538,11 +548,12 @@ def rows(document: Mapping[str, Any], path: Path) -> tuple[Row, ...]:
         return ()
     if node.get("type") == "array":
         length = len(node["prefixItems"]) if "prefixItems" in node else len(value) if isinstance(value, tuple) else 0
-        return tuple(row for index in range(length) for row in (row_at(document, (*path, index)),) if row)
+        entry_rows = (_row_below(document, (*path, index), nodes, node) for index in range(length))
+        return tuple(row for row in entry_rows if row is not None)
     properties = node.get("properties", {})
     present_keys = tuple(value) if isinstance(value, Mapping) else ()
     keys = list(dict.fromkeys((*filter(None, [distinguishing_key(nodes)[0]]), *properties, *present_keys)))
-    all_rows = (row_at(document, (*path, key)) for key in keys)
+    all_rows = (_row_below(document, (*path, key), nodes, node) for key in keys)
     return tuple(row for row in all_rows if row is not None)
 
 
@@ -580,11 +591,15 @@ def refused_at(document: Mapping[str, Any], path: Path) -> frozenset[str]:
 
 def row_at(document: Mapping[str, Any], path: Path) -> Row | None:
     """Return the row of a path; None if no model has this path."""
-    siblings, value = node_at(document, path[:-1]), value_at(document, path)
-    table = table_of(siblings, value_at(document, path[:-1]))
-    if table is None:
-        return None
-    key, nodes_by_kind = distinguishing_key(siblings)
+    owners = node_at(document, path[:-1])
+    table = table_of(owners, value_at(document, path[:-1]))
+    return None if table is None else _row_below(document, path, owners, table)
+
+
+def _row_below(document: Mapping[str, Any], path: Path, owners: tuple[_Node, ...], table: _Node) -> Row | None:
+    """Return the row of a path below a table, which is one of its owner's alternatives."""
+    value = value_at(document, path)
+    key, nodes_by_kind = distinguishing_key(owners)
     if key and key == path[-1]:
         options = tuple(
             Choice(tag, _plain_text(str(node.get(OWN, node.get("description", ""))).split("\n\n")[0]))
@@ -600,7 +615,7 @@ def row_at(document: Mapping[str, Any], path: Path) -> Row | None:
             choices=options,
             model=table.get("title", ""),
         )
-    nodes = node_at(document, path)
+    nodes = _nodes_below(table, path[-1])
     if not nodes:
         return None if value is None else Row(path=path, kind="unknown", label=label_of(path[-1]), value=value)
     row = _make_row(document, path, nodes, value, required=path[-1] in table.get("required", ()))

@@ -17,7 +17,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, Final, NamedTuple
 
 from study_app.haptics.model.effect import GRAVITY_MPS2, Flow
@@ -207,6 +207,7 @@ def effect_verdicts(scene: Scene) -> tuple[Verdict, ...]:
     return tuple(verdict for liquid in scene.liquids for verdict in _verdicts(scene, liquid))
 
 
+@lru_cache(maxsize=64)
 def resolve(scene: Scene) -> Scene:
     """Return the scene with effects and a drag law selected wherever it says ``"auto"``."""
     if all(liquid.effects != "auto" for liquid in scene.liquids):
