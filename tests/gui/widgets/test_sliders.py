@@ -5,13 +5,14 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QKeySequence, QShortcut
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
+from study_app.gui.theme.theme import font
 from study_app.gui.widgets.controls import Number
-from study_app.gui.widgets.numbers import NumberField, Range, read_number, write_number
+from study_app.gui.widgets.numbers import MARGIN, NumberField, Range, Slider, read_number, write_number
 
 SPANS = [
     Range(0.0, 1.0),
@@ -170,3 +171,55 @@ def test_a_whole_number_is_typed_in_digits_or_the_one_before_comes_back(qtbot: A
     assert number.text() == typed
     other.setFocus()
     assert (number.value(), number.text(), number.refusal) == (7, "7", "")
+
+
+def test_return_submits_a_rejected_number_again_and_escape_restores_it(field: Any, qtbot: Any) -> None:
+    field.show_state("refused")
+    assert (field.state, field.font().weight()) == ("refused", 600)
+    for _ in range(2):
+        qtbot.keyClick(field, Qt.Key.Key_Return)
+    qtbot.keyClick(field, Qt.Key.Key_Escape)
+    field.show_state("")
+    assert (field.state, field.font().weight()) == ("", font("label").weight())
+    for key in (Qt.Key.Key_Return, Qt.Key.Key_Escape):
+        qtbot.keyClick(field, key)
+    assert field.told == [45.0, 45.0, "back"]
+
+
+def test_keys_mouse_and_screen_readers_move_a_slider_and_only_a_dragged_knob_is_held(qtbot: Any) -> None:
+    slider = Slider()
+    qtbot.addWidget(slider)
+    slider.resize(round(100 + 2 * MARGIN), 32)
+    moves: list[tuple[float, bool]] = []
+    slider.slid.connect(lambda value, held: moves.append((value, held)))
+    qtbot.keyClick(slider, Qt.Key.Key_Delete)  # there is no tick
+    slider.show_number(Range(0.0, 1.0), 0.4, tick=0.7)
+    assert (slider.number, slider.tick, slider.value(), moves) == (0.4, 0.7, 80, [])
+    for key, value in (
+        ("Right", 0.405), ("Up", 0.41), ("Left", 0.405), ("Down", 0.4), ("PageUp", 0.5), ("PageDown", 0.4), ("Home", 0),
+        ("End", 1), ("Delete", 0.7), ("Home", 0), ("Backspace", 0.7),
+    ):  # fmt: skip
+        qtbot.keyClick(slider, getattr(Qt.Key, f"Key_{key}"))
+        assert (moves.pop(), moves, slider.value()) == ((pytest.approx(value), False), [], round(200 * value)), key
+    left, right = Qt.MouseButton.LeftButton, Qt.MouseButton.RightButton
+    at_quarter, at_half = QPoint(37, 16), QPoint(62, 16)
+    qtbot.mousePress(slider, right, pos=at_half)
+    qtbot.mouseMove(slider, at_quarter)
+    qtbot.mouseRelease(slider, right, pos=at_quarter)
+    assert (moves, slider.dragged) == ([], False)
+    qtbot.mousePress(slider, left, pos=at_quarter)
+    qtbot.mouseMove(slider, at_half)
+    assert slider.dragged
+    qtbot.mouseRelease(slider, left, pos=at_half)
+    qtbot.mouseMove(slider, at_quarter)
+    assert (moves, slider.dragged) == ([(0.255, True), (0.505, True), (0.505, False)], False)
+    qtbot.mousePress(slider, left, pos=at_quarter)
+    slider.release_knob()
+    qtbot.mouseRelease(slider, left, pos=at_quarter)
+    qtbot.mouseDClick(slider, left, pos=at_quarter)
+    slider.setValue(150)
+    assert moves[3:] == [(0.255, True), (0.7, False), (0.75, False)]
+    slider.show_number(Range(1.0, 100_000.0, logarithmic=True, whole=True), 1.0)
+    for steps in (-1, 1, 1, -1):
+        slider.step(steps)
+    assert moves[6:] == [(2.0, False), (3.0, False), (2.0, False)]
