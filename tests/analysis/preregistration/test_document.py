@@ -63,7 +63,7 @@ def test_a_study_of_thresholds_states_levels_sample_size_and_catch_rule() -> Non
     assert "Weber fraction 0.19, at 71 % correct, n = 10" in text
     assert "We plan to include 20 participants. The study ends when this number of valid sessions is complete" in text
     assert (
-        "are the data unblinded and tested. The goal is a 95 % interval for the group mean no wider than ±15 %." in text
+        "are the data unblinded and tested. The goal is a 95 % interval for the group mean no wider than ±20 %." in text
     )
     assert "we simulated 50 trials per standard" in text
     assert "- Block “Viscosity” compares levels of damping." in text
