@@ -9,6 +9,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
 from study_app.haptics.model.effects import EFFECTS, NAMED, Parameter
+from study_app.haptics.model.laws import LAW_NAMES
 from study_app.number_text import exact_text
 
 MAX_FORCE_N: Final = 8.0
@@ -121,7 +122,7 @@ def liquid_words(liquid: Mapping[str, Any]) -> str:
     phrases += [] if viscosity is None else [f"{viscosity:g} Pa·s"]
     for effect in EFFECTS:
         if effect.name == "drag":
-            phrases += [f"drag law: {liquid['drag']['law']}"] if effect.name in effects else []
+            phrases += [f"drag law: {LAW_NAMES[liquid['drag']['law']]}"] if effect.name in effects else []
             continue
         is_named, table = effect.name in effects, liquid.get(effect.name)
         values = ""

@@ -21,6 +21,7 @@ UNITS = (
 )  # fmt: skip
 """The unit of a parameter by the end of its name in a file."""
 LAWS = {
+    "haider-levenspiel": "Haider–Levenspiel",
     "herschel-bulkley": "Herschel–Bulkley",
     "carreau": "Carreau",
     "maxwell": "Maxwell",
@@ -37,7 +38,7 @@ def written_values(table: dict[str, Any]) -> Iterator[str]:
         elif name == "kind":
             yield LAWS.get(value, value)
         elif name == "law":
-            yield f"drag law: {value}"
+            yield f"drag law: {LAWS.get(value, value)}"
         elif isinstance(value, list):
             yield f"({', '.join(f'{part:g}' for part in value)}) m"
         elif not isinstance(value, str):
@@ -103,7 +104,7 @@ def test_drawn_parameters_are_named_with_their_units(effect: str, kind: str, aut
     ("changed", "text"),
     [
         ({},
-         "1234 kg/m³, 0.5 Pa·s, drag law: newton, wake (length 3 ticks, scaling 5 ticks, exponent 0.7), added mass"),
+         "1234 kg/m³, 0.5 Pa·s, drag law: Brown–Lawler, wake (length 3 ticks, scaling 5 ticks, exponent 0.7), added mass"),
         ({"drag": {"law": "linear", "damping_nspm": 6.5}, "viscosity_pa_s": None, "effects": ["drag"]},
          "damping 6.5 N·s/m at the hand, drag law: linear"),
         ({"effects": "auto"}, "1234 kg/m³, 0.5 Pa·s, effects selected automatically by size"),
@@ -120,7 +121,7 @@ def test_parameters_of_effects_that_do_not_act_are_left_out(changed: dict[str, A
     liquid = {
         "density_kg_m3": 1234.0,
         "viscosity_pa_s": 0.5,
-        "drag": {"law": "newton"},
+        "drag": {"law": "brown-lawler"},
         "wake": {"length": 3.0, "scaling": 5.0, "exponent": 0.7},
         "effects": ["drag", "wake", "added_mass"],
     }

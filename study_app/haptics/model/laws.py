@@ -16,6 +16,15 @@ from study_app.haptics.model.ranges import Frozen, ViscosityPaS, within
 
 Law: TypeAlias = Literal["constant", "schiller-naumann", "haider-levenspiel", "brown-lawler", "linear"]
 
+LAW_NAMES: Final[dict[Law, str]] = {
+    "constant": "constant",
+    "schiller-naumann": "Schiller–Naumann",
+    "haider-levenspiel": "Haider–Levenspiel",
+    "brown-lawler": "Brown–Lawler",
+    "linear": "linear",
+}
+"""The name of each drag law within a sentence."""
+
 HIGHEST_REYNOLDS: Final = 2e5
 _CONSTANT_FROM: Final = 4040.0**0.70
 

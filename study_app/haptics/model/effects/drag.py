@@ -7,7 +7,7 @@ from typing import Annotated, Any, Final, Self, TypeAlias
 from pydantic import Field, model_validator
 
 from study_app.haptics.model.effect import FLOAT, INT, Effect, Extremes, Fields, Liquid, Parameter, Scene
-from study_app.haptics.model.laws import LAWS, Law, drag_n
+from study_app.haptics.model.laws import LAW_NAMES, LAWS, Law, drag_n
 from study_app.haptics.model.ranges import Frozen, later, within
 
 BIT = 1 << 0
@@ -108,10 +108,9 @@ def _choose(extremes: Extremes) -> tuple[Drag, str]:
     if extremes.liquid.viscosity_pa_s is None:
         return Drag(law=law), "drag law: constant, because the liquid's viscosity is not specified"
     if law == REFERENCE:
-        return Drag(law=law), f"drag law: {law}"
-    return Drag(
-        law=law
-    ), f"drag law: {law}, within {100 * accuracy.relative:g} % or {accuracy.absolute_n:g} N of {REFERENCE}"
+        return Drag(law=law), f"drag law: {LAW_NAMES[law]}"
+    error = f"within {100 * accuracy.relative:g} % or {accuracy.absolute_n:g} N of {LAW_NAMES[REFERENCE]}"
+    return Drag(law=law), f"drag law: {LAW_NAMES[law]}, {error}"
 
 
 def _problem(liquid: Liquid) -> str | None:
@@ -157,7 +156,7 @@ EFFECT = Effect(
     exerted_n=_exerted_n,
     extent="area",
     choose=_choose,
-    note=lambda liquid: f", drag law: {liquid.drag.law}",
+    note=lambda liquid: f", drag law: {LAW_NAMES[liquid.drag.law]}",
     model=Drag,
     default=Drag(),
     problem=_problem,
@@ -173,9 +172,7 @@ EFFECT = Effect(
             "Drag law",
             choices=(
                 ("constant", "Constant (thesis)"),
-                ("schiller-naumann", "Schiller–Naumann"),
-                ("haider-levenspiel", "Haider–Levenspiel"),
-                ("brown-lawler", "Brown–Lawler"),
+                *((law, LAW_NAMES[law]) for law in LAWS),
                 ("linear", "Linear damper"),
             ),
         ),
