@@ -204,7 +204,7 @@ def fit(levels: ArrayLike, successes: ArrayLike, failures: ArrayLike, grid: Grid
     _, *logarithms = tables(
         replace(grid, width_prior=None, session_sd=(0.0, 0.0)), tuple(np.asarray(levels, float).tolist())
     )
-    return posterior(grid, log_likelihood(successes, failures, *logarithms))
+    return posterior(grid, [log_likelihood(successes, failures, *logarithms)])
 
 
 def log_likelihood(
@@ -218,9 +218,13 @@ def log_likelihood(
     return total
 
 
-def posterior(grid: Grid, log_likelihood: NDArray[np.float64]) -> Posterior:
-    """Return the posterior from the logarithm of the likelihood in each cell."""
-    weights = grid.prior * np.exp(log_likelihood - log_likelihood.max())
+def posterior(grid: Grid, log_likelihoods: Sequence[NDArray[np.float64]], shares: ArrayLike = 1.0) -> Posterior:
+    """Return the posterior from logarithms of the likelihood in each cell, averaged with weights ``shares``."""
+    highest = max(values.max() for values in log_likelihoods)
+    likelihood = np.zeros(grid.shape)
+    for values, share in zip(log_likelihoods, np.broadcast_to(shares, len(log_likelihoods)), strict=True):
+        likelihood += share * np.exp(values - highest)
+    weights = grid.prior * likelihood
     return Posterior(grid, np.asarray(weights / weights.sum(), float))
 
 

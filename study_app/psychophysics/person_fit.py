@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cache, lru_cache
+from functools import cache, lru_cache, reduce
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -88,13 +88,13 @@ class PersonAnswers(NamedTuple):
         """
         shifts = np.zeros(len(self.places))
         parts = _likelihoods(self, shifts, grid)
-        fitted = posterior(grid, np.add.reduce([*parts.values()]))
+        fitted = posterior(grid, [reduce(np.add, parts.values())])
         for _ in range(_PASSES if two_intervals else 0):
             new_shifts = _preferences(self, fitted)
             if np.array_equal(new_shifts, shifts):
                 break
             shifts, parts = new_shifts, _likelihoods(self, new_shifts, grid)
-            fitted = posterior(grid, np.add.reduce([*parts.values()]))
+            fitted = posterior(grid, [reduce(np.add, parts.values())])
         score, information = _time_score(self, fitted, shifts, self.done)
         decade_u = 1.0 if grid.log else abs(fitted.threshold) * math.log(10)
         sd, has_changed = math.log10(CHANGE_PRIOR) * decade_u, score**2 > BEYOND_CHANCE**2 * information
@@ -168,21 +168,21 @@ def _posterior(
     It is averaged over ``changes`` of the threshold from the first trial to the last [u], with prior ``weights``.
     """
     cells = changes / 4 / (grid.thresholds[1] - grid.thresholds[0])
-    flat = replace(grid, width_prior=None)
     logarithms = [
-        np.log(weight) + np.add.reduce([_shift_cells(likelihood, half * moved) for half, likelihood in parts.items()])
-        for moved, weight in zip(cells, np.broadcast_to(weights, cells.shape), strict=True)
+        reduce(np.add, [_shift_cells(likelihood, half * moved) for half, likelihood in parts.items()])
+        for moved in cells
     ]
-    return replace(posterior(flat, np.logaddexp.reduce(logarithms)), grid=grid)
+    return replace(posterior(replace(grid, width_prior=None), logarithms, weights), grid=grid)
 
 
 def _shift_cells(values: NDArray[np.float64], cells: float) -> NDArray[np.float64]:
     """Return the values shifted by a number of threshold cells, interpolated; the end values are repeated."""
-    last = len(values) - 1
-    at = np.clip(np.arange(len(values)) + cells, 0, last)
-    low = np.minimum(at.astype(np.int64), last - 1)
-    share = (at - low)[:, None, None, None]
-    return np.asarray(values[low] * (1.0 - share) + values[low + 1] * share, float)
+    if not cells:
+        return values
+    whole = math.floor(cells)
+    share = cells - whole
+    neighbours = values[np.clip(np.arange(len(values) + 1) + whole, 0, len(values) - 1)]
+    return np.asarray(neighbours[:-1] * (1.0 - share) + neighbours[1:] * share, float)
 
 
 def _time_score(answers: PersonAnswers, fitted: Posterior, shifts: Floats, course: Floats) -> tuple[float, float]:
