@@ -293,7 +293,7 @@ def _participant_form_values(study: Study, contrast: Contrast, form: str, block:
         for score in study.others.scores
         if (score.where.id, score.name) == (form, contrast.measure)
     ]
-    after = [table[(table["code"] == block) & table["score"].notna()] for table in rows]
+    after = [table[(table["after_block"] == block) & table["score"].notna()] for table in rows]
     means = {person: own["score"].mean() for table in after for person, own in table.groupby("participant")}
     return {str(person): ParticipantValue(value=float(mean)) for person, mean in means.items()}
 

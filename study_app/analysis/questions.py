@@ -188,7 +188,7 @@ def _answers_by_setting(where: QuestionPlace, answers: pd.DataFrame) -> Iterator
 
 
 def scored(study: Study, placed_score: PlacedScore) -> pd.DataFrame:
-    """Return one row per completed questionnaire: ``participant``, ``code`` and ``score``."""
+    """Return one row per completed questionnaire: ``participant``, ``code``, ``after_block`` and ``score``."""
     rows = pd.concat([study.answers_to(question) for question in placed_score.questions])
     bounds = {question.id: question.bounds for question in placed_score.questions}
     scores: list[dict[str, Any]] = []
@@ -200,8 +200,10 @@ def scored(study: Study, placed_score: PlacedScore) -> pd.DataFrame:
             if not pd.isna(response)
         }
         code = str(answers["code"].iloc[0]) if placed_score.where.settings else None
-        scores.append({"participant": participant, "code": code, "score": placed_score.score.compute(answered, bounds)})
-    return pd.DataFrame(scores, columns=["participant", "code", "score"])
+        score = placed_score.score.compute(answered, bounds)
+        after_block = answers["after_block"].iloc[0]
+        scores.append({"participant": participant, "code": code, "after_block": after_block, "score": score})
+    return pd.DataFrame(scores, columns=["participant", "code", "after_block", "score"])
 
 
 def _score_result(study: Study, score: PlacedScore) -> ScoreResult:
@@ -213,13 +215,15 @@ def _score_result(study: Study, score: PlacedScore) -> ScoreResult:
         instrument=score.instrument,
         source=str(Instrument(score.instrument).table["source"]) if known and score.instrument is not None else None,
         groups=tuple(
-            GroupAnswers(code, name, _score_summary(rows["score"].dropna().to_numpy(dtype=float)))
+            GroupAnswers(code, name, _score_summary(rows.dropna(subset=["score"])))
             for code, name, rows in _answers_by_setting(score.where, scored(study, score))
         ),
     )
 
 
-def _score_summary(values: Any) -> dict[str, Any]:
+def _score_summary(scores: pd.DataFrame) -> dict[str, Any]:
+    """Return the numbers of scores, each participant's scores being averaged first."""
+    values = scores.astype({"score": float}).groupby("participant")["score"].mean().to_numpy()
     n = len(values)
     return {
         "n": n,

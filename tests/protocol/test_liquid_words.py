@@ -104,7 +104,8 @@ def test_drawn_parameters_are_named_with_their_units(effect: str, kind: str, aut
     ("changed", "text"),
     [
         ({},
-         "1234 kg/m³, 0.5 Pa·s, drag law: Brown–Lawler, wake (length 3 ticks, scaling 5 ticks, exponent 0.7), added mass"),
+         "1234 kg/m³, 0.5 Pa·s, drag law: Brown–Lawler, wake (length 3 ticks, scaling 5 ticks, exponent 0.7), "
+         "added mass"),
         ({"drag": {"law": "linear", "damping_nspm": 6.5}, "viscosity_pa_s": None, "effects": ["drag"]},
          "damping 6.5 N·s/m at the hand, drag law: linear"),
         ({"effects": "auto"}, "1234 kg/m³, 0.5 Pa·s, effects selected automatically by size"),

@@ -511,6 +511,9 @@ def read_decided(tables: Sequence[Mapping[str, Any] | None]) -> Decided:
 
 START: Final = "0"
 """The code of a form before the first block; no block has this ID."""
+OF_SESSION: Final = "__"
+"""Between block and session in the code of a form that follows the same block in several sessions."""
+AT_THE_START: Final = "At the start"
 AFTER: Final = "After "
 
 
@@ -518,13 +521,15 @@ AFTER: Final = "After "
 class QuestionPlace:
     """The place of questions: after the trials of a block, with its ``settings``, or in a form.
 
-    A form that is repeated within a session has one setting for each block that it follows; other forms have none.
+    A form that participants complete more than once has one setting for each block that it follows, or for each block
+    and session (``by_session``) if it follows the same block in several sessions; other forms have none.
     """
 
     id: str
     title: str
     is_form: bool
     settings: tuple[Setting, ...]
+    by_session: bool = False
 
     def name(self, setting: Setting) -> str:
         """Return the name of a setting in tables and figures."""
@@ -638,10 +643,20 @@ def _questionnaires(protocol: Mapping[str, Any], key: Key | None) -> Iterator[tu
                 where = QuestionPlace(step, titles[step], False, _block_settings(protocol, step, key))
                 yield where, protocol["questionnaires"][block["questionnaire"]]
         elif step in protocol["questionnaires"]:
-            table, after = protocol["questionnaires"][step], sessions.follows(step)
-            labels = ((START, "At the start") if name is None else (name, f"{AFTER}{titles[name]}") for name in after)
-            settings = tuple(Setting(code=name, condition=name, label=label) for name, label in labels)
-            yield QuestionPlace(step, _form_title(protocol, step), True, settings), table
+            uses = sessions.form_uses(step) if sessions.is_repeated(step) else ()
+            by_session = len({block for block, _ in uses}) < len(uses)
+            settings = tuple(_form_setting(block, session if by_session else None, titles) for block, session in uses)
+            where = QuestionPlace(step, _form_title(protocol, step), True, settings, by_session)
+            yield where, protocol["questionnaires"][step]
+
+
+def _form_setting(block: str | None, session: int | None, titles: Mapping[str, str]) -> Setting:
+    """Return the setting of a repeated form after a block, or at the start of a session."""
+    code, label = (START, AT_THE_START) if block is None else (block, f"{AFTER}{titles[block]}")
+    if session is not None:
+        link = " of" if block is None else ","
+        code, label = f"{code}{OF_SESSION}{session}", f"{label}{link} session {session}"
+    return Setting(code=code, condition=code, label=label)
 
 
 def _form_title(protocol: Mapping[str, Any], form: str) -> str:

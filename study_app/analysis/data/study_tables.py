@@ -26,6 +26,7 @@ from study_app.analysis.data import measures
 from study_app.analysis.data.blocks import (
     NO_QUESTIONS,
     NOTHING_DECIDED,
+    OF_SESSION,
     START,
     Block,
     Decided,
@@ -287,8 +288,12 @@ class Study:
         """Return all rows of ``answered`` for a question outside blocks of statements."""
         place = self.answered["form" if asked.where.is_form else "block"] == asked.where.id
         rows = self.answered[place.fillna(False) & (self.answered["item"] == asked.id)]
-        by_block = asked.where.is_form and asked.where.settings
-        return rows.assign(code=rows["after_block"].fillna(START)) if by_block else rows
+        if not (asked.where.is_form and asked.where.settings):
+            return rows
+        codes = rows["after_block"].fillna(START)
+        if asked.where.by_session:
+            codes = codes + OF_SESSION + rows["session"].astype("string")
+        return rows.assign(code=codes)
 
     def presented(self, block: Block) -> dict[str, int]:
         """Return how often each setting of a block was presented in valid trials."""

@@ -318,13 +318,21 @@ def _question_column(study: Study, cells: QuestionCells, people: list[str]) -> A
     if isinstance(question, PlacedScore):
         instrument = f" of {question.instrument}" if question.instrument else ""
         description = f"Score {question.name}{instrument}, in {question.where.title}.{setting_note}"
-        return _median_column(answers, "score", people), description, (None, None)
+        return _median_column(answers, "score", people), description + _repeats_note(answers, "median"), (None, None)
     text = question.text if question.text.endswith((".", "?", "!")) else f"{question.text}."
     description = f"{text} In {question.where.title}.{setting_note}"
     if question.question.value_type != "text":
+        description += _repeats_note(answers, "median")
         return _median_column(answers, "value", people), description, question.bounds or (None, None)
+    description += _repeats_note(answers, "last")
     last = answers.sort_values(["session", "trial"]).groupby("participant")["response"].last()
     return pd.array([last.get(person, pd.NA) for person in people], dtype="string"), description, (None, None)
+
+
+def _repeats_note(answers: pd.DataFrame, which: str) -> str:
+    """Return a sentence on which of a participant's answers a cell has; "" if everybody answered once."""
+    is_repeated = bool(answers["participant"].duplicated().any())
+    return f" The {which} of each participant's answers." if is_repeated else ""
 
 
 def _median_column(answers: pd.DataFrame, column: str, people: list[str]) -> pd.api.extensions.ExtensionArray:

@@ -11,7 +11,7 @@ from markupsafe import Markup
 
 from study_app import number_text
 from study_app.analysis.contrasts import RATIOS, answer, mean_words, question
-from study_app.analysis.data.blocks import AFTER, Block, LevelBlock, Setting, name_in_sentence
+from study_app.analysis.data.blocks import AFTER, AT_THE_START, Block, LevelBlock, Setting, name_in_sentence
 from study_app.analysis.data.measures import AGREEMENT
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.figures.people_figures import Mean, mean_of, panel_rows
@@ -456,8 +456,11 @@ def _number_words(numbers: Numbers, presented: Mapping[str, Presented] = _NOT_PR
 
 def _setting_words(name: str) -> str:
     """Return the name of a setting in a sentence: "for water", or "after “80 ms late”" for a form after a block."""
-    block = name.removeprefix(AFTER)
-    return f"for {name_in_sentence(name)}" if block == name else f"{AFTER.lower()}{quoted_title(block)}"
+    if name.startswith(AT_THE_START):
+        return name_in_sentence(name)
+    block, comma, session = name.removeprefix(AFTER).rpartition(", session ")
+    block, where = (block, f" in session {session}") if comma else (session, "")
+    return f"{AFTER.lower()}{quoted_title(block)}{where}" if name.startswith(AFTER) else f"for {name_in_sentence(name)}"
 
 
 def _mean_ends(mean: Mean) -> str:
@@ -471,17 +474,25 @@ class _Ends:
 
 
 def _choice_words(result: QuestionResult) -> str:
-    """Return a sentence on the most frequent options and the number of participants who chose them."""
+    """Return a sentence on the most frequent options and how often they were chosen.
+
+    There is an interval only if each participant answered once, since the answers of one person are not independent.
+    """
     parts = []
     for group in result.groups:
-        n, counts = int(group.numbers["n"]), group.numbers["counts"]
+        n, people, counts = int(group.numbers["n"]), int(group.numbers["participants"]), group.numbers["counts"]
         if not n:
             continue
         most = int(max(counts.values()))
         first, *tied = [f"“{result.options.get(option, option)}”" for option, count in counts.items() if count == most]
         tied_note = f", and as many chose {listed(tied)}" if tied else ""
-        share = clopper_pearson(most, n)
         setting_note = f" ({name_in_sentence(group.name)})" if len(result.groups) > 1 else ""
+        if n > people:
+            tied_note = f", and as many {listed(tied)}" if tied else ""
+            given = f"{n} answers by {number_text.counted(people, 'participant')}"
+            parts.append(f"{most} of {given} were {first}{tied_note}{setting_note} ({100 * most / n:.0f} %)")
+            continue
+        share = clopper_pearson(most, n)
         ends = f"[{100 * share.low:.0f}, {100 * share.high:.0f}] %"
         parts.append(
             f"{most} of {n} participants chose {first}{tied_note}{setting_note} ({100 * most / n:.0f} %, 95 % "

@@ -367,6 +367,8 @@ def _form_sentences(study: Study) -> Iterator[str]:
         note = ", depending on the group or session" if len(times) > 1 else ""
         if not note and not all(form in steps for steps in sessions):
             note = _sessions_phrase(recorded, form)
+        elif not note and any((recorded.session_count(group) or 1) > 1 for group in recorded.groups or (None,)):
+            note = " of each session"
         yield (
             f"Participants completed the questionnaire “{title}” ({counted(questions, 'question')}) "
             f"{' or '.join(times)}{note}."

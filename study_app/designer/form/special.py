@@ -532,7 +532,7 @@ def _form_measures(study: Study) -> dict[str, tuple[tuple[str, str], ...]]:
             if item.value_type != "text"
         }
         measures = tuple((f"{name}/{measure}", f"{text} ({title})") for measure, text in labels.items())
-        for block in filter(None, protocol.follows(name)):
+        for block in protocol.blocks_followed_by(name):
             measures_by_block[block] = (*measures_by_block.get(block, ()), *measures)
     return measures_by_block
 

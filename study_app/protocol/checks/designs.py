@@ -222,8 +222,8 @@ def _check_contrast(protocol: Protocol, contrast: Contrast, place: Path) -> Iter
 
 def _check_form(protocol: Protocol, contrast: Contrast, form: str, block: str, place: Path) -> Iterator[Fault]:
     """Check that a form is asked after a block of a contrast, and has its measure."""
-    if block not in protocol.follows(form):
-        yield Fault((*place, "form"), f"{form} does not follow every block in the comparison", f"add it after {block}")
+    if block not in protocol.blocks_followed_by(form):
+        yield Fault((*place, "form"), f"{form} does not always follow {block}", f"add it after {block} in the sequence")
     questionnaire = protocol.questionnaires[form]
     known = [*(item.id for item in questionnaire.items if item.value_type != "text"), *questionnaire.scores]
     if contrast.measure not in known:

@@ -111,8 +111,7 @@ class Sessions:
 
     def every_session(self) -> Iterator[Steps]:
         """Yield the steps of each session of each group."""
-        for group in self.groups or (None,):
-            yield from self._sequences_of(group) or (self.session_steps(group, 1),)
+        yield from (steps for _, steps in self._numbered_sessions())
 
     def groups_with(self, step: str) -> tuple[str, ...]:
         """Return the groups whose sessions contain a step; empty in a study without groups."""
@@ -126,21 +125,38 @@ class Sessions:
                 yield previous
             previous = step if step in self.blocks else previous
 
-    def follows(self, form: str) -> tuple[str | None, ...]:
-        """Return the blocks that precede a form, None for the start; empty unless a session has the form repeatedly.
+    def is_repeated(self, form: str) -> bool:
+        """Return whether participants of any group complete a form more than once."""
+        return any(self._steps_of_group(group).count(form) > 1 for group in self.groups or (None,))
+
+    def form_uses(self, form: str) -> tuple[tuple[str | None, int], ...]:
+        """Return the preceding block (None: the start) and the session (from 1) of each use of a form.
 
         If the order of the main blocks varies, any of those in the session can precede the form.
         """
-        preceding: dict[str | None, None] = {}
-        is_repeated, exchanged = False, self.exchanged_blocks
-        for steps in self.every_session():
-            is_repeated |= steps.count(form) > 1
+        uses: dict[tuple[str | None, int], None] = {}
+        for session, steps in self._numbered_sessions():
+            exchanged = [block for block in steps if block in self.exchanged_blocks]
             for previous in self.blocks_before(form, steps):
-                possible_blocks = (
-                    [block for block in steps if block in exchanged] if previous in exchanged else [previous]
-                )
-                preceding |= dict.fromkeys(possible_blocks)
-        return tuple(preceding) if is_repeated else ()
+                blocks = exchanged if previous in exchanged else [previous]
+                uses |= dict.fromkeys((block, session) for block in blocks)
+        return tuple(uses)
+
+    def blocks_followed_by(self, form: str) -> tuple[str, ...]:
+        """Return the blocks after which a form is always completed, whatever the order of the main blocks."""
+        followed: dict[str, None] = {}
+        for _, steps in self._numbered_sessions():
+            exchanged = [block for block in steps if block in self.exchanged_blocks]
+            preceding = list(filter(None, self.blocks_before(form, steps)))
+            if not {*exchanged} <= {*preceding}:
+                preceding = [block for block in preceding if block not in exchanged]
+            followed |= dict.fromkeys(preceding)
+        return tuple(followed)
+
+    def _numbered_sessions(self) -> Iterator[tuple[int, Steps]]:
+        """Yield number and steps of each session of each group."""
+        for group in self.groups or (None,):
+            yield from enumerate(self._sequences_of(group) or (self.session_steps(group, 1),), start=1)
 
     def _sequences_of(self, group: str | None) -> Sequences:
         own_group = None if group is None else self.groups[group]

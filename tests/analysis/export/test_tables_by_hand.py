@@ -230,11 +230,12 @@ def test_questions_and_scores_have_their_answers_and_texts_in_the_wide_table_sps
     monkeypatch.setattr("study_app.analysis.export.tables.scored", lambda _study, _score: given)
     asked = replace(made, others=OtherQuestions(questions=(sure, pick), scores=(raw,)))
     table, cells = wide_table(asked)
+    median, last = (f" The {which} of each participant's answers." for which in ("median", "last"))
     expected = {
-        "end__sure__stir": (4.5, 7, "How sure? In End. After stir.", 2, 9),
+        "end__sure__stir": (4.5, 7, f"How sure? In End. After stir.{median}", 2, 9),
         "end__sure__again": (8, None, "How sure? In End. After again.", 2, 9),
-        "q__pick__mild": ("o", "w", "Pick one. In Oils. About mild.", None, None),
-        "end__raw__stir": (46, 71, "Score raw of tlx, in End. After stir.", None, None),
+        "q__pick__mild": ("o", "w", f"Pick one. In Oils. About mild.{last}", None, None),
+        "end__raw__stir": (46, 71, f"Score raw of tlx, in End. After stir.{median}", None, None),
         "end__raw__again": (81, None, "Score raw of tlx, in End. After again.", None, None),
     }
     columns = {column.name: column for column in table.columns if column.name in expected}

@@ -131,6 +131,48 @@ def test_a_form_after_each_block_is_analysed_block_by_block(tmp_path: Path, orde
     assert "After Again" in (tmp_path / "report" / "report.html").read_text(encoding="utf-8")
 
 
+@pytest.mark.parametrize(
+    ("blocks", "uses"),
+    [
+        (("stir", "again"), {"stir": "After Stir", "again": "After Again"}),
+        (("stir", "stir"), {"stir__1": "After Stir, session 1", "stir__2": "After Stir, session 2"}),
+    ],
+)
+def test_a_form_in_each_of_two_sessions_is_analysed_session_by_session(
+    tmp_path: Path, blocks: tuple[str, str], uses: dict[str, str]
+) -> None:
+    """Every participant counts once in each; the questionnaire has a question with options and a text, too."""
+    last = 'conditions = ["thin", "thick"]'
+    old = 'sequence = ["start", "stir", "load", "usability", "end"]'
+    steps = ", ".join(f'["{block}", "load", "start"]' for block in blocks)
+    again = f"{last}\n[blocks.again]\n{last}" if "again" in blocks else last
+    protocol = mixed_file(tmp_path, (old, f"sequences = [{steps}]"), (last, again))
+    folder = rehearse_answers(
+        protocol, participants=PEOPLE, seed=4, results=tmp_path / "results", features=made_up(protocol)
+    )
+    study = load_study(folder)
+    results = evaluate(study, recordings=False)
+    rows = study.answered[study.answered["form"] == "load"].astype({"value": float})
+    raw = rows.groupby(["session", "participant"])["value"].mean()  # the mean of the six ratings
+    (score,) = (score for score in results.scores if (score.where, score.name) == ("load", "raw"))
+    assert [group.name for group in score.groups] == [*uses.values()]
+    for session, group in enumerate(score.groups, start=1):
+        assert group.numbers["n"] == PEOPLE
+        assert (group.numbers["mean"], group.numbers["sd"]) == pytest.approx((raw[session].mean(), raw[session].std()))
+    table, _ = wide_table(study)
+    for session, code in enumerate(uses, start=1):
+        given = table.frame[f"load__raw__{code}"].astype(float).to_list()
+        assert given == pytest.approx(raw[session].reindex(table.frame["participant"]).to_list())
+    hands = study.answered[study.answered["item"] == "hand"]
+    (hand,) = (result for result in results.questions if result.item == "hand")
+    assert [group.numbers["counts"] for group in hand.groups] == [
+        {option: int((rows["response"] == option).sum()) for option in ("left", "right", "both")}
+        for _, rows in hands.groupby("session")
+    ]
+    assert {group.numbers["n"] for group in hand.groups} == {PEOPLE}
+    assert "(six questions) after the last block of each session." in methods(study, results)
+
+
 def test_readers_see_the_name_of_a_standard_questionnaire_in_place_of_its_title(tmp_path: Path) -> None:
     before = '[questionnaires.before]\ninstrument = "nasa-tlx"\ntitle.en = "At first"\n\n[questionnaires.load]'
     sequence = 'sequence = ["start", "stir", "load", "usability", "end"]'

@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 from scipy.stats import binom
 
-from study_app.analysis.data.blocks import AFTER, Block, Decided, Item, LevelBlock, Setting
+from study_app.analysis.data.blocks import AFTER, AT_THE_START, Block, Decided, Item, LevelBlock, Setting
 from study_app.analysis.evaluate import evaluate, evaluate_block
 from study_app.analysis.figures.summary_figures import Numbers, place_of
 from study_app.analysis.findings.delays import ContrastsWithControl, DetectionThreshold, LowestDelay, LowestTrend
@@ -266,6 +266,13 @@ def test_a_form_has_a_card_only_if_it_says_more_than_a_hypothesis(blocks: str, p
             "(95 % confidence intervals, n = 2). The mean difference (after Oil − wax) was 2.00 [−10.7, 14.7].",
         ),
         (
+            Numbers("Raw", None, True, (
+                (f"{AFTER}Thick oil, session 2", {"P1": 2.0}), (f"{AT_THE_START} of session 1", {"P1": 1.0}),
+            )),
+            "The mean Raw score was 2.00 after “Thick oil” in session 2 and 1.00 at the start of session 1 (95 % "
+            "confidence intervals, n = 1).",
+        ),
+        (
             Numbers("Warm", (1.0, 7.0), False, (("L1", {"P1": 2.0, "P2": 6.0}), ("Utrecht-L2", {"P2": 3, "P1": 1}))),
             "The mean of “Warm” was 4.00 [−21.4, 29.4] for L1 and 2.00 [−10.7, 14.7] for Utrecht-L2 on a scale from 1 "
             "to 7 (95 % confidence intervals, n = 2). The mean difference (L1 − Utrecht-L2) was 2.00 [−10.7, 14.7].",
@@ -508,7 +515,7 @@ def test_of_successive_short_cards_each_pair_is_side_by_side(monkeypatch: pytest
     ],
 )
 def test_a_choice_names_each_of_the_most_frequent_options(counts: dict[str, int], sentence: str) -> None:
-    answered = GroupAnswers(code=None, name="", numbers={"n": 8, "counts": counts})
+    answered = GroupAnswers(code=None, name="", numbers={"n": 8, "participants": 8, "counts": counts})
     result = QuestionResult(
         where="form", title="Form", is_form=True, item="drink", text="Which drink?", short="Drink", kind="choice",
         measure="counts", figure=None, groups=(answered,),
@@ -517,3 +524,6 @@ def test_a_choice_names_each_of_the_most_frequent_options(counts: dict[str, int]
     named = replace(result, options={"milk": "Warm milk", "tea": "Green tea", "rum": "Rum"})
     with_text = sentence.replace("“milk”", "“Warm milk”").replace("“tea”", "“Green tea”").replace("“rum”", "“Rum”")
     assert pages._choice_words(named).startswith(f"“Drink”: {with_text}, ")
+    repeated = replace(answered, numbers={**answered.numbers, "participants": 5})
+    given = sentence.replace("participants chose", "answers by 5 participants were").replace("many chose", "many")
+    assert pages._choice_words(replace(result, groups=(repeated,))) == f"“Drink”: {given})."

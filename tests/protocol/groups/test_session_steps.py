@@ -11,6 +11,7 @@ from study_app.protocol.orders.balance import balances, numbered_participants
 from study_app.protocol.orders.block_orders import orders_of
 from study_app.protocol.orders.durations import expected_duration_s, variants
 from study_app.protocol.orders.schedule import build_schedule, draw_key
+from study_app.protocol.participants.groups import RecordedSessions
 from study_app.protocol.randomization.streams import group_of, stream
 from tests.protocol.groups.grouped import grouped
 
@@ -51,6 +52,33 @@ def test_a_session_beyond_the_last_is_refused() -> None:
         ):
             refused()
     study.check_session_number(2)
+
+
+@pytest.mark.parametrize(
+    ("order", "sequences", "uses", "followed", "is_repeated"),
+    [
+        ("fixed", [["thin", "end"]], [("thin", 1)], ("thin",), False),
+        ("fixed", [["end", "thin", "thick", "end"]], [(None, 1), ("thick", 1)], ("thick",), True),
+        ("fixed", [["thin", "end"], ["thick", "end"]], [("thin", 1), ("thick", 2)], ("thin", "thick"), True),
+        ("fixed", [["thin", "end"], ["thin", "end"]], [("thin", 1), ("thin", 2)], ("thin",), True),
+        ("balanced", [["thin", "thick", "end"]], [("thin", 1), ("thick", 1)], (), False),
+        ("balanced", [["thin", "end", "thick", "end"]], [("thin", 1), ("thick", 1)], ("thin", "thick"), True),
+    ],
+)
+def test_a_form_follows_blocks_in_numbered_sessions(
+    order: str,
+    sequences: list[list[str]],
+    uses: list[tuple[str | None, int]],
+    followed: tuple[str, ...],
+    is_repeated: bool,
+) -> None:
+    """After the last of two blocks in either order, a form follows each of them only in some sessions."""
+    recorded = RecordedSessions.model_validate(
+        {"study": {"block_order": order}, "blocks": {"thin": {}, "thick": {}}, "sequences": sequences}
+    )
+    assert list(recorded.form_uses("end")) == uses
+    assert recorded.blocks_followed_by("end") == followed
+    assert recorded.is_repeated("end") is is_repeated
 
 
 def test_a_session_has_its_own_blocks_forms_parts_and_duration() -> None:
