@@ -67,6 +67,26 @@ def test_slower_and_uneven_rows_tell_the_same():
     assert len(found.fitted_n) == len(some)
 
 
+@pytest.mark.parametrize("velocities", [True, False])
+@pytest.mark.parametrize("rate_hz", [50, 100, 333])
+def test_a_slow_sensor_does_not_bias_drag_and_added_mass(rate_hz, velocities):
+    """The force of both laws on three sines is computed here; a tick of 1 ms still delays the acceleration by half."""
+    rng = np.random.default_rng(rate_hz)
+    t_s, w = np.arange(0, 12, 1 / rate_hz)[:, None], 2 * np.pi * np.array([0.7, 1.1, 1.9])
+    phases, sizes_m = w * t_s + rng.uniform(0, 6, 3), np.array([0.05, 0.03, 0.012])
+    x_m, v_mps = np.sin(phases) @ sizes_m, np.cos(phases) @ (w * sizes_m)
+    drag_n = -0.5 * 1000 * 0.55 * math.pi / 4 * 0.068**2 * np.abs(v_mps) * v_mps
+    force_n = drag_n + 0.7 * 1000 * math.pi / 6 * 0.068**3 * np.sin(phases) @ (w**2 * sizes_m)
+    along = np.outer(x_m, [0, 1, 0]), np.outer(v_mps, [0, 1, 0])
+    motion = Motion(t_s[:, 0], along[0], velocity_mps=along[1] if velocities else None)
+    ball = BALL.model_copy(update={"liquids": (Liquid(id="tank", density_kg_m3=1000, effects=("drag", "added_mass")),)})
+    measured_n = np.outer(force_n + rng.normal(0, 0.01, len(force_n)), [0, 1, 0])
+    moved = measured_force.with_centred_velocity(motion)
+    fitted = fit(ball, "tank", ("drag_coefficient", "coefficient"), moved, measured_n).scene
+    assert fitted.body.drag_coefficient == pytest.approx(0.55, rel=0.025)
+    assert fitted.liquids[0].added_mass.coefficient == pytest.approx(0.7, rel=0.025)
+
+
 def test_a_measured_force_does_not_lag_so_velocities_from_places_do_not(tmp_path):
     """Through the filter of a device the added mass of a real ball would be felt 9.5 ms late, as less of it."""
     force_n = noisy(OIL, REACH, 0.01)

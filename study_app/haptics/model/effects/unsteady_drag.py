@@ -57,8 +57,9 @@ def _fill(record: Any, liquid: Liquid, scene: Scene, first: Mapping[str, int]) -
     record.per_m = 1 / diameter_m
     record.mass_kg = 0.5 * liquid.density_kg_m3 * scene.body.volume_m3
     record.factor_kg_rs = 1.5 * diameter_m**2 * math.sqrt(math.pi * liquid.density_kg_m3 * viscosity_pa_s)
-    record.filter_per_s = rate_per_s(smoothing_s(scene.velocity, None, added_mass.SMOOTHING_S))
-    record.history_filter_per_s = rate_per_s(smoothing_s(scene.velocity, None, history.SMOOTHING_S))
+    record.filter_per_s = rate_per_s(smoothing_s(scene.velocity, liquid.added_mass.filter_s, added_mass.SMOOTHING_S))
+    of_history_s = smoothing_s(scene.velocity, liquid.history.smoothing_s, history.SMOOTHING_S)
+    record.history_filter_per_s = rate_per_s(of_history_s)
 
 
 def _damping_nspm(record: Any, rate: float) -> float:

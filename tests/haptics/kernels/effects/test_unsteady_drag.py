@@ -12,7 +12,7 @@ from study_app.haptics.kernels.effects.unsteady_drag import RATES_PER_S, WEIGHTS
 from study_app.haptics.model.estimators import Kalman
 from study_app.haptics.model.laws import finite_reynolds
 from study_app.haptics.model.motion import Motion
-from study_app.haptics.model.scene import Box, MotionBox
+from study_app.haptics.model.scene import Box, Liquid, MotionBox
 from study_app.haptics.model.slope_limits import steady_force
 from study_app.haptics.runtime.offline import simulate
 from study_app.haptics.runtime.pack import pack
@@ -70,6 +70,14 @@ def test_it_equals_its_law_by_the_letter(name, interval_s, within):
     felt, even_s = tank(name), np.full(len(velocity), interval_s)
     by_letter = unsteady_n(felt, velocity, np.diff(velocity, axis=0, prepend=velocity[:1]) / interval_s, even_s)
     assert abs(force(felt, velocity, even_s) - by_letter).max() <= within * abs(by_letter).max()
+
+
+@pytest.mark.parametrize(("filter_s", "smoothing_s"), [(0.004, 0.03), (0.021, 0.006)])
+def test_its_acceleration_is_smoothed_as_in_the_effects_that_it_replaces(filter_s, smoothing_s):
+    times = {"added_mass": {"filter_s": filter_s}, "history": {"smoothing_s": smoothing_s}}
+    oil = Liquid(id="oil", density_kg_m3=1261, viscosity_pa_s=1.41, effects=("unsteady_drag",), **times)
+    record = pack(scene(oil, velocity=Kalman())).liquids[0].unsteady_drag
+    assert (record.filter_per_s, record.history_filter_per_s) == pytest.approx((1 / filter_s, 1 / smoothing_s))
 
 
 @compiled
