@@ -18,9 +18,11 @@
     └── DisplayError           no screen to open a window on
 """
 
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import KW_ONLY, dataclass
+from pathlib import PurePath
 from typing import Any, Final
 
 
@@ -40,6 +42,11 @@ def _restore_error(kind: type[StudyError], args: tuple[Any, ...], fields: dict[s
     error = kind.__new__(kind, *args)
     error.__dict__.update(fields)
     return error
+
+
+def as_argument(path: PurePath) -> str:
+    """Return a path as an argument of a command that a message suggests: quoted if it has spaces or special signs."""
+    return f'"{path}"' if re.search(r"[^\w./\\:~+@=-]", str(path)) else str(path)
 
 
 @dataclass(frozen=True, slots=True)

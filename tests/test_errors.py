@@ -1,15 +1,16 @@
-"""Errors cross processes: each is the same after pickling, with its fields."""
+"""Errors cross processes, each the same after pickling with its fields; suggested commands can be pasted."""
 
 import importlib
 import inspect
 import pickle
 import pkgutil
 from collections.abc import Iterator
+from pathlib import PurePosixPath
 from typing import Any
 
 import pytest
 
-from study_app.errors import Problem, StudyError
+from study_app.errors import Problem, StudyError, as_argument
 
 PROBLEMS = Problem("blocks.b", "is unknown", 3, hint="did you mean c?"), Problem("x", "is missing")
 GIVEN = {"int": -6, "tuple[Problem, ...]": PROBLEMS}
@@ -44,3 +45,17 @@ def test_every_error_is_the_same_after_pickling() -> None:
         assert type(again) is type(error)
         assert (str(again), again.args, vars(again)) == (str(error), error.args, vars(error))
         assert again.__notes__ == ["in case 3"]
+
+
+@pytest.mark.parametrize(
+    ("path", "argument"),
+    [
+        ("data/sub-P003", "data/sub-P003"),
+        ("study ä/data", '"study ä/data"'),
+        ("C:\\Users\\Jo\\s_1.0", "C:\\Users\\Jo\\s_1.0"),
+        ("a&b", '"a&b"'),
+        ("größe", "größe"),
+    ],
+)
+def test_a_suggested_command_quotes_a_path_that_a_shell_would_split(path: str, argument: str) -> None:
+    assert as_argument(PurePosixPath(path)) == argument

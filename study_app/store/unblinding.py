@@ -13,7 +13,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Final
 
-from study_app.errors import StoreError
+from study_app.errors import StoreError, as_argument
 from study_app.protocol.blocks import block_titles
 from study_app.protocol.model import quoted_title
 from study_app.store import receipt
@@ -272,7 +272,8 @@ def _open_files(place: Place, lines: list[Event], key: Key) -> list[str]:
         current, sealed = read_if_there(path) or b"", before[path]
         if current not in (sealed, content) and not _is_table_behind(current, path, place, lines, key):
             left.append(
-                f"{path} differs from the journal, so it was not changed: run liquid-study rebuild {place.folder.path}"
+                f"{path} differs from the journal, so it was not changed: run liquid-study rebuild "
+                f"{as_argument(place.folder.path)}"
             )
             continue
         if current != content:

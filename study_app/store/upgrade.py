@@ -9,7 +9,7 @@ import hashlib
 from collections.abc import Iterator
 from pathlib import Path
 
-from study_app.errors import StoreError
+from study_app.errors import StoreError, as_argument
 from study_app.protocol.load import read_document
 from study_app.protocol.source import source_bytes
 from study_app.protocol.upgrade import needs_upgrade, upgraded_file
@@ -108,6 +108,6 @@ def _outdated_tables(
             if isinstance(lines[-1], SessionEnded) and not has_same_cells(old_content, new_content):
                 raise StoreError(
                     f"{table} differs from its journal, so nothing was upgraded: run liquid-study rebuild "
-                    f"{session.path} to recreate it"
+                    f"{as_argument(session.path)} to recreate it"
                 )
             yield session, table, old_content, new_content

@@ -20,7 +20,7 @@ from study_app.analysis.data.blocks import (
     main_blocks,
     other_questions,
 )
-from study_app.errors import AnalysisError, StoreError
+from study_app.errors import AnalysisError, StoreError, as_argument
 from study_app.protocol.blocks import display_language
 from study_app.protocol.source import text_in
 from study_app.store.blinded import Key
@@ -104,7 +104,7 @@ def _parse_column(column: Column, texts: Sequence[str], known: dict[str, Any], p
 
 
 def _rebuild_remedy(path: Path) -> str:
-    return f"create it again from the journal with liquid-study rebuild {path.parent}"
+    return f"create it again from the journal with liquid-study rebuild {as_argument(path.parent)}"
 
 
 def _read_json_object(path: Path) -> dict[str, Any]:
@@ -321,7 +321,7 @@ def _check_answers(sessions: Sequence[Session], paths: Sequence[Path], table: pd
             raise AnalysisError(
                 f"{paths[index]}, row {row}: the receipt does not contain the statement {item!r} for code {code!r} in "
                 f"block {block!r}. The file has been changed or belongs to a different study: create it again from the "
-                f"journal with liquid-study rebuild {sessions[index].folder.path}"
+                f"journal with liquid-study rebuild {as_argument(sessions[index].folder.path)}"
             )
     twice = np.flatnonzero(
         table.duplicated(["participant", "session", "form", "after_block", "trial", "attempt", "item"])

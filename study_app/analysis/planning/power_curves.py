@@ -483,9 +483,10 @@ def _summary_lines(power: Powers) -> Iterator[str]:
         if curve.question == "contrast" or (primary and curve.question in ("conditions differ", "trend")):
             shares = dict(zip(power.kinds, (kind.power[place] for kind in power.curves_by_kind(curve)), strict=True))
             question = "" if curve.question == "contrast" else f" ({HEADS[curve.question]})"
+            shown = "show equivalence" if curve.setting == IF_EQUAL else "detect the effect"
             lines.append(
                 f"- {_curve_name(curve, power).strip('*')}{question}: {whole_percent(shares[CONSISTENT])} of studies "
-                f"detect the effect if participants are {CONSISTENT}, {whole_percent(shares[main])} if they are "
+                f"{shown} if participants are {CONSISTENT}, {whole_percent(shares[main])} if they are "
                 f"{main}, and {whole_percent(shares[NOISY])} if they are {NOISY}."
             )
     if lines:
@@ -574,7 +575,8 @@ def _test_sentences(question: Question, powers: Powers) -> list[str]:
             ]
         case "contrast":
             return [
-                "Hypotheses are tested with paired t tests on each participant's mean answers, Holm-corrected across "
+                "Hypotheses are tested with paired t tests on each participant's answers (medians of repeated ones), "
+                "Holm-corrected across "
                 "the hypotheses; the bootstrap and the t test corrected for skewness must also be significant. "
                 f"Equivalence is tested in the same way as in the report. {inclusion_words([])}"
             ]

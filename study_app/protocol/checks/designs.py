@@ -12,10 +12,11 @@ from typing import Any, Final
 from study_app.errors import StudyError
 from study_app.haptics.model.overrides import number_names, override_value
 from study_app.protocol.blocks import Block
-from study_app.protocol.model import RULES, Contrast, Protocol, Published
+from study_app.protocol.model import OF_LEVELS, RULES, Contrast, Protocol, Published
 from study_app.protocol.orders.block_orders import order_of
 from study_app.protocol.orders.tracks import tracks_of
 from study_app.protocol.quantities import can_vary
+from study_app.protocol.questions import POINTS
 from study_app.protocol.source.document import Path, entries, names
 from study_app.protocol.source.problems import Fault, unknown_name
 from study_app.protocol.source.table import Table
@@ -187,7 +188,8 @@ def _check_published(protocol: Protocol, published: Published, place: Path) -> I
 
 
 def _check_contrast(protocol: Protocol, contrast: Contrast, place: Path) -> Iterator[Fault]:
-    """Check that the blocks of a contrast have its measure and its conditions."""
+    """Check that the blocks of a contrast have its measure and its conditions, and that its bound can be reached."""
+    yield from _check_bound(protocol, contrast, place)
     for name in contrast.blocks:
         block, questionnaire = protocol.blocks[name], protocol.questionnaire_of(name)
         if block.phase != "main":
@@ -218,6 +220,22 @@ def _check_contrast(protocol: Protocol, contrast: Contrast, place: Path) -> Iter
         if contrast.conditions is not None and block.design is not None:
             message = f"block {name} has one result for all its conditions, because it has a design"
             yield Fault((*place, "conditions"), message, "compare two blocks instead")
+
+
+def _check_bound(protocol: Protocol, contrast: Contrast, place: Path) -> Iterator[Fault]:
+    """Check that the bound of a contrast is a ratio above 1, or a difference that the scale of a statement permits."""
+    bound, path = contrast.bound, (*place, "bound")
+    if bound is None:
+        return
+    blocks = [protocol.blocks[name] for name in contrast.blocks]
+    spacings = {protocol.stimulus_of(block).spacing for block in blocks if block.stimulus is not None}
+    if contrast.measure in ("threshold", "pse") and spacings == {"log"} and bound <= 1:
+        ratio = f"{1 / bound:.3g}" if bound < 1 else "1.25"
+        yield Fault(path, f"is {bound:g}, but the bound of a ratio must be greater than 1", f"for example {ratio}")
+    largest = (POINTS - 1) * (2 if contrast.is_interaction else 1)
+    if contrast.form is None and contrast.measure not in OF_LEVELS and bound > largest:
+        message = f"is {bound:g}, but differences on seven points are at most {largest}"
+        yield Fault(path, message, "choose the largest difference that you consider negligible")
 
 
 def _check_form(protocol: Protocol, contrast: Contrast, form: str, block: str, place: Path) -> Iterator[Fault]:

@@ -14,6 +14,7 @@ from itertools import count, pairwise
 from typing import TypeAlias
 
 from study_app.errors import StudyError
+from study_app.number_text import counted
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import CodeOrder, Orders, orders_of
 from study_app.protocol.orders.durations import variants
@@ -300,7 +301,7 @@ def _verdict_lines(counts: Evenness) -> Iterator[str]:
         yield f"Carry-over is not balanced: each code follows every other code {_range_text(carry_over)}."
     if counts.shortest_distance is not None:
         shortest = f"the minimum distance between repeats is {counts.shortest_distance}"
-        yield f"At most {counts.longest_run} presentations of a condition occur in a row; {shortest}."
+        yield f"The longest run of one condition is {counted(counts.longest_run, 'presentation')}; {shortest}."
 
 
 def _advice(block: BlockBalance) -> Iterator[str]:

@@ -14,7 +14,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-from study_app.errors import StoreError
+from study_app.errors import StoreError, as_argument
 from study_app.outlets.markers import Marker, marker_of
 from study_app.outlets.session_outlets import Outlets
 from study_app.protocol.model import Protocol
@@ -227,8 +227,8 @@ class SessionStore:
         self.lock.release()
         if failures:
             raise StoreError(
-                f"{failures[0]}; the journal is complete: run liquid-study rebuild {self.folder.path} to write what is "
-                "missing"
+                f"{failures[0]}; the journal is complete: run liquid-study rebuild {as_argument(self.folder.path)} to "
+                "write what is missing"
             ) from failures[0]
         self._is_over = True
 

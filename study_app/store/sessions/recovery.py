@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import study_app
-from study_app.errors import StoreError
+from study_app.errors import StoreError, as_argument
 from study_app.protocol.descriptions import CONDITIONS_DIFFER, differences
 from study_app.protocol.model import Protocol
 from study_app.protocol.randomization import stream
@@ -260,7 +260,7 @@ def files_beyond_journal(place: Place, lines: Sequence[events.Event]) -> Iterato
     ended = isinstance(lines[-1], events.SessionEnded)
     session_receipt = receipt.read(folder.receipt) if is_there(folder.receipt) else {}
     if not ended and (status := session_receipt.get("status", receipt.UNFINISHED)) != receipt.UNFINISHED:
-        yield folder.receipt, f"its status is {status!r}, but the journal's is {receipt.UNFINISHED!r}"
+        yield folder.receipt, f"has the status {status!r}, but the journal {receipt.UNFINISHED!r}"
     if len(session_receipt.get("resumed", ())) > sum(isinstance(line, events.SessionResumed) for line in lines):
         yield folder.receipt, "records more resumptions of the session than the journal does"
     if ended:
@@ -340,7 +340,7 @@ def refuse_finished(folder: SessionFolder, done: Progress) -> None:
     if done.ended is not None and not is_there(folder.checksums):
         raise StoreError(
             f"{folder.path} is finished ({done.ended}), but its receipt, tables and checksums could not all be "
-            f"written: run liquid-study rebuild {folder.path} to write them"
+            f"written: run liquid-study rebuild {as_argument(folder.path)} to write them"
         )
     if done.ended is not None:
         raise StoreError(

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
-from study_app.errors import StoreError
+from study_app.errors import StoreError, as_argument
 from study_app.protocol.model import StudyHead
 from study_app.protocol.source import text_in
 from study_app.store import receipt
@@ -266,7 +266,8 @@ def refuse_earlier_columns(folder: StudyFolder) -> None:
     """Raise StoreError for a study whose tables an earlier version wrote; the message says how to upgrade it."""
     if has_earlier_columns(folder):
         raise StoreError(
-            f"{folder.path} has tables from an earlier version of the program: run liquid-study upgrade {folder.path}"
+            f"{folder.path} has tables from an earlier version of the program: run liquid-study upgrade "
+            f"{as_argument(folder.path)}"
         )
 
 

@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any
 
 import study_app
-from study_app.errors import PlugInError, StoreError
+from study_app.errors import PlugInError, StoreError, as_argument
 from study_app.number_text import counted
 from study_app.protocol.upgrade import needs_upgrade
 from study_app.protocol.wording import SHIPPED
@@ -653,7 +653,7 @@ def session_discrepancies(place: Place) -> tuple[Discrepancy, ...]:
         first_findings.setdefault(finding.place, finding)
     if (journal_finding := first_findings.get(folder.journal.name)) is not None:
         first_findings = {journal_finding.place: journal_finding}
-    remedy = f"run liquid-study verify {place.study_folder.path} to check everything"
+    remedy = f"run liquid-study verify {as_argument(place.study_folder.path)} to check everything"
     return (
         *discrepancies,
         *(Discrepancy(folder.path / error.place, error.message, remedy) for error in first_findings.values()),
