@@ -80,7 +80,7 @@ def test_a_viscosity_that_a_constant_coefficient_ignores_is_named_with_both_forc
     ("old", "new", "line", "words"),
     [
         ('"small"', '"small', 5, "column"),
-        ("scale = 10", "scale = 10\nscale = 11", 17, "column 11: Cannot overwrite a value"),
+        ("scale = 10", "scale = 10\nscale = 11", 17, "column 11: the key scale occurs twice in this table"),
         ("[liquids.other]", "[liquids.thick]", 26, "column"),
         ("scale = 10", "scale =", 16, "column 8: Invalid value"),
         ("Klein", "Kl\udce9in", 6, "UTF-8"),

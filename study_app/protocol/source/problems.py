@@ -162,7 +162,10 @@ def _fault(details: ErrorDetails, document: Mapping[str, Any], schema: Schema) -
         last = path[-1]
         if isinstance(last, int):
             return Fault(path, f"entry {last + 1} is missing")
-        return Fault(path, "is missing", kind="missing")
+        properties = (node.get("properties", {}).get(last, {}) for node in _nodes_at(document, path[:-1], schema))
+        constant = next((key["const"] for key in properties if "const" in key), None)
+        hint = "" if constant is None else f"write {last} = {shown_value(constant)}"
+        return Fault(path, "is missing", hint, kind="missing")
     if kind == "extra_forbidden":
         permitted = {key for node in _nodes_at(document, path[:-1], schema) for key in node.get("properties", {})}
         hint = did_you_mean(str(path[-1]), permitted)
