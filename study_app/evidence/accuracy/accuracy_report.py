@@ -103,7 +103,7 @@ def _draw_acting(figure: FigureBase, accuracy: Accuracy, height_pt: float) -> No
         figure,
         "Error of the force on the hand, including the delay",
         f"{accuracy.acting_liquid}; a typical hand moves a 0.2 kg handle randomly, at about 1.6 Hz and with the power "
-        "of a ±20 mm oscillation. Numbers are ticks of delay; bars show the smallest error of any linear estimator.",
+        "of a ±20 mm oscillation. Numbers are ticks of delay; bars show the best linear estimator from positions.",
         height_pt,
     )
     axes = _axes_at(figure, _ACTING_TOP_PT, _PANEL_PT, height_pt)

@@ -288,7 +288,7 @@ def delivered_force_evidence(found: Sequence[Delivered]) -> Evidence:
 def _lines(found: Sequence[Delivered]) -> Iterator[str]:
     yield "Force on the hand, including the delay, compared with the law for the handle's true motion; 1 kHz, 38 µm."
     yield "The hand follows a sine, random motion with the power of a ±20 mm sine, and reaches of 60 mm in 0.3 s."
-    yield "Columns: RMS error in each [% of the law], smallest possible error of a linear estimator in the random"
+    yield "Columns: RMS error in each [% of the law], error of the best linear estimator from positions in the random"
     yield "motion, proportion of each part of the law that reaches the hand during the sine [%] (inertia includes"
     yield "history), and proportion of the force held back [%]."
     yield "A limit follows its value after a slash; * marks a value beyond it."

@@ -312,7 +312,7 @@ def _lines(rows: Sequence[Row]) -> Iterator[str]:
         values = "".join(f"{value:9.4g}" if value >= 100 else f"{value:9.2f}" for value in row.values)
         goal = "" if row.goal is None else f"   {'≥' if row.least else '≤'} {row.goal:.3g}: "
         verdict = "" if row.goal is None else "met" if row.met else "not met"
-        bound = "" if row.bound is None else f"   minimum for a linear estimator: {row.bound:.3g}"
+        bound = "" if row.bound is None else f"   best linear estimator from positions: {row.bound:.3g}"
         yield f"{row.name:{width}} {values}{goal}{verdict}{bound}"
 
 

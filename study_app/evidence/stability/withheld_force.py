@@ -135,7 +135,7 @@ def _lines(found: Sequence[Withheld]) -> Iterator[str]:
         yield f"{f'{estimator}, {mode}':21}{strokes}{after}"
         for row in rows:
             after = "".join(f"{100 * share:7.1f}" for share in row.after[QUICK.index(SHOWN_SHAKE)])
-            goals = "no goal" if row.liquid in _EXEMPT else "met" if row.met else "not met"
+            goals = "no goal" if row.liquid in _EXEMPT else _goal_text(row.met) + " afterwards" * (mode == SHAKEN)
             strokes = "".join(f"{100 * share:11.1f}" for share in row.strokes)
             yield f"  {row.liquid:19}{strokes}  {after}{100 * row.lasting:10.1f}   {goals}"
     with_limits = [withheld for withheld in found if withheld.liquid not in _EXEMPT]
@@ -144,7 +144,12 @@ def _lines(found: Sequence[Withheld]) -> Iterator[str]:
     for most in sorted({withheld.most for withheld in with_limits}):
         quick = max(withheld.quick for withheld in with_limits if withheld.most == most)
         where = "except in tar" if most == _MAX_SHARE else f"in {' with '.join(_REVERSED)}"
-        yield f"at most {most:.0%} held back in every stroke, {where}: {_goal_text(quick <= most)} ({quick:.1%})"
+        motion = f"in every stroke with imposed position or a firm hand, {where}"
+        yield f"at most {most:.0%} held back {motion}: {_goal_text(quick <= most)} ({quick:.1%})"
+    if shaken := [withheld for withheld in with_limits if withheld.mode == SHAKEN]:
+        worst = max(shaken, key=lambda withheld: max(withheld.strokes))
+        which = f"in {worst.liquid} with {worst.estimator}"
+        yield f"strokes of a shaken hand, without a goal: up to {max(worst.strokes):.1%} held back ({which})"
     met = _goal_text(lasting < MOST_AFTER)
     after = f"less than {MOST_AFTER:.1%} held back from one second after a shake onwards, except in tar"
     yield f"{after}: {met} ({lasting:.1%})"
