@@ -373,7 +373,7 @@ def stability(
     seed = seed or os.urandom(4).hex()
     chosen = tuple(group for group in groups(seed, cases) if only is None or only in group.name)
     if not chosen:
-        names = ", ".join(group.name for group in groups(seed, cases))
+        names = ", ".join(f'"{group.name}"' for group in groups(seed, cases))
         raise StudyError(f"no group has a name that contains {only!r}; choose from: {names}")
     with progress() as show, executor_for(workers) as executor:
         swept = run_sweep(

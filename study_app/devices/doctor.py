@@ -9,6 +9,7 @@ from textwrap import fill
 from typing import Final, Literal
 
 from study_app.errors import DeviceError, DeviceNotFound
+from study_app.number_text import counted
 
 State = Literal["ok", "found", "not checked"]
 _ORDER: Final[tuple[State, ...]] = ("found", "not checked", "ok")
@@ -70,7 +71,7 @@ class Report:
     @property
     def conclusion(self) -> str:
         if not self.well:
-            return f"Found: {len(self.found)}."
+            return f"{counted(len(self.found), 'fault')} found."
         if self.unseen:
             return f"{_NOTHING_WRONG} Not checked: {'; '.join(finding.tested for finding in self.unseen)}."
         return _NOTHING_WRONG
@@ -80,7 +81,7 @@ def report_lines(report: Report) -> list[str]:
     """Return a report as text of 100 columns; commands to paste are on one line."""
     lines = ["", *(f"seen: {observation}" for observation in report.seen), ""]
     for finding in report.in_order:
-        word = "FOUND" if finding.state == "found" else finding.state
+        word = "FAULT" if finding.state == "found" else finding.state
         lines.append(f"{finding.number:>2}  {word:<13}  {finding.words}")
         if finding.state == "found":
             lines.append(_indent_text(f"cause: {finding.cause}", 19))

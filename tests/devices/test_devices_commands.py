@@ -43,12 +43,12 @@ class TestDoctor:
         told = liquid_study("doctor", "--device", "falcon-emulated", "--fault", "never-homes")
         assert told.exit_code == 3
         rows = [line for line in told.output.splitlines() if line[:2].strip().isdigit()]
-        assert "FOUND" in rows[0]
+        assert "FAULT" in rows[0]
         for state in ("not checked", " ok "):
             numbers = [int(row[:2]) for row in rows if state in row]
             assert numbers == sorted(numbers)
         assert len(rows) == len(FAILURES.modes)
-        found = told.output.split("FOUND")
+        found = told.output.split("FAULT")
         assert len(found) == 2
         assert "homing fails" in found[1]
         assert "cause: not every arm has passed its index" in found[1]

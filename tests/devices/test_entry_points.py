@@ -120,7 +120,7 @@ class TestDeviceOfAnotherPackage:
         assert str(refused.exception).startswith("device 'mouse' does not use toy-mass; only these do: Toy hand:")
         found = liquid_study("devices", "doctor", "--device", "toy-hand", "--fault", "loose")
         assert found.exit_code == 3
-        assert "FOUND          its string is loose" in found.output
+        assert "FAULT          its string is loose" in found.output
 
 
 @pytest.mark.parametrize(

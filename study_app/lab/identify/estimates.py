@@ -23,6 +23,7 @@ CONFIDENCE: Final = 0.95
 _VAGUE_RATIO: Final = 2.0
 _NO_EFFECT: Final = 1e-9
 _SINGULAR: Final = 1e-9
+_NEARLY_ZERO: Final = 1e-9
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -166,14 +167,20 @@ def _parameter_warnings(
                 "was kept"
             )
         elif z[k] - problem.least[k] < tolerance or problem.most[k] - z[k] < tolerance:
+            edge = f"{_edge_text(values[k])}{_edge_reason(problem, k, z)}"
             yield (
-                f"{parameter.name} reached the end of its range, {values[k]:.6g}{_edge_reason(problem, k, z)}: the "
-                "best value may lie beyond it, and the intervals do not take this limit into account"
+                f"{parameter.name} reached the end of its range, {edge}: the best value may lie beyond it, "
+                "and the intervals do not take this limit into account"
             )
         elif k not in in_pair and half_widths[k] > (
             abs(problem.u(z)[k]) / _VAGUE_RATIO if coordinate(parameter).relative else math.log(_VAGUE_RATIO)
         ):
             yield f"{parameter.name} is poorly determined by {problem.varied}: check its interval"
+
+
+def _edge_text(value: float) -> str:
+    """Return an end of a range; the search ends just above a limit of 0."""
+    return "0" if 0 < value < _NEARLY_ZERO else f"{value:.6g}"
 
 
 def _edge_reason(problem: Problem, k: int, z: Floats) -> str:

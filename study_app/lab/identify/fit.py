@@ -28,6 +28,10 @@ _POOR_SHARE: Final = 0.5  # residual relative to the force above which the oppos
 _CLEARLY_BETTER: Final = 0.9
 _DRIVING_CORRELATION: Final = 0.1  # noise of 10,000 rows correlates with velocity by 0.01
 _MIN_EXPLAINED: Final = 0.25
+_MAX_HAND_MPS: Final = 10.0
+"""The fastest motion of a hand. [choice] Throws reach 10 m/s."""
+_MAX_FORCE_N: Final = 1000.0
+"""The largest force that a hand can exert. [choice]"""
 _CHANCE_DEVIATIONS: Final = 5.0
 """Residuals count as correlated if their correlation exceeds this many standard deviations of that of noise."""
 
@@ -91,14 +95,14 @@ def fit(scene: Scene, liquid_id: str, names: Sequence[str], motion: Motion, forc
     fitted_n = problem.force_n(z)
     residual_n = (measured.force_n - fitted_n)[:, problem.axes]
     fields["warnings"] += (
-        *_quantity_warnings(measured, problem.axes),
+        *_quantity_warnings(measured, problem.axes, scene.scale),
         *_sign_warnings(problem, _rms(residual_n)),
         *_residual_warnings(residual_n, fields["autocorrelation"], measured.force_n),
     )
     return Fit(**fields, motion=motion, measured_n=measured.force_n, fitted_n=fitted_n, axes=problem.axes)
 
 
-def _quantity_warnings(measured: MeasuredForce, axes: Sequence[int]) -> Iterator[str]:
+def _quantity_warnings(measured: MeasuredForce, axes: Sequence[int], scale: float) -> Iterator[str]:
     """Yield warnings if the measured values cannot be the force of a liquid at rest on this body.
 
     Apart from a constant part, such a force takes energy from the body and depends on its velocity and acceleration.
@@ -107,6 +111,15 @@ def _quantity_warnings(measured: MeasuredForce, axes: Sequence[int]) -> Iterator
     velocity_mps = measured.motion.velocity_mps
     if velocity_mps is None:
         velocity_mps = np.gradient(measured.motion.position_m, t_s, axis=0)
+    speed_mps = float(np.linalg.norm(velocity_mps, axis=1).max()) / scale
+    if speed_mps > _MAX_HAND_MPS:
+        yield (
+            f"the body moves at up to {speed_mps:.3g} m/s, faster than a hand can move it: specify positions in metres "
+            "and times in seconds"
+        )
+    largest_n = float(np.linalg.norm(force_n, axis=1).max())
+    if largest_n > _MAX_FORCE_N:
+        yield f"the largest force is {largest_n:.3g} N, more than a hand can exert: specify forces in newtons"
     varying_n = force_n - force_n.mean(axis=0)
     size = np.linalg.norm(varying_n) * np.linalg.norm(velocity_mps)
     along = float(np.sum(varying_n * velocity_mps)) / size if size else 0.0

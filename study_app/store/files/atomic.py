@@ -304,6 +304,8 @@ def cannot_write(path: Path, error: OSError) -> StoreError:
     blocked = isinstance(error, FileExistsError | NotADirectoryError) or (
         isinstance(error, FileNotFoundError) and any(map(os.path.isfile, path.parents))  # on Windows
     )
+    if isinstance(error, FileNotFoundError) and not blocked:
+        return StoreError(f"{path} cannot be written: the folder does not exist; create it, or choose another folder")
     why = "there is a file where a folder is needed" if blocked else system_message(error)
     return StoreError(
         f"{path} cannot be written ({why}): free disk space, correct its permissions, close the program "

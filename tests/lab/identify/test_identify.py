@@ -186,6 +186,24 @@ def test_a_reversed_sign_is_noticed_and_the_explained_share_is_told():
         assert any("accelerate the body" in warning for warning in found.warnings) == (sign == -1)
 
 
+@pytest.mark.parametrize(
+    ("metres", "newtons", "warning"),
+    [
+        (1000, 1, "m/s, faster than a hand can move it: specify positions in metres and times in seconds"),
+        (1, 1e5, "N, more than a hand can exert: specify forces in newtons"),
+    ],
+)
+def test_millimetres_and_millinewtons_are_noticed(metres, newtons, warning):
+    force_n = newtons * force_of(TANK, REACH)
+    moved = Motion(REACH.t_s, metres * REACH.position_m, velocity_mps=metres * REACH.velocity_mps)
+    speed_mps = np.linalg.norm(moved.velocity_mps, axis=1).max()
+    value = speed_mps if metres > 1 else np.linalg.norm(force_n, axis=1).max()
+    warnings = fit(BALL, "tank", ["drag_coefficient"], moved, force_n).warnings
+    assert sum(line.endswith(f"{value:.3g} {warning}") for line in warnings) == 1
+    usual = fit(BALL, "tank", ["drag_coefficient"], REACH, force_of(TANK, REACH)).warnings
+    assert not [line for line in usual if "specify" in line]
+
+
 def test_values_that_do_not_follow_the_motion_are_no_force_on_the_body():
     torque = np.random.default_rng(SEED).normal(0, 0.3, (len(REACH.t_s), 3))
     found = fit(OIL, "oil", ["viscosity_pa_s"], REACH, torque)
