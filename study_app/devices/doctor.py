@@ -71,7 +71,7 @@ class Report:
     @property
     def conclusion(self) -> str:
         if not self.well:
-            return f"{counted(len(self.found), 'fault')} found."
+            return f"Found {counted(len(self.found), 'fault')}."
         if self.unseen:
             return f"{_NOTHING_WRONG} Not checked: {'; '.join(finding.tested for finding in self.unseen)}."
         return _NOTHING_WRONG
