@@ -51,6 +51,7 @@ from study_app.analysis.results import (
 from study_app.analysis.statistics.outcome import FEW
 from study_app.analysis.wording import counted, listed, ms, number, significant
 from study_app.discovery import by_name
+from study_app.number_text import capitalised
 from study_app.protocol.descriptions import limit_label
 from study_app.protocol.model import RULES, quoted_title
 from study_app.protocol.orders import Evenness
@@ -131,6 +132,12 @@ def _general_sentences(study: Study, results: Results) -> Iterator[str]:
         yield "The participants were SIMULATED, so this report is not evidence about people."
     if study.pilot:
         yield "These are pilot sessions, so do not report them as results of the study."
+    if study.doubts:
+        files = len({doubt.path for doubt in study.doubts})
+        yield (
+            f"{capitalised(counted(files, 'file'))} {'has' if files == 1 else 'have'} changed since recording, so "
+            "numbers may be wrong. The command liquid-study verify RESULTS checks all files."
+        )
     if not decided.made:
         yield "No analysis was planned in the study file, so all results are exploratory."
     elif decided.changed:

@@ -23,6 +23,7 @@ from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store import receipt
 from study_app.store.exclusions import exclude, include
 from study_app.store.unblinding import unblind
+from study_app.store.verification import Discrepancy
 from study_app.store.verification.whole_study import verify_study
 from tests.analysis.conftest import SAMPLE, Results, make_results, twelve
 from tests.protocol.groups.grouped import GROUPS, STUDY
@@ -58,6 +59,21 @@ def test_limits_count_the_trials_in_which_the_device_answered_late() -> None:
         f"In 3 of {len(main)} trials in the main blocks, the device responded later than the servo assumed: in the "
         "worst case after at least 4 ticks instead of 1. "
     )
+
+
+@pytest.mark.parametrize(
+    ("names", "start"), [(("a.csv",), "1 file has "), (("a.csv", "b.csv", "a.csv", "c.json"), "Three files have ")]
+)
+def test_limits_count_the_files_that_have_changed(names: tuple[str, ...], start: str) -> None:
+    study = load_study(SAMPLE.path)
+    results = evaluate(study)
+    assert not [line for line in limits(study, results) if "since recording" in line]
+    doubts = tuple(Discrepancy(study.folder / name, "differs from its journal", "") for name in names)
+    told = [line for line in limits(replace(study, doubts=doubts), results) if "since recording" in line]
+    assert told == [
+        f"{start}changed since recording, so numbers may be wrong. The command liquid-study verify RESULTS checks all "
+        "files."
+    ]
 
 
 def test_a_changed_file_of_one_version_and_an_exclusion_after_unblinding_are_stated(
