@@ -1,6 +1,7 @@
 """What commands refuse in one line, without a window or a file; `new`, `edit` and `outlets`."""
 
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -11,6 +12,7 @@ from study_app.cli import commands
 from study_app.errors import StudyError
 from study_app.evidence import accuracy
 from study_app.evidence.table import Evidence
+from study_app.protocol.load import load_scenes
 
 
 class Visit:
@@ -69,8 +71,12 @@ def test_what_cannot_be_is_refused_before_a_window_opens(visit: Visit, words: tu
 
 
 def test_a_survey_of_liquids_is_written_into_a_folder(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(accuracy, "survey_scenes", lambda _scenes, _show: ("compared",))
-    monkeypatch.setattr(accuracy, "survey_evidence", lambda found: Evidence("", {"survey.md": found[0]}))
-    done = CliRunner().invoke(commands, ["accuracy", "--liquids", "--to", str(tmp_path)])
-    assert (done.exit_code, (tmp_path / "survey.md").read_text("utf-8")) == (0, "compared"), done.output
+    names = list(load_scenes("slime"))
+    compared = [SimpleNamespace(liquid=name) for name in names if name not in ("slime", "ketchup")]
+    monkeypatch.setattr(accuracy, "survey_scenes", lambda _scenes, _show: compared)
+    monkeypatch.setattr(accuracy, "survey_evidence", lambda found: Evidence("", {"survey.md": found[0].liquid}))
+    done = CliRunner().invoke(commands, ["accuracy", "slime", "--liquids", "--to", str(tmp_path)])
+    assert (done.exit_code, (tmp_path / "survey.md").read_text("utf-8")) == (0, compared[0].liquid), done.output
     assert done.stdout.strip() == str(tmp_path / "survey.md")
+    omitted = ", ".join(name for name in names if name in ("slime", "ketchup"))
+    assert f"not compared, because references need a constant viscosity: {omitted}\n" in done.stderr
