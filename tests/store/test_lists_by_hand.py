@@ -71,6 +71,9 @@ def test_a_merged_study_names_each_participant_and_exclusion_with_the_site(sites
         ("north", "a", 7, 1), ("south", "b", 9, None),
     ]  # fmt: skip
     assert (study.path, study.study, study.protocol_hash) == (sites, "stirring", "c" * 64)
+    assert study.manifest == sites / "sites.json"
+    assert json.loads(study.content()) == json.loads(study.manifest.read_text("utf-8"))
+    assert merged.read_merged(study.manifest) is merged.read_merged(sites / "sites") is None
     assert merged.folders_of(sites) == {"north-": sites / "sites" / "north", "south-": sites / "sites" / "south"}
     assert merged.locate_participant(sites, "south-P012") == (sites / "sites" / "south", "P012")
     assert merged.session_in(sites, "north-P007", 2) == SessionFolder(
@@ -114,14 +117,22 @@ SITE = {"name": "north", "merged_at": AT, "key_hash": "a" * 64, "sessions": 7, "
         {"study": 7},
         *(
             {"sites": [SITE | {name: wrong}]}
-            for name, wrong in (("name", "a-b"), ("merged_at", "noon"), ("key_hash", 7), ("sessions", "7"))
+            for name, wrong in (
+                ("name", "a-b"), ("name", 7), ("merged_at", "noon"), ("key_hash", 7), ("sessions", "7"),
+                ("withdrawals", "1"),
+            )
         ),
+        {"format": 0},
+        {"format": 3},
     ],
-)
+)  # fmt: skip
 def test_an_invalid_list_of_sites_is_refused(sites: Path, change: dict[str, Any]) -> None:
     path = sites / "sites.json"
     path.write_text(json.dumps(json.loads(path.read_text("utf-8")) | change), encoding="utf-8", newline="\n")
-    with pytest.raises(StoreError, match=f"^{escape(str(path))} does not list the sites of a merged study"):
+    problem = "does not list the sites of a merged study: restore it from a backup"
+    if "format" in change:
+        problem = f"has format {change['format']}, but this version reads only formats 1 and 2: install a newer version"
+    with pytest.raises(StoreError, match=f"^{escape(f'{path} {problem}')}$"):
         merged.read_merged(sites)
 
 

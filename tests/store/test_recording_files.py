@@ -1,3 +1,4 @@
+import hashlib
 import json
 import struct
 import zlib
@@ -15,6 +16,8 @@ from study_app.store.recordings import (
     SamplesFile,
     WrittenFile,
     crcs,
+    describe_recording,
+    opened_content,
     read_checks,
     read_facts,
     read_frames,
@@ -50,6 +53,10 @@ def test_times_and_places_come_back_to_the_last_bit_and_the_rest_to_its_step(tmp
     read = read_samples(written.path)
     assert read.dtype.fields == SAMPLE.fields
     assert (written.rows, len(read)) == (61_234, 61_234)
+    metadata = parquet.read_metadata(written.path)
+    groups = [metadata.row_group(number) for number in range(metadata.num_row_groups)]
+    assert [group.num_rows for group in groups] == [30_000, 30_000, 1_234], "30 s are compressed together"
+    assert {group.column(column).compression for group in groups for column in range(metadata.num_columns)} == {"ZSTD"}
     for name in EXACT:
         assert np.array_equal(read[name], samples[name]), name
     assert not read["busy_ns"].any()
@@ -100,9 +107,12 @@ def test_recordings_of_format_2_are_read_and_one_that_lacks_a_column_is_damaged(
     read = read_samples(path)
     assert not read["measured"].any()
     assert np.array_equal(read["position_m"], samples_of(100)["position_m"])
-    rewrite(whole.drop_columns("gripper_m"), facts)
-    with pytest.raises(StoreError, match="it does not have the columns of samples"):
-        read_samples(path)
+    at = whole.column_names.index("gripper_m")
+    with_a_null = whole.set_column(at, "gripper_m", pa.array([None] + [0.5] * 99, whole.schema.field(at).type))
+    for damaged in (whole.drop_columns("gripper_m"), with_a_null, whole.append_column("x", whole["gripper_m"])):
+        rewrite(damaged, facts)
+        with pytest.raises(StoreError, match="it does not have the columns of samples"):
+            read_samples(path)
     rewrite(whole, facts | {"format": 5})
     with pytest.raises(
         StoreError, match="has format 5, but this version reads only formats 1 to 4: install a newer version"
@@ -152,6 +162,7 @@ def test_any_reader_of_parquet_finds_columns_with_unit_and_meaning(tmp_path: Pat
     frames = write_frames(tmp_path / "frames.parquet", np.array([[5, 3, -1, 0, -1]]), FACTS)
     for path in (written.path, frames.path):
         assert all(field.metadata[b"description"] for field in parquet.read_schema(path))
+        assert not any(field.nullable for field in parquet.read_schema(path))
     schema = parquet.read_schema(written.path)
     for name, unit, description in (
         ("position_y_m", b"m", b"Exact position of the hand, up."),
@@ -172,6 +183,23 @@ def test_frames_come_back_with_their_age(tmp_path: Path) -> None:
     assert np.array_equal(read["sample_ns"], shown[:, 1])
     assert np.array_equal(read["age_ns"], shown[:, 0] - shown[:, 1])
     assert [tuple(one) for one in read[["video_frame", "video_ns", "video_age_ns"]].tolist()] == video
+
+
+@pytest.mark.parametrize("secret", [None, b"s" * 32])
+def test_a_recording_on_the_disk_is_described_as_it_was_written(
+    tmp_path: Path, samples_of: Make, secret: bytes | None
+) -> None:
+    file = SamplesFile(tmp_path / "trial-003.parquet", FACTS, 1000.0, secret)
+    file.write(samples_of(70))
+    frames = write_frames(tmp_path / "frames.parquet", np.array([[7, 3, 5, 11, 13]] * 2), FACTS, 0.07, secret)
+    for written, rows in ((file.finish(dropped=5), 70), (frames, 2)):
+        assert describe_recording(written.path, secret) == written
+        content = written.path.read_bytes()
+        assert (written.rows, written.sha256) == (rows, hashlib.sha256(content).hexdigest())
+        opened = hashlib.sha256(opened_content(written.path, content, secret)).hexdigest()
+        assert written.opened_sha256 == (None if secret is None else opened)
+        assert (opened == written.sha256) == (secret is None)
+    assert read_facts(file.path, secret)["dropped"] == 5
 
 
 def test_frames_of_format_3_are_those_of_sessions_without_a_video(tmp_path: Path) -> None:
@@ -196,8 +224,8 @@ def test_what_is_no_recording_is_named(tmp_path: Path, samples_of: Make) -> None
         (read_samples, frames, "contains frames, not samples"),
         (read_checks, frames, "contains frames, not samples"),
         (read_samples, other, "is not a recording made by this program"),
-        (read_samples, torn, "is damaged"),
-        (read_facts, torn, "is damaged"),
+        (read_samples, torn, r"is damaged \(Parquet magic bytes not found in footer"),
+        (read_facts, torn, r"is damaged \(Parquet magic bytes not found in footer"),
         (read_samples, tmp_path / "none.parquet", "cannot be read"),
         (read_facts, tmp_path / "none.parquet", "cannot be read"),
     ):

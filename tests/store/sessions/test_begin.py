@@ -104,6 +104,48 @@ def test_the_receipt_holds_what_reproduces_the_session(start: Start) -> None:
     assert (ended.event, ended.status, ended.reason) == ("session_ended", "withdrawn", "tired, went home")
 
 
+def test_every_value_of_a_start_is_in_the_receipt_and_most_are_in_the_first_line(
+    start: Start, protocol: Protocol
+) -> None:
+    both = {
+        "participant": "P009", "session": 2, "seed": 23, "operator": "CD", "language": "nb", "simulated": True,
+        "pilot": True, "recordings": True,
+    }  # fmt: skip
+    only_receipt = {
+        "device": {"name": "falcon", "serial": "F7"}, "screens": {"operator": "left"}, "motors_masked": {"by": "fan"},
+        "outlets": {"LSL": "1.16"}, "video": {"camera": "C3"},
+    }  # fmt: skip
+    with start(**both, **only_receipt) as store:
+        held, first = receipt.read(store.folder.receipt), store.lines[0]
+        assert isinstance(first, SessionStarted)
+        assert store.folder.path.parts[-2:] == ("sub-P009", "ses-02")
+        assert store.key.drawn == "seed"
+        assert store.recorder is not None
+        assert store.recorder._facts == {
+            "study": "brackish", "participant": "P009", "session": 2, "simulated": True, "pilot": True,
+            "version": __version__, "origin_ns": store.clock.origin_ns,
+        }  # fmt: skip
+        assert (store.recorder._folder, store.recorder._secret, store.recorder._waits) == (
+            store.folder.recordings, store.key.nonce, True,
+        )  # fmt: skip
+    both |= {"study": "brackish", "key_hash": store.key.hash, "protocol_hash": SOURCE_HASH, "version": __version__}
+    assert {name: held[name] for name in both} == {name: getattr(first, name) for name in both} == both
+    assert {name: held[name] for name in only_receipt} == only_receipt
+    assert (held["format"], held["status"], held["reason"], held["ended_at"], held["resumed"]) == (
+        2, "unfinished", "", None, [],
+    )  # fmt: skip
+    assert (held["started_at"], first.at, first.t_s, first.n) == (
+        held["clock"]["origin_at"],
+        held["started_at"],
+        0.0,
+        1,
+    )
+    assert (first.format, first.device, first.measures_sealed) == (2, "falcon", True)
+    assert (first.own_codes, first.intervals, first.entry, first.group, first.place_in_group) == (None,) * 5
+    assert first.limits == protocol.limits.model_dump(mode="json")
+    assert first.receipt_hash == receipt.digest(held)
+
+
 @pytest.mark.parametrize(
     ("again", "sentence"),
     [
@@ -111,7 +153,8 @@ def test_the_receipt_holds_what_reproduces_the_session(start: Start) -> None:
         ({"participant": "p007"}, "differs from the existing 'P007' only in capitalisation"),
         ({"participant": "P-007"}, "letters A-Z, a-z and digits 0-9"),
         ({"participant": "test"}, "is reserved for pilot sessions"),
-        ({"participant": "P008", "session": 0}, "it must be from 1 to 99"),
+        ({"participant": "P008", "session": 0}, "session number 0 cannot be used: it must be from 1 to 99"),
+        ({"participant": "P008", "session": 100}, "session number 100 cannot be used: it must be from 1 to 99"),
         ({"participant": "P008", "simulated": True}, "must not be mixed"),
         ({"participant": "P008", "protocol": OTHER}, "contains the study 'brackish', not 'other'"),
     ],
@@ -182,4 +225,21 @@ def test_an_id_that_other_programs_keep_is_not(tmp_path: Path, participant: str)
 
 
 def test_a_participant_who_has_such_an_id_already_has_further_sessions(tmp_path: Path) -> None:
-    UsedIds(tmp_path, frozenset({("007", 1)}), ("007",)).check_unused("007", 2)
+    UsedIds(tmp_path, frozenset({("007", 1)}), ("007",)).check_unused("007", 99)
+
+
+def test_a_used_number_is_refused_with_the_next_free_number_and_id(tmp_path: Path) -> None:
+    held = frozenset({("P002", 3), ("P002", 1), ("p011", 7), ("X40", 2), ("P1x", 5)})
+    used = UsedIds(tmp_path, held, ("P002", "P050", "p011"), withdrawn=("P012",))
+    assert (used.numbers("P002"), used.numbers("P050"), used.suggested()) == ((1, 3), (), "P013")
+    used.check_unused("P002", 2)
+    with pytest.raises(StoreError) as refused:
+        used.check_unused("P002", 1)
+    assert str(refused.value) == (
+        f"participant P002 already has session 1 in {tmp_path}: use a new session number (4), resume that session, or "
+        "use another ID (next free: P013); nothing was changed"
+    )
+    with pytest.raises(StoreError, match=r"^participant P012 withdrew, .*use another ID \(next free: P013\)$"):
+        used.check_unused("P012", 2)
+    with pytest.raises(StoreError, match=r"^participant ID 'P011' differs from the existing 'p011' only in capital"):
+        used.check_unused("P011", 8)
