@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from study_app.protocol.model import Reach
 from study_app.protocol.trials.tasks import Explore, Follow
-from study_app.session.tasks import new_tracker
+from study_app.session.tasks import TaskView, Tracker, new_tracker
 from tests.golden import compare
 from tests.session.small import samples
 from tests.transcripts import acts, played, value_of
@@ -72,6 +72,85 @@ PLACES = {"LEFT": LEFT, "RIGHT": RIGHT, "AWAY": AWAY, "BORDER": BORDER, "BEYOND"
 def test_what_happens_in_a_task(pytestconfig: pytest.Config) -> None:
     file = Path(__file__).parent / "golden" / "tasks.txt"
     compare(file, played(file, acts(begun, PLACES)), pytestconfig)
+
+
+def stay(tracker: Tracker, begin_s: float, end_s: float, place: Any) -> list[tuple[int, float]]:
+    """Let samples of 1 kHz come, at a place; return the targets reached, and when."""
+    times = np.arange(round(begin_s * 1000), round(end_s * 1000)) / 1000
+    reached = tracker.feed(samples(times, np.tile(place, (len(times), 1))))
+    return [(target.target, round(target.t_task_s, 9)) for target in reached]
+
+
+def test_targets_light_up_in_turn_and_each_moment_is_drawn_as_it_was() -> None:
+    """Two targets, 0.1 s in each, three times; the first target is left too early once."""
+    tracker = new_tracker(reach())
+    assert (tracker.at(5_000_000_000).elapsed_s, tracker.now().lit, tracker.done) == (0.0, 0, False)
+    assert tracker.summary() == {"duration_s": 0.0, "targets_reached": 0, "targets": 3}
+    for begin_s, end_s, place, reached in (
+        (5.0, 5.2, AWAY, []), (5.2, 5.25, LEFT, []), (5.25, 5.3, BEYOND, []), (5.3, 5.45, BORDER, [(0, 0.4)]),
+        (5.45, 5.5, RIGHT, []), (5.5, 5.6, LEFT, []), (5.6, 5.8, RIGHT, [(1, 0.7)]),
+    ):  # fmt: skip
+        assert stay(tracker, begin_s, end_s, place) == reached
+    assert tracker.summary() == {"duration_s": 0.799, "targets_reached": 2, "targets": 3}
+    views = ((at_s, tracker.at(round(at_s * 1e9))) for at_s in (4.0, 5.225, 5.27, 5.375, 5.4, 5.475, 5.55, 5.65, 9.0))
+    assert [(at_s, view.lit, view.reached, round(view.dwell, 9), view.elapsed_s) for at_s, view in views] == [
+        (4.0, 0, 0, 0.0, 0.0), (5.225, 0, 0, 0.25, 0.225), (5.27, 0, 0, 0.0, 0.27), (5.375, 0, 0, 0.75, 0.375),
+        (5.4, 1, 1, 0.0, 0.4), (5.475, 1, 1, 0.25, 0.475), (5.55, 1, 1, 0.0, 0.55), (5.65, 1, 1, 0.5, 0.65),
+        (9.0, 0, 2, 0.0, 0.799),
+    ]  # fmt: skip
+    assert tracker.now() == tracker.at(9_000_000_000)
+    assert (tracker.leave(), tracker.outcome, tracker.end_ns) == (False, None, None)
+    assert stay(tracker, 5.8, 6.0, LEFT) == [(0, 0.9)]
+    assert stay(tracker, 6.0, 6.2, RIGHT) == []
+    assert (tracker.done, tracker.outcome, tracker.end_ns) == (True, "complete", 5_900_000_000)
+    assert tracker.summary() == {"duration_s": 0.9, "targets_reached": 3, "targets": 3}
+    assert tracker.now() == TaskView(lit=None, reached=3, of=3, dwell=0.0, elapsed_s=0.9)
+
+
+def test_a_radius_is_measured_in_all_directions_and_no_dwell_closes_no_ring() -> None:
+    tracker = new_tracker(reach(dwell_s=0.0, count=None, duration_s=1.0))
+    assert stay(tracker, 2.0, 2.1, (-0.02, 0.004, 0.0031)) == []
+    assert stay(tracker, 2.1, 2.2, (-0.02, 0.0, -0.0051)) == stay(tracker, 2.2, 2.3, NOWHERE) == []
+    assert stay(tracker, 2.3, 2.4, (-0.02, 0.004, 0.003)) == [(0, 0.3)]
+    assert tracker.at(2_350_000_000) == TaskView(lit=1, reached=1, of=None, dwell=0.0, elapsed_s=0.35)
+
+
+@pytest.mark.parametrize(
+    ("task", "asks", "leaves", "outcome", "end_s"),
+    [
+        (explore(1.0, 3.0), 0.999, False, "complete", 3.0),
+        (explore(1.0, 3.0), 1.0, True, "complete", 1.0),
+        (explore(0.0, 3.0), 0.002, True, "complete", 0.002),
+        (reach(count=2, timeout_s=2), 1.5, False, "timeout", 2.0),
+        (reach(count=None, duration_s=2), 1.5, False, "complete", 2.0),
+        (Follow(kind="follow", lead_s=0.5, frequency_hz=2, cycles=3), 1.5, False, "complete", 2.0),
+    ],
+)
+def test_a_task_ends_at_its_limit_or_earlier_if_the_participant_may_leave(
+    task: Any, asks: float, leaves: bool, outcome: str, end_s: float
+) -> None:
+    """Samples come every millisecond from 7 s on."""
+    tracker = new_tracker(task)
+    assert not tracker.leave(), "it has not begun"
+    stay(tracker, 7.0, 7.001 + asks, AWAY)
+    assert (tracker.leave(), tracker.done) == (leaves, leaves)
+    for begin_s, last_s in ((7.001 + asks, 6.999 + end_s), (6.999 + end_s, 7.0 + end_s)):
+        stay(tracker, begin_s, last_s, AWAY)
+        assert tracker.done == leaves
+    stay(tracker, 7.0 + end_s, 12.0, AWAY)
+    assert (tracker.outcome, tracker.end_ns, tracker.leave()) == (outcome, round((7 + end_s) * 1e9), False)
+    assert tracker.summary()["duration_s"] == tracker.now().elapsed_s == tracker.at(20_000_000_000).elapsed_s == end_s
+    assert tracker.summary()["targets_reached"] == (0 if isinstance(task, Reach) else None)
+
+
+def test_a_moving_target_is_drawn_where_it_was() -> None:
+    """20 mm at a quarter of a hertz: 3 s after the begin three quarters of a period have passed."""
+    tracker = new_tracker(Follow(kind="follow", lead_s=1, frequency_hz=0.25, amplitude_mm=20))
+    stay(tracker, 7.0, 11.0, AWAY)
+    view = tracker.at(10_000_000_000)
+    assert (view.lit, view.reached, view.of, view.dwell, view.elapsed_s) == (0, 0, None, 0.0, 3.0)
+    assert view.target_m == pytest.approx((-0.02, 0.0, 0.0))
+    assert new_tracker(explore()).at(0) == TaskView(lit=None, reached=0, of=None, dwell=0.0, elapsed_s=0.0)
 
 
 def slowly(task: Reach, rows: Any) -> tuple[list[tuple[int, int]], tuple[str | None, int | None]]:
