@@ -114,6 +114,38 @@ class TestMoving:
             assert hid.now > 1.5
             assert servo.telemetry.latest().position_m[0] == pytest.approx(went_m, rel=0.05)
 
+    def test_each_direction_of_the_cap_moves_the_pointer_and_a_gap_counts_as_50_ms(self):
+        """Half of what is beyond the dead zone is half the speed."""
+        half = (350 - 20) // 2 + 20
+        report = bytes([1, *(half).to_bytes(2, "little"), 0, 0, *(-350).to_bytes(2, "little", signed=True)])
+        device, hid = opened(report, REST)
+        with device, Servo(device, clock=VirtualClock()) as servo:
+            hid.say(bytes([1, 0, 0, 0x5E, 0x01, 0, 0]))
+            hid.now += 0.4
+            hid.say(REST)
+            servo.advance(500)
+            right_m, up_m, toward_m = servo.telemetry.latest().position_m
+            assert right_m == pytest.approx(HELD_S * FULL_SPEED_MPS / 2, abs=1e-4)
+            assert up_m == pytest.approx(HELD_S * FULL_SPEED_MPS, abs=1e-4)
+            assert 0.0498 <= toward_m / FULL_SPEED_MPS <= 0.0502 + HELD_S, "and once more until the cap rests"
+
+    def test_its_buttons_are_the_programs_until_it_is_opened_again(self):
+        device, hid = opened(bytes([3, 0b10, 0]), listed=[interface("SpaceMouse Pro")])
+        assert device.state.buttons == 0b10
+        hid.say(bytes([3, 0b01, 0, 0x40, 0]))
+        assert device.state.buttons == BUTTON_STOP | 0b01
+        device.open()
+        assert hid.open_count == 1, "it is open"
+        device.close()
+        device.open()
+        assert device.state.buttons == 0
+        device.close()
+
+    def test_a_model_without_a_light_is_sent_nothing(self):
+        device, hid = opened(listed=[interface("SpaceMouse (USB)")])
+        device.close()
+        assert hid.written == []
+
     def test_its_light_is_on_while_it_is_used(self):
         device, hid = opened()
         assert hid.written == [b"\x04\x01"]
@@ -176,3 +208,5 @@ def test_the_receipt_says_which_it_was():
     device.close()
     assert described["name"] == "spacemouse"
     assert described["model"] == "SpaceMouse Pro"
+    assert (described["full_speed_mps"], described["dead_share"]) == (0.25, 20 / 350)
+    assert SpaceMouseDevice(hid=FakeHid()).describe()["model"] is None
