@@ -15,6 +15,8 @@ import numpy as np
 import pytest
 
 from study_app.errors import StoreError, StudyError
+from study_app.protocol.load import parse
+from study_app.protocol.source.files import source_bytes
 from study_app.protocol.trials.stimuli import Stimulated
 from study_app.store import exclusions, merged, receipt, withdrawals
 from study_app.store.blinded import blinding
@@ -163,8 +165,13 @@ def test_a_withdrawal_reaches_what_names_the_participant_and_nothing_of_others(
         north / "notes.txt": ["(P007) was late"],
         north / "other.txt": ["P0071 and XP007 were early"],
         results / "old.ZIP": [],
+        results / "mail.txt": ["stirring: P007 called"],
+        results / "another.txt": ["shaking: P007 called"],
+        results / "mine" / "dataset_description.json": ["{}"],
+        results / "mine" / "notes.txt": ["stirring: P007 called"],
     }
     for path, lines in lists.items():
+        path.parent.mkdir(exist_ok=True)
         path.write_text("".join(f"{line}\n" for line in lines), encoding="utf-8", newline="\n")
     output_files.write_output(sites, tmp_path / "report", {"report.html": b"P007"})
     assert list(withdrawals.unerased_files(study, "P007")) == [
@@ -172,22 +179,71 @@ def test_a_withdrawal_reaches_what_names_the_participant_and_nothing_of_others(
     ]  # fmt: skip
     done = withdrawals.withdraw(north, "P007", by="AB", reason="asked")
     assert (done.folders, done.outputs) == ((north,), (tmp_path / "report" / "report.html",))
-    assert list(done.left) == [
-        f"{north / 'notes.txt'} still names P007",
+    assert done.left[0] == f"{north / 'notes.txt'} still names P007"
+    assert set(done.left[1:]) == {
         f"{results / 'old.ZIP'} is an archive, which is not searched: delete it if it contains data from P007",
-    ]
+        f"{results / 'mail.txt'} still names P007",
+    }
     assert list(withdrawals.unerased_files(study, "P007")) == []
     assert (study.exclusions.read_text("utf-8"), study.ids()) == (COLUMNS, ("P0071",))
     for path in (study.fingerprints, study.reversed_exclusions):
-        assert path.read_text("utf-8").splitlines() == lists[path][1:]
+        assert path.read_text("utf-8") == f"{lists[path][1]}\n"
     assert withdrawals.withdraw(north, "P007", by="CD", reason="again").folders == ()
     assert study.ignore.read_text("utf-8").splitlines() == ["rebuilt.txt", "withdrawals.jsonl"]
     assert [(it.participant, it.by, it.reason) for it in withdrawals.tombstones(study).values()] == [
         ("P007", "AB", "asked"),
     ]  # fmt: skip
-    study.withdrawals.write_bytes(study.withdrawals.read_bytes().replace(b'"at": "', b'"at": "on '))
-    with pytest.raises(StoreError, match="line 1 is not a withdrawal"):
+
+
+HELD = {"session": 2, "begun": "b" * 64, "checksums": "c" * 64, "fingerprint": "k3vq-7m2p-xw4d"}
+TOMBSTONE = {"participant": "P007", "at": AT, "by": "AB", "reason": "asked", "sessions": [HELD]}
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"at": "on Monday"}, {"participant": "P-7"}, {"participant": 7}, {"by": 7}, {"reason": None}, {"more": 1},
+        {"sessions": 7}, {"sessions": [7]},
+        *({"sessions": [HELD, HELD | {name: wrong}]} for name, wrong in (
+            ("session", "2"), ("begun", 7), ("checksums", None), ("fingerprint", []), ("more", 1),
+        )),
+    ],
+)  # fmt: skip
+def test_a_line_that_is_no_withdrawal_is_refused_with_its_number(tmp_path: Path, change: dict[str, Any]) -> None:
+    study = StudyFolder(tmp_path)
+    lines = [TOMBSTONE, TOMBSTONE | {"participant": "P011", "by": "CD"}]
+    text = "\n".join(json.dumps(line) for line in lines)
+    study.withdrawals.write_text(f"{text}\n \n", encoding="utf-8", newline="\n")
+    first, second = withdrawals.tombstones(study).values()
+    assert (first.participant, first.at, first.by, first.reason) == ("P007", AT, "AB", "asked")
+    assert first.sessions == (withdrawals.ErasedSession(**HELD),)  # type: ignore[arg-type]
+    assert (second.participant, second.by) == ("P011", "CD")
+    study.withdrawals.write_text(f"{text}\n \n{json.dumps(TOMBSTONE | change)}\n", encoding="utf-8", newline="\n")
+    with pytest.raises(StoreError, match=f"^{escape(str(study.withdrawals))}, line 4 is not a withdrawal: restore it"):
         withdrawals.tombstones(study)
+
+
+def test_a_copy_has_a_key_or_sessions_and_an_export_the_name_of_the_study(tmp_path: Path) -> None:
+    study, also = tmp_path / "mine", tmp_path / "disk"
+    places = {
+        name: also / f"{number} {name}"
+        for number, name in enumerate(("key", "sessions", "export", "other", "of BIDS", "x"))
+    }
+    for folder in (study, *places.values()):
+        (folder / "data").mkdir(parents=True)
+        name = "shaking" if folder == places["other"] else "stirring"
+        field = "Name" if folder == places["of BIDS"] else "name"
+        StudyFolder(folder).description.write_text(json.dumps({field: name}), encoding="utf-8", newline="\n")
+    for folder in (study, places["sessions"]):
+        (folder / "data" / "sub-P007" / "ses-01").mkdir(parents=True)
+    (places["key"] / "blinding").mkdir()
+    StudyFolder(places["key"]).key.write_bytes(b"")
+    (places["x"] / "data").rmdir()
+    copies, exports = withdrawals._find_copies(StudyFolder(study), [tmp_path, also])
+    assert [copy.path for copy in copies] == [places["key"], places["sessions"]]
+    assert [export.path for export in exports] == [places["export"]]
+    with pytest.raises(StoreError, match=f"^{escape(str(tmp_path / 'none'))} is not a folder: --also requires"):
+        withdrawals._find_copies(StudyFolder(study), [tmp_path / "none"])
 
 
 def test_a_decision_of_a_person_or_a_rule_is_reversed_with_its_own_words(tmp_path: Path) -> None:
@@ -371,11 +427,66 @@ def test_plug_ins_are_named_by_package_and_version(tmp_path: Path, monkeypatch: 
         ],
         "c": None,
     }
-    monkeypatch.setattr(receipt, "read", lambda path: {"plug_ins": held[path.name]})
-    assert receipt.recorded_plug_ins(tmp_path / name for name in held) == {
+    monkeypatch.setattr(receipt, "read", lambda path: {"plug_ins": held[path.name]} if path.name in held else {})
+    assert receipt.recorded_plug_ins(tmp_path / name for name in ("none", *held)) == {
         "oils 1.2": ["method ladder", "task swirl"],
         "oils 1.3": ["task tilt"],
     }
+
+
+@pytest.mark.parametrize(
+    ("name", "edit", "codes", "compares", "orders"),
+    [
+        (
+            "viscosityjnd", ("", ""), {"training": ["practice"], "viscosity": ["V1", "V2", "V3", "V4"]},
+            [None, "liquids"],
+            [("interleaved", [20], "training/answer"), ("interleaved", [55] * 4, "viscosity/answer")],
+        ),
+        (
+            "thickness", ("kind = \"estimation\"", "kind = \"estimation\"\nmodulus = { level = 0.321, number = 10 }"),
+            {"thickness": ["A1"]}, ["liquids"], [("interleaved", [37], "thickness/answer")],
+        ),
+        (
+            "demo", ("", ""), {"liquids": ["L1", "L2"], "delays": ["D1", "D2"]}, ["liquids", "delays"],
+            [("shuffled", None, "liquid"), ("shuffled", None, "delay")],
+        ),
+    ],
+)  # fmt: skip
+def test_a_receipt_publishes_codes_and_what_is_compared_but_no_condition(
+    name: str, edit: tuple[str, str], codes: dict[str, Any], compares: list[Any], orders: list[Any]
+) -> None:
+    protocol = parse(source_bytes(name).decode().replace(*edit).encode(), name)
+    shown = receipt.without_conditions(protocol)
+    assert {"liquids", "conditions", "stimuli", "methods"}.isdisjoint(shown)
+    blocks = shown["blocks"].values()
+    assert {"conditions", "standard", "stimulus", "standards", "method"}.isdisjoint(
+        key for table in blocks for key in table
+    )
+    assert {block: table["codes"] for block, table in shown["blocks"].items()} == codes
+    assert [table["compares"] for table in blocks] == compares
+    assert [(table["order"], table.get("slots"), table["questionnaire"]) for table in blocks] == orders
+    for table in blocks:
+        assert shown["questionnaires"][table["questionnaire"]]["items"]
+    assert "0.321" not in json.dumps(shown)
+    assert not any("modulus" in design for design in shown.get("designs", {}).values())
+
+
+@pytest.mark.parametrize(
+    "name", ["versions", "device", "screens", "clock", "protocol", "motors_masked", "outlets", "outlets_lost", "video"]
+)
+def test_a_section_of_a_receipt_is_a_table_and_others_are_of_their_kind(tmp_path: Path, name: str) -> None:
+    path = tmp_path / "receipt.json"
+    wrong = [(name, 7), (name, [1]), ("plug_ins", {}), ("resumed", "x"), ("started_at", "noon"), ("ended_at", 7)]
+    for field, value in wrong:
+        receipt.write(path, {"key_hash": "a" * 64, field: value})
+        with pytest.raises(StoreError, match=f"is not a receipt \\({field} is "):
+            receipt.read(path)
+    valid = {"key_hash": "a" * 64, name: {"b": 1}, "plug_ins": [], "resumed": [{}], "started_at": AT, "ended_at": None}
+    receipt.write(path, valid)
+    assert receipt.read(path) == valid
+    path.write_text('{"seed": 1}', encoding="utf-8", newline="\n")
+    with pytest.raises(StoreError, match=r"is not a receipt \(no key_hash\): restore it from a backup$"):
+        receipt.read(path)
 
 
 @pytest.mark.parametrize(
