@@ -1,22 +1,29 @@
 """The runner in a world of fakes: what it asks of whom, in which order, and what it makes of samples and buttons."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
+from study_app.errors import SessionError
 from study_app.haptics.model.layout import LIMITER_NAMES
 from study_app.session.device_buttons import ANSWERS, CONTINUE, DeviceButtons
-from study_app.session.pages import PausePage, QuestionnairePage, TaskPage
+from study_app.session.pages import PausePage, QuestionnairePage, TaskPage, TextPage, TroublePage
 from study_app.session.transitions.events import (
     Begin,
     Broke,
+    Continue,
     EndRequested,
+    ForceStopped,
+    Note,
     PauseRequested,
     Reconnected,
     ResumeRequested,
+    Submitted,
 )
 from study_app.session.transitions.state import Phase
+from study_app.store.journals.journal_events import Event
 from tests.golden import compare
 from tests.session.fakes import World, step
 from tests.session.runner.played_worlds import begun, play
@@ -92,6 +99,51 @@ def test_the_row_of_a_trial_sums_up_its_samples_and_frames(
     assert isinstance(world.pages[-1], page)
 
 
+def test_the_force_ends_first_then_a_line_is_written_and_then_its_page_is_shown(world: World) -> None:
+    """A trial's scene is loaded with the first frame of its page."""
+    world.runner.on_change(lambda _state: world.log.append("told"))
+    trial, pause = ["trial_started", "TaskPage", "load", "told"], ["paused", "PausePage", "told"]
+    written = 0
+    for kind, words, asked, waited, force_is_on, scene in (
+        (Begin, (), ["page_shown", "TextPage", "told"], [], True, 0),
+        (Continue, (), ["page_left", *trial], ["page_left"], True, 1),
+        (PauseRequested, ("operator",), ["rest", "trial_ended", *pause], [], True, 0),
+        (ResumeRequested, ("operator",), ["resumed", *trial], [], True, 2),
+        (
+            ForceStopped, ("operator",),
+            ["stop_force", "stop_force", "rest", "trial_ended", "force_stopped", *pause], [], False, 0,
+        ),
+        (
+            ResumeRequested, ("operator",),
+            ["resumed", "force_restored", "fade_in", *trial], [], True, 3,
+        ),
+        (None, (), ["stop_force", "rest", "trial_ended", "broke", "TroublePage", "told"], [], False, 0),
+        (
+            Reconnected, ({"name": "memory"},),
+            ["stop_force", "device_reconnected", *pause], ["device_reconnected"], False, 0,
+        ),
+        (
+            EndRequested, ("aborted", "fire"),
+            ["finish", "EndPage", "told"], [], False, 0,
+        ),
+    ):  # fmt: skip
+        world.servo.fault = "the cable" if kind is None else None
+        world.run(0.25)
+        if kind is not None:
+            world.runner.post(kind(world.clock(), *words))
+        assert (world.log, world.journal.waited) == (asked, waited)
+        assert (world.servo.force_is_on, world.servo.scene) == (force_is_on, scene)
+        assert world.runner.cause == ("the cable" if "TroublePage" in asked else "")
+        assert {line["t_s"] for line in world.journal.lines[written:]} <= {world.clock()}
+        written = len(world.journal.lines)
+        world.log.clear()
+        world.journal.waited.clear()
+    outcomes = [(line["attempt"], line["outcome"], line["t_s"]) for line in world.journal.of("trial_ended")]
+    assert outcomes == [(1, "interrupted", 0.75), (2, "interrupted", 1.25), (3, "interrupted", 1.75)]
+    assert world.runner.finished
+    assert not world.runner.ending
+
+
 @pytest.mark.parametrize(("button", "way"), [(ANSWERS[0], -1), (ANSWERS[1], 1)])
 def test_the_second_button_steps_to_less_and_the_third_to_more(world: World, button: int, way: int) -> None:
     buttons = DeviceButtons()
@@ -136,6 +188,50 @@ def test_lines_that_are_not_on_the_disk_stop_the_force_until_they_are(world: Wor
     assert [line["outcome"] for line in world.journal.of("trial_ended")] == ["interrupted"]
     world.runner.post(EndRequested(world.clock(), "aborted", "fire"))
     assert (world.runner.finished, world.journal.status) == (True, "aborted")
+
+
+def test_what_a_full_disk_refused_is_written_once_a_second_later(world: World, monkeypatch: pytest.MonkeyPatch) -> None:
+    attempts: list[float] = []
+    append = world.journal.append
+
+    def counted(event: Event, **options: Any) -> None:
+        attempts.append(world.clock())
+        append(event, **options)
+
+    monkeypatch.setattr(world.journal, "append", counted)
+    world.runner.post(Begin(0.0))
+    world.run(0.1)
+    world.journal.fails_after = len(world.journal.lines)
+    attempts.clear()
+    world.runner.post(Continue(world.clock()))
+    assert (world.runner.stalled, world.journal.lines[-1]["event"]) == ("disk full", "page_shown")
+    for seconds in (0.9, 0.099, 0.001, 0.9, 0.099):
+        world.run(seconds)
+    assert [round(at_s, 3) for at_s in attempts] == [0.1, 1.1]
+    world.journal.fails_after = None
+    world.run(0.001)
+    assert (world.runner.stalled, world.state.phase) == (None, Phase.PAUSED)
+    assert [(line["event"], line["t_s"]) for line in world.journal.lines[1:3]] == [
+        ("page_left", 0.1), ("trial_started", 0.1),
+    ]  # fmt: skip
+    assert [line["event"] for line in world.journal.lines].count("page_left") == 1
+    assert [type(page) for page in world.pages] == [TextPage, TroublePage, TroublePage, TaskPage, PausePage]
+
+
+def test_an_event_that_is_not_allowed_changes_nothing_and_those_posted_with_it_are_applied(world: World) -> None:
+    world.on_page = lambda page: world.runner.post(Note(world.clock(), "mark", type(page).__name__))
+    world.runner.post(Begin(0.0))
+    assert [line["text"] for line in world.journal.of("note")] == ["TextPage"], "posted while the page was presented"
+    before = world.state
+    with pytest.raises(SessionError):
+        world.runner.post(Submitted(1.0))
+    assert (world.state, world.runner.task, world.runner.view(0)) == (before, None, None)
+    world.runner.frame_shown(0, 0)
+    world.on_page = lambda _page: (world.runner.post(Begin(1.0)), world.runner.post(Note(1.0, "mark", "late")))[0]
+    with pytest.raises(SessionError):
+        world.runner.post(Continue(1.0))
+    assert [line["text"] for line in world.journal.of("note")] == ["TextPage", "late"]
+    assert world.state.phase is Phase.TASK
 
 
 def test_the_end_of_a_session_waits_for_its_recordings() -> None:
