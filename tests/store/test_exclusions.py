@@ -13,6 +13,7 @@ from hypothesis.stateful import RuleBasedStateMachine, rule, run_state_machine_a
 from study_app.errors import StoreError
 from study_app.store import unblinding
 from study_app.store.exclusions import Exclusion, exclude, exclusions, include, keep, reversals
+from study_app.store.files.folders import StudyFolder
 from study_app.store.unblinding import RULES, late_exclusions, unblind
 from study_app.store.verification.whole_study import verify_study
 from tests.platforms import files_up_to, needs_links
@@ -94,6 +95,23 @@ def test_in_a_list_of_an_earlier_version_times_decide_what_is_late(folder: Path)
     assert verify_study(folder).is_sound
     exclude(folder, "P007", 1, trial=1, by="AB", reason="tired")
     assert [row.key_open for row in exclusions(folder)] == [None, None, True]
+
+
+def test_the_first_reveal_in_whole_seconds_decides_what_is_late_in_an_earlier_list(tmp_path: Path) -> None:
+    (tmp_path / "blinding").mkdir()
+    moments = "2026-03-02T09:30:05+01:00", "2026-03-02T09:30:01+01:00", "2026-03-02T09:30:09+01:00"
+    records = [{"at": at, "by": "AB", "reason": "analysis", "key_hash": "a" * 64} for at in moments]
+    StudyFolder(tmp_path).reveals.write_text("".join(f"{json.dumps(it)}\n" for it in records), "utf-8", newline="\n")
+    times = ("09:30:01.999+01:00", "09:30:02.000+01:00", "08:30:01.500+00:00", "08:30:02.500+00:00", "noon")
+    rows = [
+        Exclusion(
+            participant="P7", session=number, trial=None, rule_or_person="AB", reason="", excluded_at=f"2026-03-02T{at}"
+        )
+        for number, at in enumerate(times, start=1)
+    ]
+    assert [row.session for row in late_exclusions(tmp_path, rows)] == [2, 4]
+    judged = [replace(row, key_open=row.session > 3) for row in rows]
+    assert [row.session for row in late_exclusions(tmp_path, judged)] == [4, 5], "no times are compared"
 
 
 def test_a_rule_excludes_no_session_that_a_person_included_again(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,6 +1,7 @@
 """Before unblinding no table tells a condition; after it every table is what an open study's would have been."""
 
 import csv
+import json
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
@@ -11,6 +12,7 @@ import pytest
 from study_app.protocol.model import Protocol, StudyHead
 from study_app.store import unblinding as module
 from study_app.store.blinded.blinding import open_events, open_or_draw_key, reveal
+from study_app.store.exclusions import Exclusion
 from study_app.store.files.columns import SEALED, TRIALS
 from study_app.store.files.csv_files import header, unsealed_columns
 from study_app.store.files.folders import REBUILT, StudyFolder
@@ -23,6 +25,8 @@ from study_app.store.verification.whole_study import verify_study
 from tests.journal_lines import event_of, raw
 from tests.store.conftest import SOURCE, Attend, Start, ticking_clock
 from tests.store.forging import Lines, cover_up, forge
+
+AT = "2026-03-02T09:30:00.000+01:00"
 
 
 def names(path: Path) -> set[str]:
@@ -75,7 +79,11 @@ def test_unblinding_gives_what_an_open_study_would_have_held(
     before, sealed_tables = (tables_in(folder) for folder in folders)
     assert before.keys() == sealed_tables.keys()
     assert before != sealed_tables
-    found = unblind(folders[1], "AB", "done")
+    steps: list[tuple[str, float]] = []
+    found = unblind(folders[1], "AB", "done", lambda step, done: steps.append((step, done)))
+    assert steps == [
+        ("opening session 1 of 2", 0.0), ("opening session 2 of 2", 1 / 3), ("writing the tables of the study", 2 / 3),
+    ]  # fmt: skip
     assert found.left == ()
     assert set(found.codes) == {"practice", "liquids", "delays"}
     assert tables_in(folders[1]) == before
@@ -184,6 +192,63 @@ def test_a_study_of_an_earlier_version_stays_sound_sealed_and_opened(
     assert store.folder.table("brackish", "trials").read_bytes() == held
     assert names(later.folder.table("brackish", "trials")) == set(header(TRIALS))
     assert sound(folder)
+
+
+@pytest.fixture
+def sites(tmp_path: Path) -> Path:
+    """A merged study of two sites, of which the keys were not opened."""
+    held = {"merged_at": AT, "key_hash": "a" * 64, "sessions": 1, "withdrawals": 0}
+    for name in ("north", "south"):
+        (tmp_path / "both" / "sites" / name / "blinding").mkdir(parents=True)
+    listed = {"format": 2, "study": "stirring", "protocol_hash": "c" * 64}
+    listed |= {"sites": [{"name": name, **held} for name in ("north", "south")]}
+    (tmp_path / "both" / "sites.json").write_text(json.dumps(listed), encoding="utf-8", newline="\n")
+    return tmp_path / "both"
+
+
+def test_a_merged_study_is_opened_site_by_site(sites: Path) -> None:
+    records = {
+        site: {"at": AT, "by": by, "reason": f"{site} is done", "key_hash": "a" * 64}
+        for site, by in (("south", "CD"), ("north", "AB"))
+    }
+    for site, opened in (("south", False), ("north", True)):
+        assert not module.has_opened_keys(sites)
+        path = StudyFolder(sites / "sites" / site).reveals
+        path.write_text(f"{json.dumps(records[site])}\n", encoding="utf-8", newline="\n")
+        assert module.has_opened_keys(sites / "sites" / site)
+        assert module.has_opened_keys(sites) == opened
+    assert module.reveals_of(sites) == tuple({"site": site, **records[site]} for site in ("north", "south"))
+    assert module.reveals_of(sites / "sites" / "south") == (records["south"],)
+    assert not module.is_unblinded(sites), "the columns are not described yet"
+
+
+def test_all_keys_are_verified_before_the_first_is_opened_and_exclusions_name_the_site(
+    sites: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[Any] = []
+
+    def opened(folder: Path, *words: object) -> module.Unblinded:
+        asked.append((folder.name, *words))
+        row = Exclusion(
+            participant="P7", session=2, trial=None, rule_or_person=module.RULE, reason=folder.name, excluded_at=AT
+        )
+        return module.Unblinded({"b": {"A1": folder.name}}, (f"{folder.name} is left",), (row,))
+
+    monkeypatch.setattr(module, "unblind", opened)
+    monkeypatch.setattr(module, "verified_key", lambda study: asked.append(study.path.name))
+    done = module.unblind_folder(sites, "AB", "closed", print)
+    words = ("AB", "closed", print)
+    assert asked == ["north", "south", ("north", *words), ("south", *words)]
+    assert {prefix: (it.codes, it.left) for prefix, it in done.items()} == {
+        f"{site}-": ({"b": {"A1": site}}, (f"{site} is left",)) for site in ("north", "south")
+    }
+    rows = [row for result in done.values() for row in result.excluded]
+    assert [(row.participant, row.session, row.reason) for row in rows] == [
+        ("north-P7", 2, "north"), ("south-P7", 2, "south"),
+    ]  # fmt: skip
+    asked.clear()
+    assert list(module.unblind_folder(sites / "sites" / "south", "AB", "closed", print)) == [""]
+    assert asked == [("south", *words)]
 
 
 def test_catch_trials_are_judged_block_by_block(finished: Start, monkeypatch: pytest.MonkeyPatch) -> None:

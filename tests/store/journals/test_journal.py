@@ -145,6 +145,35 @@ def test_a_journal_is_neither_written_over_nor_continued_after_another_program(t
         read(tmp_path / "none.jsonl")
 
 
+def test_an_answer_keeps_when_it_was_first_shown_and_chosen_and_counts_its_changes() -> None:
+    shown = journal_events.Answer().shown(2.0)
+    assert shown.shown(3.0) == shown == journal_events.Answer(onset_s=2.0)
+    first = shown.chosen(4.0, 3)
+    assert first == journal_events.Answer(onset_s=2.0, first_s=4.0, last_s=4.0, changes=0, value=3)
+    assert first.chosen(5.0, 3) == first, "the same choice again changes nothing"
+    changed = first.chosen(6.0, 5).chosen(7.0, None)
+    assert changed == journal_events.Answer(onset_s=2.0, first_s=4.0, last_s=7.0, changes=2, value=None)
+    assert changed.chosen(8.0, None) == changed
+    assert changed.removed() == shown
+    assert [answer.given for answer in (shown, first, changed, changed.removed())] == [False, True, True, False]
+
+
+def test_a_closed_journal_takes_no_line_and_says_what_was_lost(tmp_path: Path) -> None:
+    path = three_answers(tmp_path / "journal.jsonl")
+    journal = Journal.reopen(path, scan(path), SessionClock())
+    assert not journal.is_closed
+    fifth = journal.append(event_of("counted", value=5))
+    journal.close()
+    assert journal.is_closed
+    assert (fifth.n, read(path)[-1]) == (5, fifth)
+    with pytest.raises(StoreError) as refused:
+        journal.append(event_of("counted", value=6))
+    assert str(refused.value) == (
+        f"{path} is closed: 'counted' occurred after the end of the session and was not recorded"
+    )
+    assert len(read(path)) == 5
+
+
 def test_what_a_reader_would_call_damage_is_not_written(tmp_path: Path) -> None:
     path = tmp_path / "journal.jsonl"
     with Journal.create(path) as journal:
