@@ -1,17 +1,19 @@
 """A trial that runs: a ball that is hidden and a video, drawn as late as everything else; video frames are counted."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, cast
 
 import pytest
 
 from study_app.errors import VideoError
+from study_app.haptics.model.layout import LIMITER_GLITCH
 from study_app.haptics.model.scene import Scene
 from study_app.protocol.trials.stimuli import Stimulated
 from study_app.protocol.trials.tasks import Explore, Follow
 from study_app.session.tasks import TaskView
 from study_app.session.transitions.events import StartTrial
-from study_app.session.trial import _MIN_SETTING_S, SETTLED_S, Recording, RunningTrial
+from study_app.session.trial import _MIN_SETTING_S, SETTLED_S, Recording, RunningTrial, is_ball_at_start, resting_view
 from study_app.video.frames import VideoFrame, VideoStatistics
 from tests.session.fakes import FakeServo
 
@@ -87,6 +89,76 @@ def test_a_task_is_over_when_its_end_was_drawn_with_the_longest_delay() -> None:
         lasted_ms += 1
     assert lasted_ms == 1 + round(1000 * (1 + DELAY_S + SETTLED_S)), "the first sample comes after a millisecond"
     assert trial.outcome() == "complete"
+
+
+def test_a_trial_counts_its_own_samples_up_to_its_end_and_no_glitch() -> None:
+    """The first second belongs to the scene before; the task ends after 1 s, and a refused sample moves no ball."""
+    trial, servo = painted(Explore(kind="explore", instruction="Move", min_s=1, max_s=1), hides_ball=False)
+    assert trial.follow(servo.telemetry.read()) == []
+    servo.scene = 0
+    servo.run(1.0)
+    servo.scene = 1
+    servo.run(0.4, device_force_n=(0.0, 3.0, 4.0))
+    servo.run(0.001, (1.0, 1.0, 1.0), limiters=LIMITER_GLITCH)
+    servo.run(1.0, (0.0, 0.03, 0.04), device_force_n=(0.0, 0.0, 2.0))
+    assert trial.outcome() is None
+    trial.follow(servo.telemetry.read())
+    row = trial.summary()
+    assert (row["ticks"], row["limiter_glitch"], row["duration_s"]) == (1001, 1, 1.0)
+    assert row["path_length_m"] == pytest.approx(0.05)
+    assert row["force_mean_n"] == pytest.approx((400 * 5.0 + 600 * 2.0) / 1001)
+    assert (trial.samples["time_ns"][0], trial.samples["time_ns"][-1]) == (1_501_000_000, 2_501_000_000)
+    servo.run(0.5)
+    assert trial.follow(servo.telemetry.read()) == []
+    assert trial.summary() == row
+
+
+def test_a_trial_is_frozen_by_a_gap_of_more_than_a_second_in_ticks_or_frames() -> None:
+    trial, servo = begun(TASK)
+    servo.worst_gap_s = 1.5
+    assert not trial.frozen, "it has not begun"
+    trial.frame(servo.now_ns(), servo.now_ns())
+    assert trial.frozen
+    servo.worst_gap_s = 1.0
+    servo.run(5.0)
+    assert not trial.frozen, "without a window only the first frame is reported"
+    trial.frame(servo.now_ns(), servo.now_ns())
+    servo.run(1.0)
+    assert trial.frozen, "5 s between the frames"
+
+
+@pytest.mark.parametrize(("task", "lit", "start_m"), [(SWING, 0, (0.0, 0.0, 0.0)), (TASK, None, None)])
+def test_a_rest_draws_the_ball_as_it_is_and_the_target_at_its_start(task: Any, lit: int | None, start_m: Any) -> None:
+    servo = FakeServo([])
+    servo.run(0.3, (0.0, 0.0, 0.006))
+    view = resting_view(cast(Any, servo), task, servo.now_ns())
+    assert (view.position_m.tolist(), view.sample_time_ns) == ([0.0, 0.0, 0.006], servo.now_ns() - 2_000_000)
+    assert view.task == TaskView(lit=lit, reached=0, of=None, dwell=0.0, elapsed_s=0.0, target_m=start_m)
+    assert (view.ball_hidden, view.video) == (False, None)
+    assert is_ball_at_start(view, task)
+    servo.run(0.3, (0.0, 0.0, 0.0061))
+    assert is_ball_at_start(resting_view(cast(Any, servo), task, servo.now_ns()), task) == (start_m is None)
+
+
+def test_a_level_is_adjusted_from_the_first_frame_until_the_time_is_over() -> None:
+    trial, servo = begun(TASK)
+    adjusting = replace(trial.command, adjusts=True, task=TASK.model_copy(update={"min_s": 0.5, "max_s": 1.5}))
+    trial = RunningTrial(
+        adjusting, Scene(), late_s=0.05, servo=servo, reader=servo.telemetry.reader(),
+        recording=Recording(None, servo.rate_hz), paints=False,
+    )  # fmt: skip
+    assert not trial.adjustable
+    trial.frame(servo.now_ns(), servo.now_ns())
+    assert trial.adjustable
+    scene = Scene(scale=2.0)
+    assert (trial.adjust(None, 0.3), trial.adjust(scene, 0.2)) == (None, 2)
+    assert servo.scenes[-1] is scene
+    assert trial.view(servo.now_ns()).sample_time_ns == servo.now_ns() - 202_000_000
+    for seconds, outcome, adjustable in ((1.2, None, True), (0.35, None, False), (0.1, "timeout", False)):
+        servo.run(seconds)
+        trial.follow(servo.telemetry.read())
+        assert (trial.outcome(), trial.adjustable) == (outcome, adjustable)
+    assert trial.summary()["delivered_error"] is None, "the participant set the force"
 
 
 def frame(number: int, due_ns: int, age_ns: int | None = None) -> VideoFrame:
