@@ -1,12 +1,13 @@
 """The runner in a world of fakes: what it asks of whom, in which order, and what it makes of samples and buttons."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from study_app.errors import SessionError
+from study_app.errors import ServoFault, SessionError
 from study_app.haptics.model.layout import LIMITER_NAMES
 from study_app.session.device_buttons import ANSWERS, CONTINUE, DeviceButtons
 from study_app.session.pages import PausePage, QuestionnairePage, TaskPage, TextPage, TroublePage
@@ -21,6 +22,7 @@ from study_app.session.transitions.events import (
     Reconnected,
     ResumeRequested,
     Submitted,
+    TimeUp,
 )
 from study_app.session.transitions.state import Phase
 from study_app.store.journals.journal_events import Event
@@ -216,6 +218,34 @@ def test_what_a_full_disk_refused_is_written_once_a_second_later(world: World, m
     ]  # fmt: skip
     assert [line["event"] for line in world.journal.lines].count("page_left") == 1
     assert [type(page) for page in world.pages] == [TextPage, TroublePage, TroublePage, TaskPage, PausePage]
+
+
+def test_a_servo_that_refuses_a_scene_ends_the_force_and_is_told_to_the_operator(world: World) -> None:
+    world.runner.post(Begin(0.0))
+    world.run(0.5)
+    world.servo.refuses = ServoFault("its thread ended")
+    world.log.clear()
+    world.runner.post(Continue(world.clock()))
+    assert world.state.phase is Phase.TROUBLE
+    assert (world.runner.cause, world.servo.force_is_on) == ("its thread ended", False)
+    (line,) = world.journal.of("broke")
+    assert (line["what"], line["t_s"]) == ("its thread ended", 0.5)
+    assert world.log[:3] == ["page_left", "trial_started", "TaskPage"]
+    assert "stop_force" in world.log[3:]
+    assert isinstance(world.pages[-1], TroublePage)
+
+
+@pytest.mark.parametrize("phase", [Phase.RESTING, Phase.FEEDBACK])
+def test_a_rest_and_feedback_end_at_their_time(world: World, monkeypatch: pytest.MonkeyPatch, phase: Phase) -> None:
+    posted: list[Any] = []
+    monkeypatch.setattr(world.runner, "post", posted.append)
+    world.runner._state = replace(world.state, phase=phase, until_s=2.0, index=1)
+    for seconds in (1.0, 0.999):
+        world.run(seconds)
+    assert posted == []
+    world.run(0.001)
+    assert posted == [TimeUp(2.0)]
+    assert (world.runner.view(world.servo.now_ns()) is None) == (phase is Phase.FEEDBACK)
 
 
 def test_an_event_that_is_not_allowed_changes_nothing_and_those_posted_with_it_are_applied(world: World) -> None:
