@@ -29,7 +29,7 @@ def begun(task: Any, recorder: Any = None, **more: Any) -> tuple[RunningTrial, F
     servo.run(0.5)
     reader = servo.telemetry.reader()
     command = StartTrial(
-        trial=1, attempt=1, task=task, presented=Stimulated("presented"), delay_s=DELAY_S, linger_s=DELAY_S
+        trial=3, attempt=2, task=task, presented=Stimulated("presented"), delay_s=DELAY_S, linger_s=DELAY_S
     )
     recording = Recording(recorder, servo.rate_hz)
     trial = RunningTrial(
@@ -153,7 +153,11 @@ def test_a_level_is_adjusted_from_the_first_frame_until_the_time_is_over() -> No
     scene = Scene(scale=2.0)
     assert (trial.adjust(None, 0.3), trial.adjust(scene, 0.2)) == (None, 2)
     assert servo.scenes[-1] is scene
-    assert trial.view(servo.now_ns()).sample_time_ns == servo.now_ns() - 202_000_000
+    view = trial.view(servo.now_ns())
+    assert view.sample_time_ns == servo.now_ns() - 202_000_000
+    trial.adjust(None, 0.05)
+    trial.frame(servo.now_ns(), view.sample_time_ns)
+    assert trial.summary()["delay_error_max_ms"] == 2.0, "the frame was drawn before the last step"
     for seconds, outcome, adjustable in ((1.2, None, True), (0.35, None, False), (0.1, "timeout", False)):
         servo.run(seconds)
         trial.follow(servo.telemetry.read())
@@ -221,6 +225,7 @@ def test_the_video_is_as_late_as_the_ball_and_both_are_recorded() -> None:
     trial.frame(servo.now_ns() + 5, view.sample_time_ns)
     assert video.calls[-1] == ("begin", servo.now_ns() + 5)
     assert recorder.frames == [(servo.now_ns() + 5, view.sample_time_ns, view.video)]
+    assert recorder.started == [(3, 2, 1000.0, None)]
     for _ in range(30):
         servo.run(0.016)
         view = trial.view(servo.now_ns())
