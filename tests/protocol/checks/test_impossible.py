@@ -1,7 +1,12 @@
 """Studies that could be read, but in which nothing would be felt, nothing would differ, or no trial could end."""
 
+from types import SimpleNamespace
+from typing import Any
+
 import pytest
 
+from study_app.haptics.model.scene import Box, Cylinder, Everywhere
+from study_app.protocol.checks.consistency import _is_within_tank, felt_numbers
 from study_app.protocol.load import load, parse
 from study_app.protocol.source.files import source_bytes
 from study_app.protocol.warnings.study_warnings import warnings
@@ -34,3 +39,36 @@ def test_a_condition_that_nobody_can_perceive_is_warned_of(
         sentence for sentence in found if "not produce force" in sentence or "ball is hidden" in sentence
     } == expected
     assert expected.isdisjoint(warnings(load(study), simulates=False))
+
+
+@pytest.mark.parametrize(
+    ("region", "is_reached"),
+    [
+        (Everywhere(), True),
+        (Box(centre_m=(0.25, 0.2, -0.3), size_m=(0.101, 0.01, 0.01)), True),
+        (Box(centre_m=(0.25, 0.2, -0.3), size_m=(0.099, 0.01, 0.01)), False),
+        (Box(centre_m=(0.1, 0.32, -0.3), size_m=(0.01, 0.081, 0.01)), True),
+        (Box(centre_m=(0.1, 0.32, -0.3), size_m=(0.01, 0.079, 0.01)), False),
+        (Box(centre_m=(0.1, 0.2, -0.4), size_m=(0.01, 0.01, 0.081)), True),
+        (Box(centre_m=(0.1, 0.2, -0.4), size_m=(0.01, 0.01, 0.079)), False),
+        (Cylinder(centre_m=(0.23, 0.2, -0.4), radius_m=0.051, height_m=0.01), True),
+        (Cylinder(centre_m=(0.23, 0.2, -0.4), radius_m=0.049, height_m=0.01), False),
+        (Cylinder(centre_m=(0.1, 0.32, -0.3), radius_m=0.01, height_m=0.081), True),
+        (Cylinder(centre_m=(0.1, 0.32, -0.3), radius_m=0.01, height_m=0.079), False),
+    ],
+    ids=str,
+)
+def test_a_region_is_reached_if_it_touches_the_tank_in_the_scene(region: Any, is_reached: bool) -> None:
+    """At twice the size the tank extends 0.1, 0.08 and 0.06 m from the origin."""
+    scene: Any = SimpleNamespace(scale=2.0, origin_m=(0.1, 0.2, -0.3))
+    device: Any = SimpleNamespace(workspace_m=(0.1, 0.08, 0.06))
+    assert _is_within_tank(SimpleNamespace(region=region), scene, device) == is_reached  # type: ignore[arg-type]
+
+
+def test_two_liquids_that_differ_in_their_names_and_unused_effects_alone_feel_the_same() -> None:
+    thin, thick = (load("demo").liquids[name] for name in list(load("demo").liquids)[:2])
+    assert felt_numbers(thin) != felt_numbers(thick)
+    assert felt_numbers(thin) == felt_numbers(thin.model_copy(update={"id": "another"}))
+    changed = thin.model_copy(update={"effects": tuple(reversed(thin.effects))})
+    assert felt_numbers(thin) == felt_numbers(changed)
+    assert felt_numbers(thin) != felt_numbers(thin.model_copy(update={"density_kg_m3": thin.density_kg_m3 + 1}))
