@@ -12,7 +12,6 @@ if numba.config.DISABLE_JIT:
 from study_app.devices.doctor import DeviceFailure
 from study_app.devices.inverse3.device import address
 from study_app.devices.inverse3.opening import _check_status, _find_device, _measure_round_trip, open_session
-from study_app.devices.inverse3.service import check_force_scale
 
 SCOPED: dict[str, Any] = {
     "preset": "arm_front_centered",
@@ -80,28 +79,6 @@ def test_a_device_that_cannot_be_used_is_refused(status: dict[str, Any], at_open
         return
     with pytest.raises(DeviceFailure) as failure:
         _check_status(status, at_opening=at_opening)
-    assert failure.value.mode == mode
-
-
-@pytest.mark.parametrize("answer", [1, 1.0, {"value": 1}, {"devices/force_scale": 1.0}, {"value": 1, "other": 3}])
-def test_a_force_scale_of_1_is_accepted(answer: Any) -> None:
-    assert check_force_scale(answer) == 1.0
-
-
-@pytest.mark.parametrize(
-    ("answer", "mode", "words"),
-    [
-        (0.5, "settings", "devices/force_scale is 0.5, but must be 1"),
-        ({"value": 2}, "settings", "devices/force_scale is 2, but must be 1"),
-        (True, "unknown-scale", "no number in True"),
-        ({"value": "1"}, "unknown-scale", "no number in {'value': '1'}"),
-        ({"other": 1}, "unknown-scale", "no number in {'other': 1}"),
-        (None, "unknown-scale", "no number within 0.5 s"),
-    ],
-)
-def test_another_force_scale_is_refused_with_the_answer(answer: Any, mode: str, words: str) -> None:
-    with pytest.raises(DeviceFailure, match=words) as failure:
-        check_force_scale(answer)
     assert failure.value.mode == mode
 
 
