@@ -9,8 +9,11 @@ import pytest
 
 from study_app.errors import StoreError
 from study_app.haptics.model.layout import LIMITER_GLITCH
+from study_app.protocol.load import load
 from study_app.session import watch
+from study_app.session.pages import Interval, Progress
 from study_app.session.watch import Mark, Watched
+from tests import studies
 from tests.journal_lines import event_of
 from tests.session import small
 
@@ -187,3 +190,25 @@ def test_a_trial_without_a_recording_is_refused_with_the_reason(session: SimpleN
     session.journal = (event_of("session_started", device="scripted", language="nl"), *LINES[1:])
     with pytest.raises(StoreError, match="Hidden while the study is blinded"):
         watch.read_watched(Path("ses"), 4, attempt=2, interval=1)
+
+
+@pytest.mark.parametrize(
+    ("study", "block", "interval", "label", "of_scene"),
+    [("demo", "delays", None, "Delay setting 2", 10.0), ("viscosityjnd", "viscosity", 2, "Pair 2", 3.0)],
+)
+def test_the_tank_of_a_recorded_trial_is_that_of_its_block_with_the_ball_of_the_scene(
+    tmp_path: Path, study: str, block: str, interval: int | None, label: str, of_scene: float
+) -> None:
+    """The scene is of_scene times as large as the tank; its ball has a diameter of 68 mm."""
+    protocol = load(study)
+    with studies.begun(tmp_path / study, "P001", study) as store:
+        started: Any = event_of(
+            "trial_started", trial=7, attempt=3, block=block, phase="main", part=1, index=2, of=5, code="V2"
+        )
+        lines = [store.lines[0], event_of("language_chosen", language="nl"), started]
+        page = watch._page(store.place.study_folder, store.folder.receipt, lines, started, interval)
+        assert page.task == protocol.tasks[protocol.blocks[block].task]
+        assert (page.trial, page.workspace_m) == (7, (0.1, 0.06, 0.06))
+        assert page.body_radius_m == pytest.approx(0.034 / of_scene)
+        assert page.interval == (None if interval is None else Interval(2, 2, resting=False, announced=""))
+        assert page.progress == Progress(part=1, parts=2 if study == "demo" else 1, label=label, index=2, of=5)
