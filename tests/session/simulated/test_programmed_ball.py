@@ -163,3 +163,42 @@ def test_without_noise_an_observer_senses_what_is_presented(delays: bool) -> Non
     observer: Any = SimpleNamespace(_attended=SimpleNamespace(delays=delays))
     neutral = AdjustingObserver._neutral.fget(observer)  # type: ignore[attr-defined]
     assert AdjustingObserver._perceived_magnitude(observer, 0.4, neutral) == 0.4
+
+
+def test_a_hand_reaches_after_a_reaction_and_again_if_it_rests_outside_the_target() -> None:
+    """With this draw the reaction takes 0.275 s, and the aim errs by nothing; then by 1.5 mm along each axis."""
+    drawn, reached = [0.5], list[tuple[float, tuple[float, ...]]]()
+    device = SimpleNamespace(moving=False, reach_to=lambda *place_m: reached.append((now_s, place_m)))
+    hand = observers.Reacher(REACH, cast(Any, device), lambda: drawn[0], 0.0)
+    left, right = REACH.targets_m
+    near = (left[0], 0.005, 0.0)
+    for now_s, lit, place_m, moving in (
+        (1.0, 0, (0, 0, 0), False), (1.274, 0, (0, 0, 0), False), (1.275, 0, (0, 0, 0), False),
+        (1.3, 0, (0, 0, 0), True), (2.0, 0, (0, 0, 0), True),
+        (2.1, 0, (0, 0, 0), False), (2.3, 0, near, False), (2.5, 0, (0, 0, 0), False), (2.849, 0, (0, 0, 0), False),
+        (2.851, 0, (0, 0, 0), False), (3.0, None, near, False), (4.0, 1, (0, 0, 0), False),
+        (4.27, 1, (0, 0, 0), True), (4.28, 1, (0, 0, 0), True),
+    ):  # fmt: skip
+        device.moving = moving
+        drawn[0] = 1.0 if now_s > 4.2 else 0.5
+        task = TaskView(lit=lit, reached=0, of=4, dwell=0.0, elapsed_s=now_s)
+        assert hand.act(now_s, TankView(np.array(place_m, float), task, 0)) is False
+    assert [(at_s, pytest.approx(place_m)) for at_s, place_m in reached] == [
+        (1.275, left), (2.851, left), (4.28, tuple(axis + 0.0015 for axis in right)),
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("least_s", "drawn", "leaves_s"), [(5.0, 0.0, 10.5), (5.0, 0.9, 11.4), (1.0, 0.9, 7.4), (10.0, 0.5, 17.0)]
+)
+def test_an_exploration_is_left_a_little_after_its_least_time(least_s: float, drawn: float, leaves_s: float) -> None:
+    """A tenth to three tenths of the least time later, or of 5 s if that is longer; it began at 5 s."""
+    followed: list[Any] = []
+    device = SimpleNamespace(workspace_m=(0.05, 0.03, 0.03), follow=lambda *path: followed.append(path))
+    task = Explore(kind="explore", min_s=least_s, max_s=20, instruction="-")
+    hand = observers.Explorer(task, cast(Any, device), lambda: drawn, 5.0)
+    view = TankView(np.zeros(3), TaskView(lit=None, reached=0, of=None, dwell=0.0, elapsed_s=0.0), 0)
+    assert [hand.act(at_s, view) for at_s in (leaves_s - 1e-6, leaves_s + 1e-6)] == [False, True]
+    ((times_s, positions_m),) = followed
+    assert times_s[-1] >= leaves_s - 5.0 - 0.005
+    assert (np.abs(positions_m) <= 0.7 * np.array(device.workspace_m) + 1e-12).all()
