@@ -17,6 +17,7 @@ from study_app.errors import SessionError
 from study_app.protocol.load import parse
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Schedule, build_schedule
+from study_app.protocol.randomization import stream
 from study_app.protocol.source.files import protocol_hash, source_bytes
 from study_app.session import preflight_measurements
 from study_app.session.pages import PausePage
@@ -273,6 +274,17 @@ def test_row_that_decides_nothing_is_refused(square: Path, source: str, row_of: 
     text = source_bytes("demo") if source == "demo" else square.read_bytes()
     with pytest.raises(SessionError, match=message):
         check_choices(chosen_for(square, "P025", row_of), parse(text, "file.toml"))
+
+
+def test_a_language_that_the_study_lacks_is_refused_with_those_it_has(square: Path) -> None:
+    chosen, protocol = chosen_for(square, "P025", None), parse(square.read_bytes(), "file.toml")
+    check_choices(chosen, protocol)
+    with pytest.raises(SessionError, match=r"^language 'xx': demo is available only in en; choose one of these lang"):
+        check_choices(replace(chosen, language="xx"), protocol)
+    draws = [replace(chosen, seed=seed, participant=who).tremor().random() for seed, who in ((5, "P1"), (6, "P1"))]
+    draws += [replace(chosen, seed=5, participant="P2").tremor().random(), chosen.tremor().random()]
+    assert len(set(draws)) == 4
+    assert chosen.tremor().random() == stream(SEED, "run/P025/tremor").random() == draws[3]
 
 
 def test_run_takes_the_row_of_a_participant(square: Path, monkeypatch: pytest.MonkeyPatch) -> None:
