@@ -111,3 +111,58 @@ def test_a_linear_damper_has_its_damping_as_a_parameter() -> None:
     heavier = with_parameter(damper, "drag.damping_nspm", 20.0)
     assert value_of(heavier, "drag.damping_nspm") == 20
     assert with_parameter(heavier, "drag.law", "constant").liquids[0].drag == Drag()
+
+
+def test_sections_hold_the_parameters_that_a_liquid_has_in_the_order_of_the_model() -> None:
+    """Water names its effects, so that nothing selects them; those of honey are selected by accuracy and motion."""
+    water, honey = (
+        {section.title: [it.name for it in section.parameters] for section in sections(SCENES[name])}
+        for name in ("rek2024/water", "physical_liquids/honey")
+    )
+    assert list(water) == ["Liquid", "Wake", "Body", "Filter", "Effects", "Region", "Hand"]
+    assert list(honey) == [
+        "Liquid", "Added mass", "History", "Body", "Filter", "Effects", "Accuracy", "Region", "Hand",
+    ]  # fmt: skip
+    assert water["Liquid"] == honey["Liquid"] == ["liquid.density_kg_m3", "liquid.viscosity_pa_s", "drag.law"]
+    assert water["Filter"] == ["velocity.kind", "velocity.alpha", "knee.law", "knee.threshold_mps"]
+    assert honey["Accuracy"] == [
+        "accuracy.relative", "accuracy.absolute_n", "motion.speed_mps", "motion.acceleration_mps2",
+    ]  # fmt: skip
+    assert water["Effects"][:3] == ["effects", "effects.drag", "effects.wake"]
+    assert (water["Region"], water["Hand"]) == (["region.kind"], ["scene.scale", "scene.force_limit_n"])
+    with pytest.raises(StudyError, match=r"does not have the parameter 'history.window_s': select the effect to which"):
+        parameter(SCENES["rek2024/water"], "history.window_s")
+
+
+def test_a_component_of_a_vector_is_set_alone() -> None:
+    moved = SCENES["rek2024/water"].model_copy(update={"origin_m": (0.25, 0.5, -0.125)})
+    cylinder = with_parameter(moved, "region.kind", "cylinder")
+    region: Any = cylinder.liquids[0].region
+    assert (region.centre_m, region.radius_m, region.height_m) == ((0.25, 0.5, -0.125), 0.5, 1.0)
+    names = [it.name for it in every(cylinder) if it.name.startswith("region")]
+    centre = [f"region.centre_m.{axis}" for axis in "xyz"]
+    assert names == ["region.kind", *centre, "region.radius_m", "region.height_m"]
+    changed = with_parameter(cylinder, "region.centre_m.y", 0.75)
+    assert [value_of(changed, name) for name in centre] == [0.25, 0.75, -0.125]
+    assert [parameter(changed, name).default for name in centre] == [0.0, 0.0, 0.0]
+    assert [parameter(changed, name).label for name in centre] == ["Centre x", "Centre y", "Centre z"]
+    box = with_parameter(moved, "region.kind", "box").liquids[0].region
+    assert (box.centre_m, box.size_m) == ((0.25, 0.5, -0.125), (1.0, 1.0, 1.0))  # type: ignore[union-attr]
+
+
+def test_the_ends_of_a_range_are_permitted_and_what_is_no_choice_is_named() -> None:
+    water = SCENES["rek2024/water"]
+    density = parameter(water, "liquid.density_kg_m3")
+    assert (density.least, density.most, density.default) == (1.0, 25000.0, 1000.0)
+    for value, kept in ((1.0, 1.0), (25000.0, 25000.0), (25000.0 + 1e-6, 25000.0)):
+        assert value_of(with_parameter(water, "liquid.density_kg_m3", value), "liquid.density_kg_m3") == kept
+    for value in (0.999, 25000.1):
+        with pytest.raises(StudyError, match=r"^Density must be from 1 kg/m³ to 25000 kg/m³, not"):
+            with_parameter(water, "liquid.density_kg_m3", value)
+    with pytest.raises(StudyError, match=r"^Estimator must be one of 'ewma', 'raw', 'kalman', not 'median'$"):
+        with_parameter(water, "velocity.kind", "median")
+    with pytest.raises(StudyError, match=r"^Buoyancy must be one of 'off', 'on', not 'auto'$"):
+        with_parameter(water, "effects.buoyancy", "auto")
+    assert value_of(with_parameter(water, "effects", "auto"), "effects") == "auto"
+    states = {name: value_of(water, f"effects.{name}") for name in ("drag", "wake", "history", "buoyancy")}
+    assert states == {"drag": "on", "wake": "on", "history": "off", "buoyancy": "off"}
