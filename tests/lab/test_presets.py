@@ -71,3 +71,19 @@ def test_the_shipped_liquids_are_at_hand_with_those_of_a_folder_and_without_brok
     water = next(it for it in at_hand if (it.source, it.liquid) == ("rek2024", "water"))
     assert water.scene.velocity == Ewma()  # as its file says
     assert water.setting().origin == water.scene.model_copy(update={"velocity": Kalman()})
+
+
+def test_a_preset_says_whose_it_is_and_what_was_changed(tmp_path: Path) -> None:
+    origin = load_scene("rek2024", "honey")
+    changed = with_parameter(with_parameter(origin, "liquid.density_kg_m3", 1500.0), "velocity.kind", "raw")
+    unchanged, text = (preset_text(Setting("Honey", origin, scene)) for scene in (origin, changed))
+    assert "# Honey, as set in the liquid lab." in unchanged
+    assert "Changed from the preset" not in unchanged
+    assert "# Changed from the preset: liquid.density_kg_m3, velocity.kind." in text.splitlines()
+    path = tmp_path / "own.toml"
+    save_preset(path, text)
+    saved = available_liquids((tmp_path / "none",), saved=(str(path), str(path)))
+    assert [it for it in saved if it.source == str(path)] == [
+        Choice(source=str(path), liquid="honey", title="Honey (own)")
+    ]
+    assert saved[-1].source == str(path), "after the shipped ones"

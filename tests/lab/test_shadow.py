@@ -149,3 +149,22 @@ def test_a_tail_forgets_what_falls_off_it() -> None:
     assert tail.positions_m[:, 0] == pytest.approx(np.arange(300, 400) * 1e-4)
     assert tail.ages[0] == 1.0
     assert shadow.tail("B") is None  # honey has no wake
+
+
+def test_a_trace_holds_the_last_two_and_a_half_seconds_of_both_sides() -> None:
+    recent = module._RecentSamples()
+    assert recent.trace() is None
+    for first_ms, presented_a in ((0, True), (2000, False)):
+        a, b = records(SAMPLE, 2000), records(SAMPLE, 2000)
+        a.device_force_n, b.device_force_n = [1.0, 2.0, 3.0], [4.0, 5.0, 6.0]
+        a.velocity_mps, b.velocity_mps = [3.0, 0.0, 4.0], [0.0, 5.0, 12.0]
+        a.wake_mps, b.wake_mps = [0.0, 0.0, -7.0], [8.0, 0.0, 15.0]
+        recent.add(np.arange(first_ms, first_ms + 2000) * 1_000_000, a, b, presented_a=presented_a)
+    trace = recent.trace()
+    assert trace is not None
+    assert (len(trace.t_s), trace.t_s[-1], trace.t_s[0]) == (2500, 0.0, pytest.approx(-2.499))
+    assert (trace.force_a_n == [1.0, 2.0, 3.0]).all()
+    assert (trace.force_b_n == [4.0, 5.0, 6.0]).all()
+    assert trace.presented_a.tolist() == [True] * 500 + [False] * 2000
+    assert trace.body_mps.tolist() == [5.0] * 500 + [13.0] * 2000
+    assert ({*trace.wake_a_mps}, {*trace.wake_b_mps}) == ({7.0}, {17.0})
