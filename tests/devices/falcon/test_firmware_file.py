@@ -1,4 +1,4 @@
-"""A firmware file word by word, and the requests with which a bridge is set up, in their order."""
+"""A firmware file word by word, requests to a bridge in their order, and what a diagnosis makes of a device."""
 
 import hashlib
 from types import SimpleNamespace
@@ -10,9 +10,12 @@ import pytest
 if numba.config.DISABLE_JIT:
     pytest.skip("emulators are C functions", allow_module_level=True)
 
+import numpy as np
+
 from study_app.devices.doctor import DeviceFailure
 from study_app.devices.falcon import boot, constants
 from study_app.devices.falcon.boot import Block, BootFailure, check_firmware
+from study_app.devices.falcon.device import FalconDevice
 from study_app.devices.falcon.failures import FalconLost, FalconNotFound, UsbFailure, usb_failure
 from tests.devices.falcon.support.firmware_stream import stream, words
 
@@ -190,3 +193,88 @@ def test_an_error_of_libusb_is_told_with_its_number_and_what_was_done(
         monkeypatch.setattr("sys.platform", platform)
         expected = "busy" if (kind, platform) == ("access", "win32") else modes.get(kind, "transfer")
         assert usb_failure(code, "reading").mode == expected
+
+
+def test_a_firmware_is_loaded_only_if_none_runs(monkeypatch: pytest.MonkeyPatch, tmp_path: Any) -> None:
+    told: list[Any] = []
+    monkeypatch.setattr(boot, "configure", lambda bridge: told.append(("configure", bridge)))
+    monkeypatch.setattr(boot, "is_running", lambda _bridge: running)
+    monkeypatch.setattr(
+        boot, "boot_falcon", lambda bridge, data, progress: told.append((bridge, data)) or check_firmware(data)
+    )
+    file = tmp_path / "firmware.bin"
+    file.write_bytes(SMALL)
+    device: Any = SimpleNamespace(_firmware=file, _progress=told.append)
+    running = True
+    bridge: Any = "bridge"
+    assert FalconDevice._run_firmware(device, bridge) == "already running"
+    assert told == [("configure", "bridge")]
+    running = False
+    digest = hashlib.sha256(SMALL).hexdigest()
+    assert FalconDevice._run_firmware(device, bridge) == digest
+    assert told[2:] == [
+        f"Loading the Falcon's firmware, an unrecognised version (SHA-256 {digest[:16]}…).", ("bridge", SMALL),
+    ]  # fmt: skip
+    for firmware, reason in ((None, ""), (tmp_path / "none.bin", f"{tmp_path / 'none.bin'} cannot be read: No such")):
+        device._firmware = firmware
+        with pytest.raises(DeviceFailure) as refused:
+            FalconDevice._run_firmware(device, bridge)
+        assert refused.value.mode == "firmware-file"
+        assert reason in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("changes", "share", "seen"),
+    [
+        (
+            {}, 0.0123,
+            ("opened, serial number FT1", "program: already running", "round trip 0.31 ms; event character kept",
+             "calibration: 2026-11-20", "incomplete replies: 1.23%"),
+        ),
+        (
+            {"serial": None, "event_character": False, "calibration": "none"}, 0.0,
+            ("opened", "program: already running", "round trip 0.31 ms; event character not used",
+             "calibration: none", "incomplete replies: 0.00%"),
+        ),
+    ],
+)  # fmt: skip
+def test_what_was_seen_of_a_falcon_is_told_in_a_line_each(
+    changes: dict[str, Any], share: float, seen: tuple[str, ...]
+) -> None:
+    facts = {
+        "serial": "FT1", "firmware": "already running", "round_trip_ms": {"with": 0.31, "without": 1.9},
+        "event_character": True, "calibration": {"measured": "2026-11-20"},
+    }  # fmt: skip
+    device: Any = SimpleNamespace(found=facts | changes, _broken_share=share)
+    assert FalconDevice.observed(device) == seen
+
+
+@pytest.mark.parametrize(
+    ("counters", "share"),
+    [((101, 90), 10 / 101), ((101, 100), 0.0), ((101, 101), 0.0), ((0, 0), 0.0), ((1, 0), 0.0), ((2, 0), 0.5)],
+)
+def test_the_reply_to_the_last_packet_is_not_missing_yet(counters: tuple[int, int], share: float) -> None:
+    device: Any = SimpleNamespace(counters=dict(zip(("requests", "replies"), counters, strict=True)))
+    assert FalconDevice._broken_share.fget(device) == pytest.approx(share)  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize(
+    ("moved_m", "share", "trip_ms", "failure", "modes"),
+    [
+        (5.1e-6, 0.005, 1.99, None, set()),
+        (5e-6, 0.005, 1.99, None, {"frozen"}),
+        (1.0, 0.0051, 1.99, None, {"broken-packets"}),
+        (1.0, 0.0, 2.0, None, {"slow"}),
+        (0.0, 1.0, 9.0, None, {"frozen", "broken-packets", "slow"}),
+        (0.0, 1.0, 9.0, "unplugged", {"unplugged"}),
+    ],
+)
+def test_what_a_falcon_does_wrong_appears_in_its_samples_and_replies(
+    moved_m: float, share: float, trip_ms: float, failure: str | None, modes: set[str]
+) -> None:
+    """The first hundred samples are those before it is gripped."""
+    places_m = np.zeros((300, 3))
+    places_m[:100, 0], places_m[200, 1] = 0.3, moved_m
+    found = {"round_trip_ms": {"with": trip_ms, "without": trip_ms + 3}}
+    device: Any = SimpleNamespace(failure_mode=failure, found=found, _broken_share=share)
+    assert FalconDevice.appeared(device, {"position_m": places_m}) == modes
