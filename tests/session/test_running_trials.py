@@ -8,14 +8,15 @@ import pytest
 
 from study_app.errors import VideoError
 from study_app.haptics.model.layout import LIMITER_GLITCH
-from study_app.haptics.model.scene import Scene
+from study_app.haptics.model.scene import ForceLink, Scene
 from study_app.protocol.trials.stimuli import Stimulated
 from study_app.protocol.trials.tasks import Explore, Follow
 from study_app.session.tasks import TaskView
 from study_app.session.transitions.events import StartTrial
 from study_app.session.trial import _MIN_SETTING_S, SETTLED_S, Recording, RunningTrial, is_ball_at_start, resting_view
 from study_app.video.frames import VideoFrame, VideoStatistics
-from tests.session.fakes import FakeServo
+from tests.session import small
+from tests.session.fakes import LEFT, RIGHT, FakeServo
 
 SWING = Follow(kind="follow")
 TASK = Explore(kind="explore", instruction="Move", min_s=1, max_s=60)
@@ -163,6 +164,32 @@ def test_a_level_is_adjusted_from_the_first_frame_until_the_time_is_over() -> No
         trial.follow(servo.telemetry.read())
         assert (trial.outcome(), trial.adjustable) == (outcome, adjustable)
     assert trial.summary()["delivered_error"] is None, "the participant set the force"
+
+
+@pytest.mark.parametrize(
+    ("link", "adjusts", "has_error"),
+    [
+        (ForceLink(), False, True),
+        (ForceLink(), True, False),
+        (ForceLink(delay_s=0.02), False, False),
+        (ForceLink(loss=0.1), False, False),
+    ],
+)
+def test_a_force_is_compared_with_its_law_unless_it_is_late_or_set(
+    link: ForceLink, adjusts: bool, has_error: bool
+) -> None:
+    scene = small.protocol().scene_for("is_thick")
+    trial, servo = begun(TASK)
+    trial = RunningTrial(
+        replace(trial.command, adjusts=adjusts), scene.model_copy(update={"link": link}), late_s=0.05, servo=servo,
+        reader=servo.telemetry.reader(), recording=Recording(None, servo.rate_hz), paints=False,
+    )  # fmt: skip
+    assert trial.summary()["delivered_error"] is None, "it has not begun"
+    trial.frame(servo.now_ns(), servo.now_ns())
+    for place_m in (LEFT, RIGHT, LEFT):
+        servo.run(0.5, place_m, device_force_n=(1.0, 0.0, 0.0))
+    trial.follow(servo.telemetry.read())
+    assert (trial.summary()["delivered_error"] is not None) == has_error
 
 
 def frame(number: int, due_ns: int, age_ns: int | None = None) -> VideoFrame:
