@@ -119,6 +119,7 @@ def test_each_round_of_constant_stimuli_has_every_level_once() -> None:
     levels = [level(number) for number in range(6)]
     assert sorted(levels[:3]) == sorted(levels[3:]) == [2.0, 3.0, 5.0]
     assert levels[:3] != levels[3:]
+    assert (method.setting_s, UpDown().setting_s, UpDown().rounds(LOG)) == (0.0, 0.0, 0)
     assert Constant.model_validate({"levels": 3}).levels_of(LINEAR) == pytest.approx((10.0, 30.0, 50.0))
 
 
