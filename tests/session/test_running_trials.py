@@ -111,7 +111,7 @@ def test_a_trial_counts_its_own_samples_up_to_its_end_and_no_glitch() -> None:
     assert (trial.samples["time_ns"][0], trial.samples["time_ns"][-1]) == (1_501_000_000, 2_501_000_000)
     servo.run(0.5)
     assert trial.follow(servo.telemetry.read()) == []
-    assert trial.summary() == row
+    assert (trial.summary(), trial.outcome()) == (row, "complete")
 
 
 def test_a_trial_is_frozen_by_a_gap_of_more_than_a_second_in_ticks_or_frames() -> None:
