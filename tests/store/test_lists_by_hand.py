@@ -98,6 +98,7 @@ def test_a_merged_study_names_each_participant_and_exclusion_with_the_site(sites
     assert (merged.merged_above(alone), merged.merged_above(sites), merged.merged_above(alone.parent)) == (
         sites, None, None,
     )  # fmt: skip
+    assert merged.merged_above(sites.parent / "sites" / "north") is None, "no list of sites"
     with pytest.raises(
         StoreError, match=f"^{escape(str(alone))} is the copy of a site in the merged study {escape(str(sites))}: run"
     ):
