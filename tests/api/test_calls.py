@@ -41,6 +41,7 @@ def called(monkeypatch: pytest.MonkeyPatch) -> Called:
 def test_a_rehearsal_has_the_given_people_seed_and_folder(called: Called) -> None:
     called.replace("session.simulated.rehearsal.rehearse", Path("made"))
     assert api.rehearse("demo", np.int64(3), seed=7, results="there", recordings=False) == Path("made")
+    assert type(called.calls[0][2]["participants"]) is int, "it is stored as JSON"
     api.rehearse(Path("mine.toml"), 100_000, seed=0)
     assert called.calls == [
         ("rehearse", ("demo",), {"participants": 3, "seed": 7, "results": Path("there"), "recordings": False}),
@@ -173,10 +174,40 @@ def test_a_force_loop_has_the_limits_and_the_tank_of_the_file(
         (loaded, honey), (adjusted, lighter) = calls[3:]
         assert (loaded, honey) == ("load", scenes["honey"])
         assert (adjusted, lighter.liquids[0].id, lighter.liquids[0].density_kg_m3) == ("adjust", "honey", 700.0)
+        hand: Any = None
+        monkeypatch.setattr("study_app.devices.hand.hand_of", lambda device: hand if device == "mouse" else 1)
+        with pytest.raises(StudyError, match=r"^follow works only with simulated devices, such as 'scripted'"):
+            loop.follow([0.0], [[0.0, 0.0, 0.0]])
+        hand = SimpleNamespace(follow=lambda *path: calls.append(path))
+        loop.follow([0.0, 1.0], [[0.0, 0.0, 0.0], [0.01, 0.0, 0.0]])
+        assert calls[-1] == ([0.0, 1.0], [[0.0, 0.0, 0.0], [0.01, 0.0, 0.0]])
         with pytest.raises(StudyError, match=f"^'oil' is not in the file, which contains {', '.join(scenes)}$"):
             loop.set_liquid("oil")
     with pytest.raises(StudyError, match=r"^the force loop has ended: open it again$"):
         loop.read()
+
+
+def test_a_motion_is_a_programmed_path_a_file_or_times_and_places(called: Called, tmp_path: Path) -> None:
+    called.replace("haptics.runtime.offline.simulate", "forces")
+    called.replace("haptics.model.motion.programmed_motion", "path")
+    called.replace("haptics.model.motion.read_motion", "file")
+    scene = load_scenes("rek2024")["honey"]
+    file = tmp_path / "motion"
+    file.write_text("t_s", encoding="utf-8", newline="\n")
+    for motion, asked in (
+        ("circle", ("programmed_motion", ("circle",), {"rate_hz": scene.rate_hz})),
+        ("spiral", ("programmed_motion", ("spiral",), {"rate_hz": scene.rate_hz})),
+        ("own.csv", ("read_motion", (Path("own.csv"),), {})),
+        (file, ("read_motion", (file,), {})),
+    ):
+        assert api.simulate_force("rek2024", "honey", motion) == "forces"
+        name = "file" if asked[0] == "read_motion" else "path"
+        assert called.calls == [asked, ("simulate", (scene, name), {})]
+        called.calls.clear()
+    api.simulate_force("rek2024", "honey", ([0.0, 0.5], [[1, 2, 3], [4, 5, 6]]), density_kg_m3=700.0)
+    ((_, (changed, motion), _),) = called.calls
+    assert changed.liquids[0].density_kg_m3 == 700.0
+    assert (motion.t_s.tolist(), motion.position_m.tolist()) == ([0.0, 0.5], [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]])
 
 
 TRIALS = pd.DataFrame({"level": [0.1, 0.4], "success": [False, True]})
