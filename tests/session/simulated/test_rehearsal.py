@@ -202,6 +202,64 @@ def test_a_page_is_read_word_by_word_and_some_answers_are_changed_from_a_neighbo
         ]
 
 
+def test_each_participant_of_a_rehearsal_has_all_sessions_until_one_ends_early(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked, ran, said, grouped = list[Any](), list[str](), list[str](), list[Any]()
+
+    def run_to_end(label: str, context: Any, say: Any) -> Any:
+        assert context == "opened"
+        ran.append(label)
+        say(f"{label} ran")
+        return SimpleNamespace(lines=label)
+
+    monkeypatch.setattr(rehearsal, "open_session", lambda *words, **named: asked.append((words, named)) or "opened")
+    monkeypatch.setattr(rehearsal, "_run_to_end", run_to_end)
+    monkeypatch.setattr(rehearsal, "planned_sessions", lambda _folder, _study, _participant: 3)
+    early = {"P001, session 2": "aborted"}
+    monkeypatch.setattr(rehearsal, "progress_of", lambda lines: SimpleNamespace(ended=early.get(lines, "completed")))
+    monkeypatch.setattr(
+        rehearsal, "simulated_groups",
+        lambda folder, _study, ids, group: grouped.append((folder.path, ids, group)) or {"P001": None, "P002": "old"},
+    )  # fmt: skip
+    folder = rehearsal.rehearse(
+        "demo", participants=2, seed=9, device="falcon-emulated", results=tmp_path / "r", recordings=False,
+        group="young", progress=said.append, observer=OBSERVER,
+    )  # fmt: skip
+    assert (folder, grouped) == (tmp_path / "r", [(tmp_path / "r", ["P001", "P002"], "young")])
+    old = "P002 (group old)"
+    assert ran == ["P001", "P001, session 2", old, f"{old}, session 2", f"{old}, session 3"]
+    assert said == [
+        "P001 ran\nP001, session 2 ran", f"{old} ran\n{old}, session 2 ran\n{old}, session 3 ran",
+    ]  # fmt: skip
+    which = [(words[0].study.name, words[2], named.pop("session"), named.pop("group")) for words, named in asked]
+    assert which == [
+        *(("demo", "P001", session, None) for session in (1, 2)),
+        *(("demo", "P002", session, "old") for session in (1, 2, 3)),
+    ]
+    given = {"seed": 9, "device": "falcon-emulated", "results": tmp_path / "r", "recordings": False}
+    assert all(named == given | {"observer": OBSERVER} for _, named in asked)
+
+
+def test_every_frame_that_is_due_is_painted_a_little_later_and_seen() -> None:
+    """Half-way between 2 and 6 ms after each sixtieth of a second; a frame before there is a tank shows nothing."""
+    shown, seen = list[Any](), list[Any]()
+    views = {0: None, 16_666_667: "first", 33_333_334: "second", 50_000_001: "third"}
+    view_of = lambda at_ns: views[at_ns] and SimpleNamespace(name=views[at_ns], sample_time_ns=at_ns - 7)  # noqa: E731
+    session: Any = SimpleNamespace(
+        _next_frame_ns=0, _paint=lambda: 0.5, rig=SimpleNamespace(servo=SimpleNamespace(now_ns=lambda: now_ns)),
+        _runner=SimpleNamespace(view=view_of, frame_shown=lambda *times_ns: shown.append(times_ns)),
+    )  # fmt: skip
+    senses: Any = SimpleNamespace(see=lambda at_ns, view: seen.append((at_ns, view.name)))
+    now_ns = 40_000_000
+    assert RehearsedSession.look(session, senses).name == "second"  # type: ignore[union-attr]
+    assert shown == [(16_666_667 + 4_000_000, 16_666_660), (33_333_334 + 4_000_000, 33_333_327)]
+    assert seen == [(20_666_667, "first"), (37_333_334, "second")]
+    assert RehearsedSession.look(session, senses) is None, "no other frame is due"
+    now_ns = 50_000_001
+    assert RehearsedSession.look(session, senses).name == "third"  # type: ignore[union-attr]
+
+
 @needs_servo
 def test_a_device_that_is_lost_ends_the_rehearsal_with_a_word_why(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
