@@ -1,14 +1,26 @@
 """Orders of codes, tracks and steps of a session, from rules that a person can check: no recorded draws."""
 
+import tomllib
 from collections import Counter
 from itertools import groupby, pairwise
 from typing import Any
 
 import pytest
 
-from study_app.protocol.orders.block_orders import BlockOrder, FormOrder, Orders
-from study_app.protocol.orders.schedule import FormStep, PageStep, Trial, blocks_in_order, build_schedule, codes_of
+from study_app.protocol.model import Protocol
+from study_app.protocol.orders.block_orders import BlockOrder, FormOrder, Orders, orders_of
+from study_app.protocol.orders.schedule import (
+    FormStep,
+    PageStep,
+    Trial,
+    blocks_in_order,
+    build_schedule,
+    codes_of,
+    draw_key,
+)
 from study_app.protocol.orders.tracks import Track, track_of, tracks_of
+from study_app.protocol.randomization import stream
+from tests.protocol.edited_studies import text_of
 from tests.protocol.trials.level_studies import study
 
 
@@ -73,9 +85,11 @@ def test_places_take_all_rows_of_a_square_before_one_comes_again(order: str, exp
 def test_a_session_numbers_its_trials_and_forms_and_has_breaks_between() -> None:
     of_block = block(items=("warm", "cold"), repetitions=2, break_every=2, break_page="rest", order="fixed")
     form = FormOrder("load", ("effort", "hurry"), "fixed")
-    practice = block("warm_up", phase="practice", part=None, codes=("practice",))
+    practice = block("warm_up", phase="practice", part=None, codes=("practice",), items=("ready",))
     steps = ("hello", form, practice, form, of_block, form, "thanks")
-    schedule = build_schedule(Orders("study", steps), "P001", 5)
+    orders = Orders("study", steps)
+    assert orders.answers == 6 * 2 + 3 * 2, "of each main trial and each time of the form"
+    schedule = build_schedule(orders, "P001", 5)
     assert (schedule.participant, schedule.seed) == ("P001", 5)
     told = [
         step.page_id if isinstance(step, PageStep)
@@ -89,7 +103,7 @@ def test_a_session_numbers_its_trials_and_forms_and_has_breaks_between() -> None
         return number, "b", "main", 1, number - 1, 6, code, asked
 
     assert told == [
-        "hello", ("load", questions, None, 1), (1, "warm_up", "practice", None, 1, 1, "practice", ()),
+        "hello", ("load", questions, None, 1), (1, "warm_up", "practice", None, 1, 1, "practice", ("ready",)),
         ("load", questions, "warm_up", 2), trial(2, "A"), trial(3, "B"), "rest", trial(4, "C"), trial(5, "A"), "rest",
         trial(6, "B"), trial(7, "C"), ("load", questions, "b", 3), "thanks",
     ]  # fmt: skip
@@ -153,3 +167,56 @@ def test_a_track_is_named_by_its_standard_and_number_or_by_what_is_compared() ->
         assert (track.slots, len(track.catch)) == (66, 6)
         assert all(first.stop <= second.start for first, second in pairwise(track.catch))
         assert (track.catch[0].start >= 0, track.catch[-1].stop <= 66) == (True, True)
+    modulus = '[designs.number]\nkind = "estimation"\nmodulus = { level = 0.5, number = 10 }\n'
+    edits = ('design = "2ifc"', 'design = "number"'), ("standards = [1, 2]", 'level = "value"')
+    numbered = study(*edits, more=modulus)
+    (track,) = tracks_of(numbered, numbered.blocks["viscosity"])
+    assert (track.standard, track.slots) == (None, 3 * 8 + 1), "the first trial assigns a number to a level"
+
+
+def test_what_scheduling_needs_of_a_study_is_told_block_by_block() -> None:
+    tables = tomllib.loads(text_of("brackish"))
+    tables["sequence"] = ["consent", "form", "practice", "liquids", "delays"]
+    tables["study"]["block_order"] = "balanced"
+    more = {"order": "constrained", "repetitions": 6, "max_repeats": 2, "break_every": 4, "break_page": "consent"}
+    tables["blocks"]["liquids"] |= more
+    protocol = Protocol.model_validate(tables)
+    asked = ("wet", "calm", "near")
+    questions = {"items": asked, "item_order": "shuffled"}
+    main: dict[str, Any] = {"phase": "main", "repetitions": 1, "order": "shuffled"} | questions
+    assert orders_of(protocol) == Orders(
+        "brackish",
+        (
+            "consent",
+            FormOrder("form", asked, "shuffled"),
+            block("practice", phase="practice", part=None, codes=("practice",)),
+            BlockOrder(id="liquids", part=1, codes=("L1", "L2"), **(main | more)),
+            BlockOrder(id="delays", part=2, codes=("D1", "D2"), **main),
+        ),
+        "balanced",
+    )
+    assert orders_of(protocol).answers == 12 * 3 + 2 * 3 + 3
+    assert [one.breaks for one in orders_of(protocol).blocks] == [0, 2, 0]
+    key = draw_key(protocol, lambda: 0.0)
+    assert key.keys() == {"practice", "liquids", "delays"}
+    assert key["practice"] == {"practice": "learn"}
+    assert {code: {drawn[code] for drawn in drawn_keys(protocol)} for code in ("D1", "D2")} == {
+        "D1": {"see_prompt", "see_tardy"}, "D2": {"see_prompt", "see_tardy"},
+    }  # fmt: skip
+    far = tomllib.loads(text_of("brackish"))
+    far["blocks"]["liquids"] |= {"order": "constrained", "repetitions": 2, "min_distance": 2}
+    assert orders_of(Protocol.model_validate(far)).blocks[1].min_distance == 2
+
+
+def drawn_keys(protocol: Protocol) -> list[dict[str, str]]:
+    """The condition of each code of the delays, in keys that are drawn anew."""
+    return [draw_key(protocol, stream(seed, "key").random)["delays"] for seed in range(20)]
+
+
+def test_a_trial_is_called_by_its_block_and_by_its_number_unless_it_is_the_only_practice() -> None:
+    protocol = Protocol.model_validate(tomllib.loads(text_of("brackish")))
+    for phase, of, expected in (
+        ("practice", 1, "Setting"), ("practice", 2, "Setting 1"), ("main", 1, "Setting 1"), ("main", 2, "Setting 1"),
+    ):  # fmt: skip
+        trial = Trial(number=7, block="liquids", phase=phase, part=1, index=1, of=of, code="L1", items=())
+        assert trial.label(protocol, "en") == expected
