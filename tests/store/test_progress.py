@@ -4,16 +4,19 @@ from pathlib import Path
 
 import pytest
 
+from study_app.errors import StoreError
 from study_app.protocol.load import parse
 from study_app.protocol.randomization.streams import stream
 from study_app.protocol.source.files import shipped, shipped_file
 from study_app.store.blinded.blinding import complete_protocol, open_or_draw_key, read_key
 from study_app.store.files.folders import StudyFolder
+from study_app.store.journals.journal_events import Event
 from study_app.store.receipt import without_conditions
-from study_app.store.session_progress.progress import Progress
+from study_app.store.session_progress.progress import Progress, attempt_name, progress_of, recordable, trial_results
 from tests.journal_lines import event_of
 from tests.protocol.edited_studies import STUDIES
-from tests.protocol.trials.level_studies import text_of
+from tests.protocol.edited_studies import text_of as edited
+from tests.protocol.trials.level_studies import study, text_of
 
 ORACLE = Path(__file__).parents[1] / "analysis" / "oracle"
 
@@ -167,3 +170,147 @@ def test_choices_that_were_not_confirmed_are_kept_by_trial_and_attempt() -> None
     assert (progress.answered, progress.unconfirmed) == ({4: 1}, {})
     progress.process_line(event_of("repeat", t_s=41.0, trial=4, reason="noise"))
     assert (progress.answered, progress.repeats) == ({}, 1)
+
+
+PASSED = {"reason": "the criterion was met"}
+
+
+def test_each_line_leaves_the_session_at_its_step_page_and_trial() -> None:
+    """(step, page, trial, attempt, task done) after each line: what resuming starts from."""
+    progress = Progress()
+    for line, expected in (
+        (event_of("page_shown", page="welcome"), (0, "welcome", None, 0, False)),
+        (event_of("page_shown", page="welcome"), (0, "welcome", None, 0, False)),
+        (event_of("page_left", page="welcome"), (1, None, None, 0, False)),
+        (event_of("page_shown", page="rules"), (1, "rules", None, 0, False)),
+        (event_of("trial_started", trial=1, attempt=1), (2, None, 1, 1, False)),
+        (event_of("trial_ended", trial=1, attempt=1, outcome="timeout"), (2, None, 1, 1, True)),
+        (event_of("trial_started", trial=1, attempt=2), (2, None, 1, 2, False)),
+        (event_of("trial_ended", trial=1, attempt=2, outcome="interrupted"), (2, None, 1, 2, False)),
+        (event_of("trial_started", trial=1, attempt=3), (2, None, 1, 3, False)),
+        (event_of("trial_ended", trial=1, attempt=3, outcome="complete"), (2, None, 1, 3, True)),
+        (event_of("responses", trial=1, attempt=3), (3, None, None, 0, False)),
+        (event_of("passed_over", page="rest", **PASSED), (4, None, None, 0, False)),
+        (event_of("passed_over", trial=2, **PASSED), (5, None, None, 0, False)),
+        (event_of("trial_started", trial=3, attempt=1), (5, None, 3, 1, False)),
+        (event_of("trial_started", trial=4, attempt=1), (6, None, 4, 1, False)),
+        (event_of("form_shown", form="end"), (7, "end", None, 0, False)),
+        (event_of("form_answered", form="end"), (8, None, None, 0, False)),
+        (event_of("trial_started", trial=1, attempt=4), (2, None, 1, 4, False)),
+    ):
+        progress.process_line(line)
+        at = (progress.step, progress.page, progress.trial, progress.attempt, progress.task_done)
+        assert at == expected, line
+    assert (progress.presented, progress.steps) == ({1: 4, 3: 1, 4: 1}, {1: 2, 3: 5, 4: 6})
+
+
+def test_a_form_is_counted_by_the_block_before_it_and_forgets_what_was_chosen_before() -> None:
+    progress, chosen = Progress(), {"item": "calm", "value": 3, "first_s": 2.0}
+    for line in (
+        event_of("form_shown", form="load"),
+        event_of("choice", t_s=2.0, form="load", item="calm", value=3),
+        event_of("form_shown", form="load"),
+    ):
+        progress.process_line(line)
+    assert progress.answers == {}, "the page was shown anew"
+    for line in (
+        event_of("choice", t_s=2.0, form="load", item="calm", value=3),
+        event_of("answer_removed", t_s=3.0, form="load", item="calm"),
+    ):
+        progress.process_line(line)
+    assert (progress.answers["calm"].given, progress.unconfirmed) == (False, {})
+    progress.process_line(event_of("form_answered", form="load", items=[chosen]))
+    assert progress.answers == {}
+    progress.process_line(event_of("form_shown", form="load", after="delays"))
+    items = [chosen, {"item": "wet"}, chosen]
+    progress.process_line(event_of("form_answered", form="load", after="delays", items=items))
+    assert progress.answered == {("load", None): 1, ("load", "delays"): 2}
+    for phase, expected in (("practice", {}), ("main", {5: 1})):
+        other = Progress()
+        other.process_line(event_of("trial_started", trial=5, attempt=1, phase=phase))
+        other.process_line(event_of("responses", trial=5, attempt=1, items=[chosen]))
+        assert (other.answered, other.trial_answers) == (expected, {}), "a trial without intervals"
+
+
+def test_choices_of_a_trial_that_begins_again_are_kept_by_attempt_and_given_up_in_progress() -> None:
+    progress = Progress()
+    for line in (
+        event_of("trial_started", trial=4, attempt=1, phase="main"),
+        event_of("choice", t_s=2.0, trial=4, item="thick", value=6),
+        event_of("trial_started", trial=4, attempt=2, phase="main"),
+        event_of("choice", t_s=9.0, trial=4, item="thick", value=2),
+    ):
+        progress.process_line(line)
+    told = {which: answers["thick"].value for which, answers in progress.unconfirmed.items()}
+    assert (told, progress.answers["thick"].value) == ({(4, 1): 6, (4, 2): 2}, 2)
+    progress.process_line(event_of("page_shown", page="rest"))
+    assert (progress.answers, progress.unconfirmed.keys()) == ({}, {(4, 1), (4, 2)})
+
+
+def test_the_state_of_a_session_is_that_of_its_last_lines() -> None:
+    lines = [
+        event_of("session_started", language="de"),
+        event_of("language_chosen", language="en"),
+        event_of("trial_started", t_s=3.0, trial=1, attempt=1),
+        event_of("target_reached", t_s=4.0, trial=1, attempt=1),
+        event_of("target_reached", t_s=5.0, trial=1, attempt=1),
+        event_of("outlet_lost", t_s=5.5, outlet="camera", reason="unplugged"),
+        event_of("broke", t_s=5.6, what="the cable"),
+        event_of("paused", t_s=6.0),
+    ]
+    progress = progress_of(lines)
+    assert (progress.start, progress.language, progress.targets, progress.t_s) == (lines[0], "en", 2, 6.0)
+    assert (progress.outlets_lost, progress.broke, progress.paused) == ({"camera": "unplugged"}, "the cable", True)
+    assert (progress.trial_since_s, progress.trial_lasted_s) == (3.0, None)
+    for line in (event_of("device_reconnected", t_s=5.0), event_of("resumed", t_s=5.0)):
+        progress.process_line(line)
+    assert (progress.t_s, progress.broke, progress.paused) == (6.0, "", False), "a time never goes back"
+    progress.process_line(event_of("trial_started", t_s=7.0, trial=2, attempt=1))
+    assert progress.targets == 0
+    progress.process_line(event_of("paused", t_s=8.0))
+    progress.process_line(event_of("session_ended", t_s=9.0, status="withdrawn", fingerprint="ab12"))
+    ended = (progress.ended, progress.fingerprint, progress.paused, progress.reached_end, progress.durations_s)
+    assert ended == ("withdrawn", "ab12", False, False, {0: 7.0 - 3.0, 1: 9.0 - 7.0})
+    with pytest.raises(StoreError, match="session_started"):
+        progress_of(lines[1:])
+
+
+def test_a_recording_covers_a_trial_or_each_of_its_intervals() -> None:
+    lines = [
+        event_of("trial_started", trial=1, attempt=1),
+        event_of("trial_ended", trial=1, attempt=1),
+        event_of("trial_started", trial=2, attempt=1, arrangement="SC"),
+        event_of("interval_started", trial=2, attempt=1, interval=1),
+        event_of("interval_started", trial=2, attempt=1, interval=2),
+        event_of("trial_started", trial=1, attempt=2),
+    ]
+    assert recordable(lines) == [(1, 1, None), (2, 1, 1), (2, 1, 2), (1, 2, None)]
+    assert attempt_name(3, 1, None) == "trial 3, attempt 1"
+    assert attempt_name(3, 2, 4) == "trial 3, attempt 2, interval 4"
+
+
+def test_results_are_those_of_the_last_attempt_by_number_and_only_of_trials_with_a_design() -> None:
+    protocol = study()
+    told = {"block": "viscosity", "code": "V1", "phase": "main"}
+
+    def presented(trial: int, attempt: int, level: float, arrangement: str | None, answer: str | None) -> list[Event]:
+        which = {"trial": trial, "attempt": attempt}
+        items = [] if answer is None else [{"item": "which", "value": answer}]
+        start = event_of("trial_started", **which, **told, level=level, standard=1.0, arrangement=arrangement)
+        return [start, event_of("responses", **which, items=items)]
+
+    lines = presented(7, 1, 0.8, "CS", "first")
+    lines += presented(3, 1, 0.2, "SC", "second") + presented(3, 2, 0.4, "SC", "first")
+    assert [
+        (result.trial, result.code, result.level, result.success, result.correct, result.catch)
+        for result in trial_results(protocol, lines)
+    ] == [(3, "V1", 0.4, False, False, False), (7, "V1", 0.8, True, True, False)]
+    for broken in (presented(3, 1, 0.2, None, "first"), presented(3, 1, 0.2, "SC", None)):
+        with pytest.raises(KeyError, match="arrangement and answer"):
+            trial_results(protocol, broken)
+    with pytest.raises(KeyError):
+        trial_results(protocol, lines[1:])
+    plain = parse(edited("brackish").encode(), "brackish.toml")
+    of_plain = {"trial": 1, "attempt": 1}
+    start = event_of("trial_started", **of_plain, block="liquids", code="L1", phase="main")
+    assert trial_results(plain, [start, event_of("responses", **of_plain, items=[])]) == ()
