@@ -3,14 +3,25 @@
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QLabel, QWidget
 
 from study_app.devices.descriptor import NONE, NOT_AVAILABLE, Backend
-from study_app.gui.preflight.window import PreflightWindow, _compiled_check, _device_check, resumed_rows
+from study_app.gui.preflight.window import (
+    ComputerWindow,
+    PreflightWindow,
+    _compiled_check,
+    _device_check,
+    computer_checks,
+    resumed_rows,
+)
+from study_app.gui.theme.theme import LIGHT
+from study_app.gui.widgets.cards import Bar
 from study_app.protocol.load import load
 from study_app.protocol.orders.schedule import build_schedule
-from study_app.session.preflight import Masking
+from study_app.session.preflight import Check, Masking
 from tests.gui.windows import SCALED, WELL, checked, preflight
 from tests.journal_lines import event_from
 
@@ -22,6 +33,13 @@ FULL_DISK = replace(WELL, free_bytes=1)
 @pytest.fixture
 def window(qtbot):
     return preflight(qtbot)
+
+
+CHECKS = (
+    Check("Rate", "ok", "1 kHz", about="of the servo", share=0.25),
+    Check("Screen", "warning", "48 Hz", about="of this screen", advice="Use another screen.", share=1.5),
+    Check("Disk", "failure", "none", about="of its space", advice="Free some space."),
+)
 
 
 def begun(window):
@@ -57,10 +75,12 @@ def test_enter_on_another_button_measures_anew_and_after_it_enter_begins(window,
     window.again.setFocus()
     with qtbot.waitSignal(window.again_asked):
         qtbot.keyClick(window.again, Qt.Key.Key_Return)
-    window.show_view(checked(WELL, busy=True))
+    window.show_view(checked(FULL_DISK, busy=True))
     assert not window.again.hasFocus()
-    assert not window.start.isEnabled()
+    assert (window.start.isEnabled(), window.again.isEnabled()) == (False, False)
+    assert (window.chip.tone, window.chip.icon, window.chip.word) == ("neutral", "clock", "Measuring …")
     window.show_view(checked(WELL))
+    assert (window.start.isEnabled(), window.again.isEnabled(), window.start.hasFocus()) == (True, True, True)
     qtbot.keyClick(window.focusWidget() or window, Qt.Key.Key_Return)
     assert said == ["begun"]
 
@@ -77,6 +97,52 @@ def test_one_goes_back_without_a_trace_and_finishing_is_not_going_back(window, q
         getattr(window, how)()
     assert cancelled == ([] if how == "finish" else [how])
     assert not window.isVisible()
+
+
+def test_a_row_states_a_check_and_stays_until_a_check_changes(window):
+    window.show_view(replace(checked(WELL), checks=CHECKS))
+    rows = window.rows
+    assert [row.accessibleName() for row in rows] == [
+        "Rate, passed, 1 kHz; of the servo",
+        "Screen, warning, 48 Hz; of this screen; Use another screen.",
+        "Disk, cannot start, none; of its space; Free some space.",
+    ]
+    texts = [[part.text() for part in row.findChildren(QLabel)] for row in rows]
+    assert [sorted(row) for row in texts] == [
+        ["1 kHz", "Rate", "of the servo"],
+        ["48 Hz", "Screen", "Use another screen.", "of this screen"],
+        ["Disk", "Free some space.", "none", "of its space"],
+    ]
+    assert [[bar.share for bar in row.findChildren(Bar)] for row in rows] == [[0.25], [1.0], []]
+    roles = [{part.text(): part.property("role") for part in row.findChildren(QLabel)} for row in rows]
+    assert [row[check.value] for row, check in zip(roles, CHECKS, strict=True)] == ["text", "warn", "bad"]
+    window.show_view(replace(checked(WELL), checks=CHECKS, who="Participant P008"))
+    assert (window.rows, window.who.text()) == (rows, "rek2024  ·  Participant P008")
+    window.show_view(replace(checked(WELL), checks=CHECKS[1:]))
+    assert [row.check for row in window.rows] == list(CHECKS[1:])
+    assert [*map(window.checks.column.indexOf, (*window.rows, *rows))] == [0, 1, -1, -1, -1]
+
+
+def test_the_plot_shows_the_measured_lateness_in_microseconds(window):
+    window.show_view(checked(replace(WELL, lateness_ns=np.array([20_000] * 99 + [3_000_000]))))
+    assert window.plot.p99_name.toPlainText() == "p99 50"  # 99.01 of 100 steps from 20 to 3000 µs
+    assert window.plot.limit_name.toPlainText() == "limit 1\u2009000"
+    centres, heights = window.plot.bars.opts["x"], window.plot.bars.opts["height"]
+    assert [*np.round(10.0**centres)] == [pytest.approx(20, rel=0.2), pytest.approx(3000, rel=0.2)]
+    assert heights - 0.3 == pytest.approx([np.log10(99), 0.0])
+    window.show_view(checked(replace(WELL, lateness_ns=np.array([], int))))
+    assert not window.plot.p99_name.isVisible()
+
+
+def test_the_page_keys_scroll_the_checks(window, qtbot):
+    window.resize(window.minimumSize())
+    window.show_view(replace(checked(WELL), checks=CHECKS * 8))
+    bar = window._area.verticalScrollBar()
+    qtbot.waitUntil(lambda: bar.maximum() > 0)
+    qtbot.keyClick(window, Qt.Key.Key_PageDown)
+    assert bar.value() == min(bar.pageStep(), bar.maximum())
+    qtbot.keyClick(window, Qt.Key.Key_PageUp)
+    assert bar.value() == 0
 
 
 def test_a_session_that_goes_on_says_where_and_what_is_kept(window):
@@ -96,6 +162,11 @@ def test_a_session_that_goes_on_says_where_and_what_is_kept(window):
     journal = [event_from({**line, "t_s": float(at)}) for at, line in enumerate(happened)]
     rows = resumed_rows(protocol, schedule, journal)
     assert rows == (("Continues at", "Liquid setting 2, attempt\u00a02"), ("Kept", "2 of 8 answers"))
+    assert resumed_rows(protocol, schedule, journal[:-1])[0] == ("Continues at", "Liquid setting 2")
+    assert resumed_rows(protocol, schedule, journal[:2]) == (
+        ("Continues at", "A first look"),
+        ("Kept", "0 of 8 answers"),
+    )
     window.show_view(checked(WELL, goes_on=rows))
     assert {value.text() for value in window.values()} >= {"Liquid setting 2, attempt\u00a02", "2 of 8 answers"}
     assert checked(WELL).rows == (
@@ -114,13 +185,37 @@ def test_the_checks_of_devices_and_of_compiled_code() -> None:
     kept, folder = "the force model for this processor, in kept", Path("kept")
     checks = [*map(_device_check, ((falcon, inverse, mouse), (mouse,)))]
     checks += [_compiled_check(*compiled) for compiled in ((None, 0), (folder, 0), (folder, 7))]
-    assert [(check.verdict, check.value, check.about) for check in checks] == [
-        ("ok", "Falcon", "not available now: Inverse3"),
-        ("warning", "none connected", "all devices are available"),
-        ("warning", "not stored", "no folder is writable"),
-        ("ok", "stored", kept),
-        ("ok", "7 functions compiled", kept),
+    assert [(check.name, check.verdict, check.value, check.about, check.advice[:11]) for check in checks] == [
+        ("Haptic devices", "ok", "Falcon", "not available now: Inverse3", ""),
+        ("Haptic devices", "warning", "none connected", "all devices are available", "Connect a d"),
+        ("Compiled code", "warning", "not stored", "no folder is writable", "The model i"),
+        ("Compiled code", "ok", "stored", kept, ""),
+        ("Compiled code", "ok", "7 functions compiled", kept, ""),
     ]
+    results = computer_checks(FULL_DISK, load("demo"), [falcon], cache=folder, compiled=7)
+    assert [(check.name, check.verdict) for check in results] == [
+        ("Servo rate", "ok"), ("Servo lateness", "ok"), ("Priority", "ok"), ("Screen", "ok"),
+        ("Results folder", "ok"), ("Free space", "failure"), ("Haptic devices", "ok"), ("Compiled code", "ok"),
+    ]  # fmt: skip
+    assert results[-1] == checks[-1]
+
+
+def test_the_check_of_a_computer_is_asked_for_again_once_it_is_over(qtbot) -> None:
+    parent = QWidget()
+    qtbot.addWidget(parent)
+    window = ComputerWindow(parent, LIGHT)
+    window.show_measuring()
+    assert window.state.text().startswith("Measuring … On first use")
+    assert (window.back.isEnabled(), window.bar.isHidden(), window.bar.maximum()) == (False, False, 0)
+    window.show_compiled(0.4)
+    assert (window.bar.value(), window.bar.maximum()) == (40, 100)
+    window.show_checks(CHECKS)
+    assert [row.check for row in window.rows] == list(CHECKS)
+    assert (window.state.text(), window.bar.isHidden()) == ("1 of 3 passed.", True)
+    with qtbot.waitSignal(window.asked):
+        window.back.click()
+    with qtbot.assertNotEmitted(window.asked), qtbot.waitSignal(window.finished):
+        window.go_on.click()
 
 
 def test_a_haptic_device_is_asked_whether_its_motors_are_masked(qtbot) -> None:
@@ -135,6 +230,7 @@ def test_a_haptic_device_is_asked_whether_its_motors_are_masked(qtbot) -> None:
     for _ in range(2):
         qtbot.keyClick(asked.means, Qt.Key.Key_Down)
     assert asked.noise_db.isVisible()
+    assert (asked.noise_db.minimum(), asked.noise_db.maximum(), asked.noise_db.value()) == (30, 85, 60)
     asked.noise_db.setValue(64)
     assert asked.answer() == Masking("noise", 64)
     qtbot.keyClick(asked.means, Qt.Key.Key_Up)
