@@ -4,10 +4,11 @@ from dataclasses import replace
 
 import pytest
 from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QFileDialog, QLabel
 
 from study_app.gui.settings import view
 from study_app.store.workstation import DisplayOffset, MachineSettings
-from tests.gui.windows import SCREENS, machine, show_settings
+from tests.gui.windows import SCREENS, machine, show_settings, two_screens
 
 
 @pytest.fixture
@@ -28,6 +29,124 @@ def test_the_display_test_is_opened_once_and_left_by_esc(real_place, qtbot):
     with qtbot.waitSignal(test.left):
         qtbot.keyClick(test, Qt.Key.Key_Escape)
     assert real_place.test is None
+    real_place.open_test()
+    real_place.leave()
+    assert real_place.test is None
+
+
+def test_the_display_test_is_for_the_participants_screen_if_that_is_connected(real_place, monkeypatch):
+    monkeypatch.setattr(view, "screens_shown", lambda: (replace(SCREENS[0], refresh_hz=75.0), SCREENS[1]))
+    show_settings(real_place, MachineSettings(screen="DP-1"))
+    real_place.open_test()
+    assert real_place.test is None, "this computer has one screen"
+    show_settings(real_place, MachineSettings(screen="eDP-1"))
+    real_place.open_test()
+    texts = [part.text() for part in real_place.test.findChildren(QLabel)]
+    assert "Screen 1  ·  eDP-1  ·  1366 × 768, 75 Hz, 100\u202f%" in texts
+    assert (real_place.test.times.refresh_hz, real_place.test.isFullScreen()) == (75.0, True)
+    assert (real_place.test.interval.value, real_place.test.frames.period_ns) == (500.0, round(1e9 / 75))
+
+
+def test_one_of_the_screens_is_the_participants(real_place, qtbot, monkeypatch):
+    two_screens(monkeypatch)
+    real_place.enter()
+    card = real_place.screens
+    radios = card.radios
+    names = [radio.accessibleName() for radio in radios]
+    assert names == [f"Screen 1, eDP-1, {SCREENS[0].words}", f"Screen 2, DP-1, {SCREENS[1].words}"]
+    texts = [part.text() for part in card.findChildren(QLabel)]
+    assert {f"{SCREENS[0].words}  ·  344 × 194 mm", f"{SCREENS[1].words}  ·  527 × 296 mm"} <= {*texts}
+    for name, checked, note in (
+        ("eDP-1", [True, False], ""),
+        ("HDMI-1", [False, True], "HDMI-1 is not connected, so the last screen in the list is used instead."),
+        ("", [False, True], ""),
+    ):
+        show_settings(real_place, MachineSettings(screen=name))
+        assert [radio.isChecked() for radio in radios] == checked
+        assert (card.note.text(), card.note.isHidden()) == (note, not note)
+    assert card.radios is radios
+    with qtbot.waitSignal(real_place.changed) as heard:
+        radios[0].click()
+    assert heard.args == [{"screen": "eDP-1", "screen_number": 1}]
+    monkeypatch.setattr(view, "screens_shown", lambda: (replace(SCREENS[0], width_mm=0.0),))
+    real_place.enter()
+    assert [radio.accessibleName() for radio in card.radios] == names[:1]
+    qtbot.waitUntil(lambda: f"{SCREENS[0].words}  ·  size unknown" in [it.text() for it in card.findChildren(QLabel)])
+
+
+def test_each_field_shows_its_setting_and_hands_on_a_new_one(real_place, qtbot, tmp_path):
+    settings = MachineSettings(
+        viewing_distance_mm=600.0, screen_width_mm=500.0, lsl_markers=True, lsl_samples="always",
+        triggers="serial:COM3", photodiode=False, device="falcon:FT1", camera="v4l2:/dev/video7", proofs=str(tmp_path),
+        stamps="https://a.b/c", stamp_root=str(tmp_path.parent), theme="dark", sound=True,
+    )  # fmt: skip
+    show_settings(real_place, settings, undo="the width")
+    shown = {name: editor.value for name, editor in real_place.editors.items()}
+    assert shown == {name: getattr(settings, name) for name in shown} | {"device": "falcon"}
+    assert (real_place.undo.text(), real_place.undo.isEnabled()) == ("Undo the width", True)
+    assert (real_place.folder.whole, real_place.kept_in.whole) == ("/there", "Saved in /there/machine.json")
+    for name, value in (("photodiode", True), ("lsl_markers", False), ("sound", False)):
+        with qtbot.waitSignal(real_place.changed) as heard:
+            real_place.editors[name].control.click()
+        assert heard.args == [{name: value}]
+    for name, refused in (("triggers", "COM3"), ("viewing_distance_mm", "199"), ("screen_width_mm", "5001")):
+        real_place.editors[name].control.selectAll()
+        with qtbot.assertNotEmitted(real_place.changed):
+            qtbot.keyClicks(real_place.editors[name].control, refused)
+            qtbot.keyClick(real_place.editors[name].control, Qt.Key.Key_Return)
+    show_settings(real_place, settings)
+    assert (real_place.undo.text(), real_place.undo.isEnabled()) == ("Undo", False)
+
+
+def test_each_button_asks_for_what_it_says(real_place, qtbot, monkeypatch):
+    two_screens(monkeypatch)
+    show_settings(real_place, MachineSettings(), undo="the width")
+    asked, chosen = [], iter(["", "/new"])
+    monkeypatch.setattr(QFileDialog, "getExistingDirectory", lambda *given: asked.append(given) or next(chosen))
+    with qtbot.assertNotEmitted(real_place.changed):
+        real_place.change.click()
+    for signal, act, said in (
+        (real_place.go_asked, real_place.devices.click, ["devices"]),
+        (real_place.changed, real_place.change.click, [{"workspace": "/new"}]),
+        (real_place.undo_asked, real_place.undo.click, []),
+        (real_place.undo_asked, lambda: qtbot.keyClick(real_place, "z", Qt.KeyboardModifier.ControlModifier), []),
+        (real_place.check_asked, real_place.check.click, []),
+        (real_place.changed, real_place.offset.forgotten.emit, [{"display_offset": None}]),
+        (
+            real_place.offset_measured,
+            lambda: real_place.offset.kept.emit(1.5, 0.25, "data sheet"),
+            [1.5, 0.25, "data sheet", "DP-1"],
+        ),
+    ):
+        with qtbot.waitSignal(signal) as heard:
+            act()
+        assert heard.args == said
+    assert asked == [(real_place, "Workspace", "/there")] * 2
+
+
+@pytest.mark.parametrize(
+    ("screen", "distance_mm", "width_mm", "scale", "sentence"),
+    [  # an x of 8.73 px
+        ("eDP-1", None, None, 1.0, "Measure the viewing distance; text is then enlarged until the letter x subtends"),
+        ("eDP-1", 600.0, None, 1.9044, "1.90 times the default size: the letter x subtends 0.4° instead of 0.21°."),
+        ("DP-1", 600.0, None, 1.7473, "1.75 times the default size: the letter x subtends 0.4° instead of 0.23°."),
+        ("DP-1", 300.0, None, 1.0, "Default size: the letter x subtends 0.46°; at least 0.4° is recommended."),
+        ("DP-1", 600.0, 400.0, 2.302, "2.30 times the default size: the letter x subtends 0.4° instead of 0.17°."),
+        ("DP-1", 3000.0, None, 2.4, "8.74 times the default size: the letter x subtends 0.4° instead of 0.05°."),
+    ],
+)
+def test_a_sample_has_the_size_that_participants_see(
+    real_place, monkeypatch, screen, distance_mm, width_mm, scale, sentence
+):
+    two_screens(monkeypatch)
+    default_px = real_place.sample.font().pixelSize()
+    settings = MachineSettings(screen=screen, viewing_distance_mm=distance_mm, screen_width_mm=width_mm)
+    show_settings(real_place, settings)
+    assert real_place.said.text().startswith(sentence)
+    assert real_place.sample.font().pixelSize() == pytest.approx(scale * default_px, abs=1)
+    reported = f"The system reports {344 if screen == 'eDP-1' else 527} mm."
+    used = "" if width_mm is None else " The measured value is used instead."
+    assert real_place.editors["screen_width_mm"].below.text() == reported + used
 
 
 def test_what_is_being_typed_stays_if_something_else_is_set(real_place, qtbot):
@@ -78,12 +197,21 @@ def test_the_display_offset_is_shown_with_its_screen_and_handed_on_as_it_was_typ
     form.show_offset(offset, "Mine")
     assert form.forget.isEnabled()
     assert form.said.text() == f"23.5 ± 1.25 ms (data sheet, 2026-11-20{ending}"
+    assert {name: editor.value for name, editor in form.editors.items()} == {
+        "mean": 23.5, "spread": 1.25, "how": "data sheet"
+    }  # fmt: skip
+    form.show_offset(offset.model_copy(update={"measured": ""}), screen)
+    assert form.said.text() == "23.5 ± 1.25 ms (data sheet)."
     form.editors["mean"].control.setText("17.25")
     form.keep.click()
     form.editors["spread"].control.setText("")
     form.keep.click()
-    form.editors["mean"].control.setText("twelve")
-    form.keep.click()
+    for refused in ("twelve", "", "501"):
+        form.editors["mean"].control.setText(refused)
+        form.keep.setFocus()
+        form.keep.click()
+        assert form.editors["mean"].below.text() == "A number from 0 to 500 ms."
+        assert form.editors["mean"].control.hasFocus()
     assert kept == [(17.25, 1.25, "data sheet"), (17.25, 0.0, "data sheet")]
     with qtbot.waitSignal(form.forgotten):
         form.forget.click()
