@@ -80,7 +80,7 @@ def test_the_patch_toggles_when_the_interval_is_over_and_painted_frames_alone_ar
         test_page.draw_frame()
         for _ in range(2):
             test_page.grab()
-    test_page.show_figures()
+    test_page.report_timer.timeout.emit()
     assert tuple(value.text() for value in test_page.values) == FIGURES
 
 

@@ -3,10 +3,11 @@
 from dataclasses import replace
 
 import pytest
-from PySide6.QtCore import Qt
+from PySide6.QtCore import Qt, QTimer
 from PySide6.QtWidgets import QFileDialog, QLabel
 
 from study_app.gui.settings import view
+from study_app.gui.widgets.labels import Elided
 from study_app.store.workstation import DisplayOffset, MachineSettings
 from tests.gui.windows import SCREENS, machine, show_settings, two_screens
 
@@ -45,6 +46,9 @@ def test_the_display_test_is_for_the_participants_screen_if_that_is_connected(re
     assert "Screen 1  ·  eDP-1  ·  1366 × 768, 75 Hz, 100\u202f%" in texts
     assert (real_place.test.times.refresh_hz, real_place.test.isFullScreen()) == (75.0, True)
     assert (real_place.test.interval.value, real_place.test.frames.period_ns) == (500.0, round(1e9 / 75))
+    assert [real_place.test.frames.findChild(QTimer).isActive(), real_place.test.report_timer.isActive()] == [True] * 2
+    real_place.test.leave.click()
+    assert real_place.test is None
 
 
 def test_one_of_the_screens_is_the_participants(real_place, qtbot, monkeypatch):
@@ -56,6 +60,7 @@ def test_one_of_the_screens_is_the_participants(real_place, qtbot, monkeypatch):
     assert names == [f"Screen 1, eDP-1, {SCREENS[0].words}", f"Screen 2, DP-1, {SCREENS[1].words}"]
     texts = [part.text() for part in card.findChildren(QLabel)]
     assert {f"{SCREENS[0].words}  ·  344 × 194 mm", f"{SCREENS[1].words}  ·  527 × 296 mm"} <= {*texts}
+    assert [part.whole for part in card.findChildren(Elided)] == ["eDP-1", "DP-1"]
     for name, checked, note in (
         ("eDP-1", [True, False], ""),
         ("HDMI-1", [False, True], "HDMI-1 is not connected, so the last screen in the list is used instead."),
