@@ -5,13 +5,24 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QDialog, QWidget
 
 from study_app.devices.descriptor import DRIVER_READY, NONE, NOT_AVAILABLE, READY, Backend
 from study_app.devices.registry import backends, list_devices
 from study_app.gui.devices.view import DevicesPlace
-from study_app.gui.kit.devices import device_before_search, device_named, devices_shown
-from study_app.store.workstation import DEFAULTS
+from study_app.gui.kit.devices import (
+    device_before_search,
+    device_choices,
+    device_named,
+    device_or_default,
+    devices_shown,
+    remembered_options,
+    theme_named,
+)
+from study_app.gui.theme.theme import DARK, LIGHT
+from study_app.gui.widgets.controls import Radio
+from study_app.store.workstation import DEFAULTS, MachineSettings
 from tests.golden import check_kept
 from tests.golden_values import value_lines
 
@@ -58,6 +69,81 @@ def test_every_device_is_shown_once_and_those_that_people_feel_with_first() -> N
     assert set(names[:5]) == {"mouse", "spacemouse", "falcon", "force-dimension", "inverse3"}
 
 
+def test_names_are_chosen_by_their_labels_and_unknown_ones_have_a_default() -> None:
+    labels = dict(device_choices())
+    assert list(labels) == list(list_devices())
+    assert (labels["mouse"], labels["falcon"]) == ("Mouse (visual only)", "Novint Falcon")
+    assert [device_or_default(name) for name in ("falcon:FT1", "hammer")] == ["falcon:FT1", "mouse"]
+    assert [option.name for option in remembered_options()] == ["firmware"]
+    assert [theme_named(name) for name in ("light", "dark", "blue")] == [LIGHT, DARK, LIGHT]
+
+
+@pytest.fixture
+def place(qtbot: Any) -> DevicesPlace:
+    made = DevicesPlace(MachineSettings(device="falcon:FT1"), lambda: [MOUSE, falcon(NONE, "plug it in")])
+    qtbot.addWidget(made)
+    return made
+
+
+@pytest.mark.slow
+def test_a_row_states_what_a_device_can_do_and_follows_its_state(qtbot: Any, place: DevicesPlace) -> None:
+    place.show_devices(devices_shown([MOUSE, *WAYS[2], EMULATED]))
+    falcon_row, mouse_row, emulated_row = rows = [place.rows[name] for name in ("falcon", "mouse", "falcon-emulated")]
+    assert [row.title.text() for row in rows] == ["Novint Falcon", "Mouse", "Emulated Falcon"]
+    assert [isinstance(row.title, Radio) and row.title.isChecked() for row in rows] == [True, False, False]
+    assert [row.diagnose.isHidden() for row in rows] == [False, True, False]
+    assert [place.lists[simulated].isAncestorOf(emulated_row) for simulated in (False, True)] == [False, True]
+    assert [place.lists[simulated].isAncestorOf(mouse_row) for simulated in (False, True)] == [True, False]
+    assert falcon_row.title.accessibleName() == "Novint Falcon. Not connected. Felt, up to 8 N. Plug it in."
+    texts = [(part.text(), part.isHidden()) for part in (falcon_row.can, falcon_row.why, falcon_row.by)]
+    ways = "libusb 1.0: none connected   ·   ftd2xx: not available"
+    assert texts == [("Felt, up to 8 N.", False), ("Plug it in.", False), (ways, False)]
+    assert [part.isHidden() for part in (mouse_row.can, mouse_row.why, mouse_row.by)] == [False, True, True]
+    assert (falcon_row.chip.tone, falcon_row.chip.icon, falcon_row.chip.word) == ("neutral", "ring", "Not connected")
+    assert falcon_row.why.property("role") == "text2"
+    place.show_devices(devices_shown([MOUSE, *WAYS[1], EMULATED]))
+    assert place.rows["falcon"] is falcon_row
+    assert (falcon_row.chip.tone, falcon_row.chip.icon, falcon_row.chip.word) == ("warn", "warning", "Check it")
+    assert (falcon_row.why.text(), falcon_row.why.property("role")) == ("No permission.", "warn")
+    with qtbot.waitSignal(place.changed) as heard:
+        mouse_row.title.click()
+    assert heard.args == [{"device": "mouse"}]
+    place.show_settings(MachineSettings.model_validate({"device": "mouse", "firmware": "/there/f.bin"}))
+    checked = [name for name, row in place.rows.items() if isinstance(row.title, Radio) and row.title.isChecked()]
+    assert checked == ["mouse"]
+    assert place.options["firmware"].editor.control.text() == str(Path("/there/f.bin"))
+    place.options["firmware"].editor.control.selectAll()
+    with qtbot.waitSignal(place.changed) as heard:
+        qtbot.keyClicks(place.options["firmware"].editor.control, __file__)
+        qtbot.keyClick(place.options["firmware"].editor.control, Qt.Key.Key_Return)
+    assert heard.args == [{"firmware": Path(__file__)}]
+
+
+@pytest.mark.slow
+def test_devices_are_looked_for_on_request_until_the_windows_close(qtbot: Any, place: DevicesPlace) -> None:
+    for look in (place.enter, place.refresh.click):
+        with qtbot.waitSignal(place.looked):
+            look()
+            assert (place.refresh.text(), place.refresh.isEnabled()) == ("Looking …", False)
+        assert (place.refresh.text(), place.refresh.isEnabled()) == ("Refresh", True)
+    assert [(device.name, device.word) for device in place.shown] == [("mouse", "Ready"), ("falcon", "Not connected")]
+    assert place.rows["falcon"].title.isChecked()
+
+    def fail() -> list[Backend]:
+        raise OSError("the driver is broken")
+
+    place.backends = fail
+    with qtbot.waitSignal(place.troubled) as heard:
+        place.look_for_devices()
+    assert heard.args == ["This machine could not be checked", "the driver is broken."]
+    assert place.refresh.isEnabled()
+    place.look_for_devices()
+    with qtbot.assertNotEmitted(place.troubled, wait=50):
+        place.stop_looking()
+    place.look_for_devices()
+    assert not place.refresh.isEnabled(), "the search that was running is the last one"
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("preferred", "examined"), [("falcon:FT123", "falcon:FT123"), ("falcon", "falcon"), ("mouse", "falcon")]
@@ -74,6 +160,13 @@ def test_of_several_devices_the_one_with_the_preferred_serial_number_is_examined
     monkeypatch.setattr("study_app.gui.devices.view.open_diagnosis", open_diagnosis)
     place = DevicesPlace(DEFAULTS.model_copy(update={"device": preferred}), list)
     qtbot.addWidget(place)
+    place.show_devices(devices_shown([falcon(NONE)]))
+    place.rows["falcon"].diagnose.click()
+    dialog = place.dialog
+    assert dialog is not None
+    assert dialog.isVisible()
     place.diagnose("falcon")
-    place.end_diagnosis()
-    assert asked == [examined]
+    assert (dialog.isVisible(), place.dialog is dialog) == (False, False)
+    place.leave()
+    assert place.dialog is None
+    assert asked == [examined] * 2
