@@ -124,6 +124,7 @@ class DiagnosisDialog(QDialog):
         self.bar.show()
         self.again.setEnabled(False)
         self.copy.setEnabled(False)
+        self.copy.show_action("copy", "Copy report")
         self.support.setEnabled(False)
         self.close_button.show_action("", "Cancel")
         self._start_pending = True

@@ -80,6 +80,7 @@ def test_steps_come_first_then_the_report_and_it_can_run_again(dialog, begun, qt
         assert (dialog.text.toPlainText(), dialog.step.text()[:9], dialog.report) == ("", "Preparing", None)
         assert [button.isEnabled() for button in buttons] == [False] * 3
         assert (dialog.close_button.text(), dialog.bar.isHidden(), dialog.saved.isHidden()) == ("Cancel", False, True)
+        assert dialog.copy.text() == "Copy report"
     assert len(begun) == 4
 
 
