@@ -92,6 +92,7 @@ def test_a_row_states_what_a_device_can_do_and_follows_its_state(qtbot: Any, pla
     assert [row.title.text() for row in rows] == ["Novint Falcon", "Mouse", "Emulated Falcon"]
     assert [isinstance(row.title, Radio) and row.title.isChecked() for row in rows] == [True, False, False]
     assert [row.diagnose.isHidden() for row in rows] == [False, True, False]
+    assert falcon_row.diagnose.accessibleName() == "Diagnose Novint Falcon"
     assert [place.lists[simulated].isAncestorOf(emulated_row) for simulated in (False, True)] == [False, True]
     assert [place.lists[simulated].isAncestorOf(mouse_row) for simulated in (False, True)] == [True, False]
     assert falcon_row.title.accessibleName() == "Novint Falcon. Not connected. Felt, up to 8 N. Plug it in."

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 from PySide6.QtCore import Qt, QTimer
-from PySide6.QtWidgets import QFileDialog, QLabel
+from PySide6.QtWidgets import QBoxLayout, QFileDialog, QLabel
 
 from study_app.gui.settings import view
 from study_app.gui.widgets.labels import Elided
@@ -87,6 +87,7 @@ def test_each_field_shows_its_setting_and_hands_on_a_new_one(real_place, qtbot, 
     )  # fmt: skip
     show_settings(real_place, settings, undo="the width")
     shown = {name: editor.value for name, editor in real_place.editors.items()}
+    assert real_place.editors["device"].isAncestorOf(real_place.devices)
     assert shown == {name: getattr(settings, name) for name in shown} | {"device": "falcon"}
     assert (real_place.undo.text(), real_place.undo.isEnabled()) == ("Undo the width", True)
     assert (real_place.folder.whole, real_place.kept_in.whole) == ("/there", "Saved in /there/machine.json")
@@ -127,6 +128,13 @@ def test_each_button_asks_for_what_it_says(real_place, qtbot, monkeypatch):
             act()
         assert heard.args == said
     assert asked == [(real_place, "Workspace", "/there")] * 2
+
+
+def test_the_columns_are_side_by_side_where_they_fit(real_place):
+    beside, below = QBoxLayout.Direction.LeftToRight, QBoxLayout.Direction.TopToBottom
+    for width, direction in ((1300, beside), (999, below), (1000, beside)):
+        real_place.resize(width, 760)
+        assert real_place._body.direction() == direction
 
 
 @pytest.mark.parametrize(
