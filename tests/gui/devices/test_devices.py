@@ -1,12 +1,13 @@
 """What is said of each device, true to what was found, compared with a reviewed text."""
 
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QDialog, QWidget
+from PySide6.QtWidgets import QBoxLayout, QDialog, QWidget
 
 from study_app.devices.descriptor import DRIVER_READY, NONE, NOT_AVAILABLE, READY, Backend
 from study_app.devices.registry import backends, list_devices
@@ -21,6 +22,7 @@ from study_app.gui.kit.devices import (
     theme_named,
 )
 from study_app.gui.theme.theme import DARK, LIGHT
+from study_app.gui.widgets.cards import Rule
 from study_app.gui.widgets.controls import Radio
 from study_app.store.workstation import DEFAULTS, MachineSettings
 from tests.golden import check_kept
@@ -109,6 +111,8 @@ def test_a_row_states_what_a_device_can_do_and_follows_its_state(qtbot: Any, pla
     with qtbot.waitSignal(place.changed) as heard:
         mouse_row.title.click()
     assert heard.args == [{"device": "mouse"}]
+    assert not falcon_row.title.isChecked()
+    assert [len(place.lists[simulated].findChildren(Rule)) for simulated in (False, True)] == [1, 0]
     place.show_settings(MachineSettings.model_validate({"device": "mouse", "firmware": "/there/f.bin"}))
     checked = [name for name, row in place.rows.items() if isinstance(row.title, Radio) and row.title.isChecked()]
     assert checked == ["mouse"]
@@ -118,6 +122,13 @@ def test_a_row_states_what_a_device_can_do_and_follows_its_state(qtbot: Any, pla
         qtbot.keyClicks(place.options["firmware"].editor.control, __file__)
         qtbot.keyClick(place.options["firmware"].editor.control, Qt.Key.Key_Return)
     assert heard.args == [{"firmware": Path(__file__)}]
+    control = place.options["firmware"].editor.control
+    assert (control.accessibleName(), control.placeholderText()) == ("File", "No file chosen")
+    for width, direction in ((999, QBoxLayout.Direction.TopToBottom), (1000, QBoxLayout.Direction.LeftToRight)):
+        place.resize(width, 700)
+        place.show()
+        assert place._body.direction() == direction
+        assert (place.help.maximumWidth() < 1000) is (width == 1000)
 
 
 @pytest.mark.slow
@@ -138,9 +149,17 @@ def test_devices_are_looked_for_on_request_until_the_windows_close(qtbot: Any, p
         place.look_for_devices()
     assert heard.args == ["This machine could not be checked", "the driver is broken."]
     assert place.refresh.isEnabled()
+    ended: list[bool] = []
+
+    def look() -> list[Backend]:
+        ended.append(threading.Event().wait(0.1))
+        return fail()
+
+    place.backends = look
     place.look_for_devices()
     with qtbot.assertNotEmitted(place.troubled, wait=50):
         place.stop_looking()
+        assert ended == [False]
     place.look_for_devices()
     assert not place.refresh.isEnabled(), "the search that was running is the last one"
 
