@@ -6,22 +6,27 @@ from pathlib import Path
 
 import pytest
 from PySide6.QtCore import QEvent, QPoint, QSize, Qt
-from PySide6.QtWidgets import QApplication, QDialog, QFileDialog
+from PySide6.QtWidgets import QApplication, QDialog, QFileDialog, QLabel
 
 from study_app.gui.home import view
-from study_app.gui.home.cards import DeviceCard, SessionsCard
+from study_app.gui.home.cards import BrokenCard, DeviceCard, ResumeBanner, SessionsCard, StudyCard
 from study_app.gui.home.dialogs import NewSessionDialog, RehearsalDialog
+from study_app.gui.home.study_facts import BrokenFacts, DraftFacts, DraftNote, Interrupted, StudyFacts
 from study_app.gui.kit.devices import DeviceShown
 from study_app.gui.sessions.session_facts import SessionFacts
 from study_app.gui.widgets.background import wait_for_jobs
+from study_app.gui.widgets.cards import Icon
 from study_app.gui.widgets.controls import ActionButton
-from study_app.gui.widgets.labels import label
+from study_app.gui.widgets.labels import Clamped, label
+from study_app.protocol.load import load
 from study_app.protocol.source.files import source_bytes
 from study_app.store.versions.drafts import Draft, delete_draft, write_draft
 from study_app.store.versions.study_settings import keep_original
+from study_app.store.workstation import MachineSettings
 from tests.golden import masked
 from tests.gui.home.home_window import hold, open_home
 from tests.gui.transcript import compare, story
+from tests.gui.windows import SCREENS
 from tests.studies import begun
 
 pytestmark = pytest.mark.slow
@@ -318,3 +323,161 @@ def test_the_card_of_the_device_shows_why_it_cannot_be_used(qtbot, tone, ink):
     assert [part.text() for part in (card.name, card.about, card.why)] == ["Falcon", "Can.", "Why."]
     assert (card.state.tone, card.state.icon, card.state.word) == (tone, "clock", "Word")
     assert card.why.property("role") == ink
+
+
+def texts_of(card):
+    return [part.whole if isinstance(part, Clamped) else part.text() for part in card.findChildren(QLabel)]
+
+
+NOTE = DraftNote("Draft from today 14:02, not saved: Water", "2026-11-20T14:02:00+01:00")
+
+
+@pytest.mark.parametrize("first", [True, False])
+@pytest.mark.parametrize(
+    ("shipped", "draft", "pen"),
+    [(True, None, "Make a copy of Ink"), (False, None, "Edit Ink"), (False, NOTE, "Continue Ink, mine")],
+)
+def test_the_card_of_a_study_says_what_it_is_and_begins_what_its_buttons_name(qtbot, first, shipped, draft, pen):
+    facts = StudyFacts(
+        source="/there/mine.toml", protocol=load("demo"), title="Ink", description="Thick or thin.", languages="Dutch",
+        extent="2 parts", duration="about 5 min", needs="Mouse; at most 6 N", origin="Copy of demo", draft=draft,
+    )  # fmt: skip
+    card, heard = StudyCard(facts, first=first, shipped=shipped), []
+    qtbot.addWidget(card)
+    for name in ("edit", "discard", "new_session", "rehearsal"):
+        getattr(card, name).connect(lambda given, name=name: heard.append((name, given is facts)))
+    assert card.origin.whole == "Copy of demo  ·  mine.toml"
+    told = [text for text in texts_of(card) if text not in ("", card.origin.text())]
+    what = "Thick or thin." if draft is None else f"{NOTE.words}. Sessions use the saved file."
+    assert sorted(told) == sorted(["Ink", what, "2 parts", "about 5 min  ·  Dutch", "Mouse; at most 6 N"])
+    assert [icon.name for icon in card.findChildren(Icon)] == ["layers", "clock", "device"]
+    assert (card.draft.isHidden(), card.bin is None) == (draft is None, draft is None)
+    assert card.pen.accessibleName() == pen
+    assert (card.new.text(), card.new.accessibleName()) == ("New session", "New session of Ink, mine")
+    assert (card.rehearse.text(), card.rehearse.accessibleName()) == ("Rehearse", "Rehearse Ink, mine")
+    assert card.new.role == ("primary" if first and draft is None else "")
+    if draft is None:
+        assert card.pen.toolTip() == pen.removesuffix(" of Ink").removesuffix(" Ink")
+    else:
+        assert (card.pen.text(), card.pen.role) == ("Continue", "primary" if first else "")
+        assert card.bin.accessibleName() == "Discard the draft of Ink, mine …"
+        card.bin.click()
+    for button in (card.pen, card.new, card.rehearse):
+        button.click()
+    assert heard == [*[("discard", True)] * bool(draft), ("edit", True), ("new_session", True), ("rehearsal", True)]
+
+
+def test_the_card_of_a_file_that_cannot_be_run_says_why(qtbot):
+    broken = BrokenFacts(source="/there/mine.toml", problem="No format.", origin="Own study", draft=None)
+    fresh = DraftFacts(source="/there/mine.toml", title="Ink", origin="Own study", draft=NOTE)
+    file, draft = cards = BrokenCard(broken), BrokenCard(fresh, first=True)
+    for card in cards:
+        qtbot.addWidget(card)
+        assert card.origin.whole == "Own study  ·  mine.toml"
+    assert {"mine", "This file cannot be used.", "No format."} <= {*texts_of(file)}
+    assert [icon.name for icon in file.findChildren(Icon)] == ["warning"]
+    assert {"Ink", "mine.toml will be created when the draft is saved.", f"{NOTE.words}."} <= {*texts_of(draft)}
+    assert [icon.name for icon in draft.findChildren(Icon)] == []
+    assert (file.pen.accessibleName(), draft.pen.role) == ("Edit mine", "primary")
+    with qtbot.waitSignal(draft.discard) as heard:
+        draft.bin.click()
+    assert heard.args == [fresh]
+
+
+def test_the_banner_resumes_the_session_that_it_names(qtbot):
+    session = Interrupted(folder=Path("x"), source="demo", participant="P007", heading="P007 stopped", line="8 of 62.")
+    banner = ResumeBanner()
+    qtbot.addWidget(banner)
+    banner.show_interrupted(session)
+    assert (banner.heading.text(), banner.line.text(), banner.isHidden()) == ("P007 stopped", "8 of 62.", False)
+    assert (banner.resume.text(), banner.resume.accessibleName()) == ("Resume P007", "Resume P007")
+    with qtbot.waitSignal(banner.resume_asked) as heard:
+        banner.resume.click()
+    assert heard.args == [session]
+    banner.show_interrupted(None)
+    assert banner.isHidden()
+
+
+def test_home_says_which_screen_is_the_participants(home, monkeypatch):
+    monkeypatch.setattr(view, "screens_shown", lambda: SCREENS)
+    for name, numbers in (
+        ("DP-1", ("Screen 1", "Participant's screen 2")),
+        ("eDP-1", ("Participant's screen 1", "Screen 2")),
+    ):
+        home.show_machine(MachineSettings(screen=name), home_device())
+        lines = [f"{number}: {screen.words}" for number, screen in zip(numbers, SCREENS, strict=True)]
+        assert home.device.screens.text().splitlines() == lines
+        assert home.device.name.text() == "Hammer"
+    monkeypatch.setattr(view, "screens_shown", lambda: SCREENS[:1])
+    home.enter()
+    assert home.device.screens.text() == f"Screen 1: {SCREENS[0].words}"
+
+
+def home_device():
+    return DeviceShown(name="h", title="Hammer", icon="device", tone="ok", sign="check", word="Ready", can="", why="")
+
+
+def test_an_interrupted_session_goes_on_with_the_settings_of_this_machine(qtbot, tmp_path, monkeypatch):
+    begun(tmp_path / "demo", "P002", "demo", device={"name": "falcon"}, seed=7).close()
+    firmware = tmp_path / "firmware.bin"
+    firmware.touch()
+    home = open_home(qtbot, tmp_path)
+    settings = MachineSettings(screen="eDP-1", firmware=str(firmware))
+    home.show_machine(settings, home_device())
+    qtbot.waitUntil(home.banner.isVisible)
+    for screens, windowed, screen in ((SCREENS, False, 1), (SCREENS[1:], True, 1)):
+        monkeypatch.setattr(view, "screens_shown", lambda screens=screens: screens)
+        with qtbot.waitSignal(home.session_asked) as heard:
+            home.banner.resume.click()
+        (chosen,) = heard.args
+        assert (chosen.source, chosen.participant, chosen.seed, chosen.device) == ("demo", "P002", 7, "falcon")
+        assert (chosen.windowed, chosen.screen, chosen.device_options) == (windowed, screen, {"firmware": firmware})
+    (tmp_path / "demo" / "data" / "sub-P002" / "ses-01" / "journal.jsonl").unlink()
+    with qtbot.waitSignal(home.message) as heard:
+        home.banner.resume.click()
+    assert heard.args[0] == "The session cannot be resumed"
+
+
+def test_home_asks_for_what_its_dialogs_and_buttons_name(home, qtbot, tmp_path, monkeypatch):
+    card = next(card for card in home.grid.cards if card.facts.source == "demo")
+    assert card.held.text() == "1 session, 1 complete"
+    card.rehearse.click()
+    folder = home.dialog.folder
+    with qtbot.waitSignal(home.results_asked) as heard:
+        home.dialog.done(QDialog.DialogCode.Accepted)
+    assert heard.args == [folder]
+    card.new.click()
+    home.dialog.editors["participant"].control.setText("P008")
+    with qtbot.waitSignal(home.session_asked) as heard:
+        home.dialog.begin.click()
+    assert [(chosen.participant, chosen.source) for chosen in heard.args] == [("P008", "demo")]
+    for button, name in (
+        (home.sessions.all, "results"),
+        (home.device.devices, "devices"),
+        (home.device.display, "machine"),
+        (home.lab.open, "lab"),
+    ):
+        with qtbot.waitSignal(home.go_asked) as heard:
+            button.click()
+        assert heard.args == [name]
+    liquid = tmp_path / "liquid.toml"
+    liquid.write_text("format = 2\n[liquids.water]\ndensity_kg_m3 = 1000\n", encoding="utf-8", newline="\n")
+    elsewhere = own_study(tmp_path).rename(tmp_path / "elsewhere.toml")
+    chosen = iter(["", str(liquid), str(elsewhere)])
+    monkeypatch.setattr(view, "choose_protocol", lambda *_: next(chosen))
+    with qtbot.assertNotEmitted(home.protocol_opened):
+        home.open_protocol.click()
+        with qtbot.waitSignal(home.message) as heard:
+            home.open_protocol.click()
+    assert heard.args == ["This is a liquid file", f"{liquid} is not a study: open it in the liquid lab."]
+    with qtbot.waitSignal(home.protocol_opened) as heard:
+        home.open_protocol.click()
+    assert heard.args == [elsewhere]
+    qtbot.waitUntil(lambda: home.grid.cards[0].facts.source == str(elsewhere))
+    with qtbot.waitSignal(home.edit_asked) as heard:
+        home.grid.cards[0].pen.click()
+    assert heard.args == [str(elsewhere)]
+    with qtbot.waitSignal(home.new_asked) as heard:
+        next(card for card in home.grid.cards if card.facts.source == "demo").pen.click()
+    assert heard.args == ["demo"]
+    home.main.notice.accept()
