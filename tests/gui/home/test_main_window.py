@@ -1,10 +1,15 @@
 """The main window: places are made when one goes there, entered and left; the rail tells where one is."""
 
+from pathlib import Path
+
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QPushButton, QVBoxLayout
 
-from study_app.gui.home.main_window import DESTINATIONS, MainWindow
+from study_app.errors import StudyError
+from study_app.gui.home.main_window import DESTINATIONS, MainWindow, bug_sentence
+from study_app.gui.theme.theme import DARK, LIGHT
+from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.main_view import Place
 
 
@@ -116,3 +121,103 @@ def test_keyboard_is_after_a_session_where_it_was_before(main, qtbot):
     assert main.focusWidget() is not began
     main.return_from_session()
     assert main.focusWidget() is began
+
+
+def test_the_rail_names_each_place_at_full_length_where_it_is_wide(main, qtbot):
+    for width, words in (
+        (1680, ["Home", "Study designer", "Results", "Liquid lab", "Devices", "This machine", "Help", "Dark theme"]),
+        (1679, ["Home", "Designer", "Results", "Lab", "Devices", "Machine", "Help", "Dark"]),
+    ):
+        main.resize(width, 900)
+        buttons = [*main.rail.buttons.values(), main.rail.switch]
+        assert [button.text() for button in buttons] == words
+        assert main.rail.name.isHidden() is (width == 1679)
+    names = ["home", "designer", "results", "lab", "devices", "machine", "help"]
+    assert [*main.rail.buttons] == [place.name for place in DESTINATIONS] == names
+    assert [button.icon_name for button in main.rail.buttons.values()] == [place.icon for place in DESTINATIONS]
+    assert [button.accessibleDescription() for button in buttons] == ["You are here", *[""] * 7]
+    main.go("lab")
+    assert [button.accessibleDescription() for button in buttons] == [*[""] * 3, "You are here", *[""] * 4]
+
+
+def test_the_switch_of_the_rail_changes_the_theme_to_the_one_that_it_names(main, qtbot):
+    for theme, icon, words in ((DARK, "sun", ("Light theme", "Light")), (LIGHT, "moon", ("Dark theme", "Dark"))):
+        with qtbot.waitSignal(main.theme_changed) as heard:
+            main.rail.switch.click()
+        assert heard.args == [theme]
+        assert main.theme is theme
+        assert (main.rail.switch.icon_name, main.rail.switch.word, main.rail.switch.short) == (icon, *words)
+        assert main.rail.switch.accessibleName() == words[0]
+    with qtbot.assertNotEmitted(main.theme_changed):
+        main.show_theme(DARK)
+    assert main.rail.switch.word == "Light theme"
+
+
+def other_buttons(notice):
+    named = (notice.go_on, notice.back)
+    return [button for button in notice.findChildren(ActionButton) if button not in named]
+
+
+def test_a_message_opens_its_file_and_closes_once_its_own_place_says_so(main, monkeypatch):
+    opened = []
+    monkeypatch.setattr("study_app.gui.home.main_window.open_here", opened.append)
+    home, lab = main.place("home"), main.place("lab")
+    home.file_message.emit("Written", "It is here.", Path("report.html"))
+    notice = main.notice
+    assert (notice.windowTitle(), notice.said.text(), notice.go_on.text()) == ("Written", "It is here.", "Close")
+    (button,) = other_buttons(notice)
+    assert button.text() == "Open the file"
+    lab.message_over.emit()
+    assert notice.isVisible()
+    home.message_over.emit()
+    assert not notice.isVisible()
+    home.file_message.emit("Written", "It is here.", Path("report.html"))
+    other_buttons(main.notice)[0].click()
+    assert opened == [Path("report.html")]
+    lab.message.emit("Saved", "There.")
+    assert (main.notice.windowTitle(), main.notice.said.text(), other_buttons(main.notice)) == ("Saved", "There.", [])
+    main.notice.accept()
+
+
+def test_a_failed_device_is_tried_again_or_diagnosed(main):
+    said = []
+    for diagnose, names in ((lambda: said.append("diagnose"), ["Diagnose …"]), (None, [])):
+        main.ask_about_device("Not found", "Plug it in.", lambda: said.append("retry"), diagnose)
+        notice = main.notice
+        assert (notice.windowTitle(), notice.said.text()) == ("Not found", "Plug it in.")
+        assert (notice.go_on.text(), notice.back.text(), notice.back.isHidden()) == ("Try again", "Close", False)
+        assert [button.text() for button in other_buttons(notice)] == names
+        for button in other_buttons(notice):
+            button.click()
+        assert notice.isVisible() is (diagnose is None)
+        notice.show()
+        notice.go_on.click()
+        assert not notice.isVisible()
+    assert said == ["diagnose", "retry", "retry"]
+
+
+def test_a_place_that_cannot_be_opened_says_why_and_is_tried_again(main, log):
+    def fail():
+        raise StudyError("the folder is gone")
+
+    maker, main._makers["lab"] = main._makers["lab"], fail
+    with pytest.raises(StudyError, match="the folder is gone"):
+        main.go("lab")
+    notice = main.notice
+    assert (notice.windowTitle(), notice.said.text()) == ("“Liquid lab” could not be opened", "the folder is gone.")
+    assert (notice.go_on.text(), notice.back.text(), main.here) == ("Try again", "Close", "home")
+    assert str(main.not_opened) == "the folder is gone"
+    main._makers["lab"] = maker
+    notice.go_on.click()
+    assert (main.here, log[-1]) == ("lab", "enter lab")
+    main.hide()
+    main._makers["help"], main.not_opened = fail, None
+    with pytest.raises(StudyError):
+        main.place("help")
+    assert main.not_opened is None, "a hidden window shows nothing"
+
+
+def test_an_unexpected_error_is_called_a_bug():
+    assert bug_sentence(StudyError("the disk is full")) == "the disk is full."
+    words = "ValueError: no number. This is a bug: please report it and include the terminal output."
+    assert bug_sentence(ValueError("no number")) == words

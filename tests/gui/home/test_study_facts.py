@@ -1,22 +1,29 @@
 """What the home window says of studies and sessions, compared with a reviewed text."""
 
 import json
+import os
 import re
 from collections.abc import Iterator
 from datetime import datetime, timedelta, timezone
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from study_app.designer import version_rows
 from study_app.gui.home.study_facts import (
     BrokenFacts,
+    StudyFacts,
+    file_states,
     holds_liquids_alone,
     interrupted_session,
+    is_shipped,
     known_sources,
+    last_written_ns,
     read_studies,
     session_counts_text,
     study_facts,
+    time_text,
 )
 from study_app.gui.sessions.session_facts import (
     Extent,
@@ -184,6 +191,69 @@ def test_times_are_said_as_people_say_them():
     here, tokyo = (timezone(timedelta(hours=hours)) for hours in (-5, 9))
     recorded = datetime(2024, 11, 21, 1, 30, tzinfo=tokyo)
     assert start_time_text(recorded, datetime(2024, 11, 20, 15, 0, tzinfo=here)) == "Today 11:30"
+
+
+def test_the_study_that_was_run_last_comes_after_the_opened_ones_and_the_demo_before_any_session(tmp_path, monkeypatch):
+    monkeypatch.setenv("LIQUID_STUDY_WORKSPACE", str(tmp_path))
+    opened, results = tmp_path / "opened.toml", tmp_path / "results"
+    opened.write_text(source_bytes("demo").decode().replace('"demo"', '"mine"', 1), encoding="utf-8", newline="\n")
+    results.mkdir()
+    names = {None: "rek2024", results: "demo"}
+    assert {folder: read_studies((), results=folder)[0].name for folder in names} == names
+    for written_s, folder, study in ((30, "sample-demo", "demo"), (20, "slime", "slime"), (10, "rek2024", "rek2024")):
+        studies.begun(results / folder, "P001", study).close()
+        session = results / folder / "data" / "sub-P001" / "ses-01"
+        os.utime(session / "journal.jsonl", (written_s, written_s))
+        assert last_written_ns(session) == written_s * 10**9
+    assert last_written_ns(results) == 0
+    facts = read_studies((str(opened),), results=results)
+    assert [study.source for study in facts[:3]] == [str(opened), "slime", "rek2024"]
+    assert [study.name for study in facts[:2]] == ["mine", "slime"]
+    assert [study.source for study in facts].count(str(opened)) == 1
+
+
+def test_a_card_states_what_a_study_needs_and_where_it_comes_from(tmp_path, monkeypatch):
+    monkeypatch.setenv("LIQUID_STUDY_WORKSPACE", str(tmp_path))
+    (tmp_path / "protocols").mkdir()
+    own = tmp_path / "protocols" / "own.toml"
+    text = source_bytes("rek2024").decode()
+    own.write_text(text.replace('"rek2024"', '"own"', 1), encoding="utf-8", newline="\n")
+    keep_original(own, "rek2024")
+    shipped, copy = study_facts("rek2024"), study_facts(str(own))
+    assert isinstance(shipped, StudyFacts)
+    assert (shipped.name, shipped.file_name, shipped.title) == ("rek2024", "rek2024", "Feeling simulated liquids")
+    assert (shipped.languages, shipped.needs) == ("Dutch, English", "Haptic device or mouse; at most 8 N")
+    assert (shipped.extent, shipped.duration) == ("2 parts, 10 settings, 62 answers", "about 18 min")
+    assert shipped.description.startswith("The user study of Ł. Rek, Solving liquids")
+    assert (shipped.origin, copy.origin, copy.file_name) == ("Shipped study", "Copy of rek2024", "own")
+    assert [is_shipped(source) for source in ("demo", "own", str(own), "nowhere")] == [True, False, False, False]
+
+
+def test_a_changed_file_changes_the_states_of_the_files(tmp_path, monkeypatch):
+    monkeypatch.setenv("LIQUID_STUDY_WORKSPACE", str(tmp_path))
+    protocols, opened = tmp_path / "protocols", tmp_path / "opened.toml"
+    protocols.mkdir()
+    seen = [file_states([str(opened)])]
+    for act in (
+        lambda: opened.write_bytes(b"x"),
+        lambda: os.utime(opened, ns=(5, 7)),
+        lambda: (opened.write_bytes(b"xy"), os.utime(opened, ns=(5, 7))),
+        lambda: (protocols / "own.toml").write_bytes(b"abc"),
+        lambda: write_draft(protocols / "fresh.toml", Draft(text="a", base="")),
+    ):
+        act()
+        seen.append(file_states([str(opened)]))
+    assert len(set(seen)) == len(seen) == 6
+    assert [len(states) for states in seen] == [0, 1, 1, 1, 2, 3]
+    assert (opened, 7, 2) in seen[-1]
+
+
+def test_the_time_of_a_draft_is_said_with_its_day_unless_it_is_today(monkeypatch) -> None:
+    now = datetime(2024, 11, 20, 18, 0).astimezone()
+    monkeypatch.setattr("study_app.gui.home.study_facts.time", SimpleNamespace(time=now.timestamp))
+    moments = (now.replace(hour=9, minute=5), now.replace(day=19, hour=23), now.replace(year=2023))
+    said = ["today 09:05", "2024-11-19 23:00", "2023-11-20 18:00", "an unknown time"]
+    assert [time_text(moment) for moment in (*(it.isoformat() for it in moments), "yesterday")] == said
 
 
 def test_drafts_come_first_the_newest_of_all_and_a_copy_names_its_original(tmp_path, monkeypatch):
