@@ -7,10 +7,10 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QFileDialog, QLabel, QWidget
 
-from study_app.gui.kit.dialogs import Question, Work
+from study_app.gui.kit.dialogs import Question, Work, choose_protocol
 from study_app.gui.kit.fields import Editor, Field, choice_field, number_field, seed_field, typed_file
 from study_app.gui.theme.theme import LIGHT
-from study_app.gui.widgets.controls import ActionButton
+from study_app.gui.widgets.controls import ActionButton, Check, Toggle
 
 ENTER, ESCAPE = Qt.Key.Key_Return, Qt.Key.Key_Escape
 SIZES = {"s": "Small", "m": "Medium", "l": "Large"}
@@ -55,9 +55,14 @@ def test_a_number_is_taken_within_its_limits_and_shown_with_its_decimals(qtbot: 
     assert heard.control.text() == "2,500", "it is being typed"
     heard.qtbot.keyClick(heard.control, ESCAPE)
     assert (heard.control.text(), below.isHidden(), below.property("role")) == ("7", True, "text2")
+    assert (heard.control.cursorPosition(), heard.control.property("dense")) == (0, "true")
     for typed in ("0.5", "500", "1,5", ""):
         heard.type(typed)
+        qtbot.keyClick(heard.control, ENTER)
     assert heard.changed == [("mean", 0.5), ("mean", 500.0), ("mean", 1.5), ("mean", None)]
+    heard.type("ten")
+    heard.type("7")
+    assert (below.isHidden(), heard.control.property("state")) == (True, "")
     needed = Heard(qtbot, number_field("mean", "Mean", "ms", (0.5, 500.0), may_miss=False))
     needed.editor.show_value(1.26)
     assert needed.control.text() == "1.3"
@@ -86,9 +91,10 @@ def test_buttons_of_a_field_choose_one_of_some_values_or_switch_one(qtbot: Any) 
     assert ([button.text() for button in buttons], radios.editor.value) == ([*SIZES.values()], "s")
     buttons[2].click()
     assert radios.editor.value == "l"
-    for kind in ("switch", "check"):
+    for kind, control in (("switch", Toggle), ("check", Check)):
         heard = Heard(qtbot, Field("dark", "Dark", kind, hint="At night."))
         heard.editor.show_value(True)
+        assert type(heard.control) is control
         assert (heard.editor.value, heard.changed, heard.edited) == (True, [], ["dark"])
         heard.control.click()
         assert (heard.editor.value, heard.changed, heard.edited) == (False, [("dark", False)], ["dark"] * 2)
@@ -166,7 +172,10 @@ def test_a_question_waits_for_what_it_needs(qtbot: Any, parent: QWidget) -> None
     texts = [part.text() for part in dialog.findChildren(QLabel) if part.isVisible()]
     assert [text for text in texts if text][:3] == ["End?", "It stops.", "No way back."]
     assert (dialog.windowTitle(), dialog.back.text(), dialog.minimumWidth()) == ("End?", "Not now", 555)
-    dialog.editors["seed"].control.setText("seven")
+    dialog.editors["seed"].control.setFocus()
+    qtbot.keyClicks(dialog.editors["seed"].control, "seven")
+    dialog.editors["reason"].control.setFocus()
+    assert dialog.editors["seed"].below.isHidden()
     dialog.go_on.click()
     assert dialog.editors["seed"].below.text().startswith("the seed must be")
     assert (dialog.isVisible(), dialog.focusWidget(), dialog.missing.isHidden()) == (
@@ -220,3 +229,14 @@ def test_work_is_shown_until_it_ends_is_refused_or_stops(qtbot: Any, parent: QWi
     dialog.go_on.click()
     dialog.close_stopped()
     assert (heard[4:], dialog.isVisible(), dialog.working) == (["begun", "rejected"], False, False)
+    dialog.show()
+    dialog.back.click()
+    assert (heard[6:], dialog.isVisible()) == (["rejected"], False)
+
+
+def test_a_protocol_is_asked_for_in_the_workspace(parent: QWidget, tmp_path: Path, monkeypatch: Any) -> None:
+    asked: list[Any] = []
+    monkeypatch.setenv("LIQUID_STUDY_WORKSPACE", str(tmp_path))
+    monkeypatch.setattr(QFileDialog, "getOpenFileName", lambda *given: asked.append(given) or ("/a.toml", "filter"))
+    assert choose_protocol(parent, "Open") == "/a.toml"
+    assert asked == [(parent, "Open", str(tmp_path / "protocols"), "Protocols (*.toml)")]
