@@ -120,6 +120,14 @@ def test_return_or_leaving_takes_a_number_once_and_escape_goes_back(field: Any, 
     assert field.told == [60.0, 60.5, "back"]
 
 
+@pytest.mark.parametrize(("reason", "selected"), [("Tab", "45"), ("Backtab", "45"), ("Mouse", "")])
+def test_the_tab_key_selects_the_number_that_it_leads_to(field: Any, reason: str, selected: str) -> None:
+    field.other.setFocus()
+    field.deselect()
+    field.setFocus(getattr(Qt.FocusReason, f"{reason}FocusReason"))
+    assert field.selectedText() == selected
+
+
 def test_what_is_no_number_stays_to_be_mended(field: Any, qtbot: Any) -> None:
     type_over(field, "4..5")
     qtbot.keyClick(field, Qt.Key.Key_Return)
@@ -175,7 +183,7 @@ def test_a_whole_number_is_typed_in_digits_or_the_one_before_comes_back(qtbot: A
 
 def test_return_submits_a_rejected_number_again_and_escape_restores_it(field: Any, qtbot: Any) -> None:
     field.show_state("refused")
-    assert (field.state, field.font().weight()) == ("refused", 600)
+    assert (field.state, field.property("state"), field.font().weight()) == ("refused", "refused", 600)
     for _ in range(2):
         qtbot.keyClick(field, Qt.Key.Key_Return)
     qtbot.keyClick(field, Qt.Key.Key_Escape)

@@ -12,7 +12,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QBoxLayout, QLabel, QWidget
 
 from study_app.errors import StudyError
-from study_app.gui.theme.theme import font
+from study_app.gui.theme.theme import LIGHT, font
 from study_app.gui.widgets.accessible import button_text, describe_plot, plain_tip
 from study_app.gui.widgets.background import Background, delayed_call, wait_for_jobs
 from study_app.gui.widgets.boxes import STRETCH, grid, hbox, vbox
@@ -137,6 +137,7 @@ def test_a_clamped_text_is_replaced_and_its_tip_has_what_was_left_out(qtbot: Any
     assert len(shown) == 2
     assert shown[0].startswith("Glycerin")
     assert shown[1].endswith("…")
+    assert long.startswith(" ".join(shown).removesuffix("…"))
     assert clamped.accessibleName() == long
     assert "35 ms" in clamped.toolTip()
 
@@ -263,6 +264,16 @@ def test_buttons_are_pressed_by_enter_and_their_key_and_keep_it_with_another_tex
     assert (stop.accessibleName(), stop.toolTip()) == (
         "Stop force and play. Holding Esc does the same.", "Stop force and play (or hold Esc)"
     )  # fmt: skip
+
+
+def test_the_colour_of_a_button_tells_its_role_and_whether_it_can_be_pressed() -> None:
+    enabled = {"primary": LIGHT.on_accent, "danger": LIGHT.bad, "plain": LIGHT.text2, "": LIGHT.text}
+    disabled = dict.fromkeys(enabled, LIGHT.text3) | {"primary": LIGHT.text2}
+    for is_enabled, inks in ((True, enabled), (False, disabled)):
+        for role, ink in inks.items():
+            button = ActionButton("", "Go", role=role)
+            button.setEnabled(is_enabled)
+            assert (button.theme, button._ink()) == (LIGHT, ink)
 
 
 @pytest.mark.parametrize("kind", [Check, Toggle, Radio])
