@@ -23,8 +23,8 @@ from study_app.haptics.runtime.telemetry import Timing
 from study_app.outlets.session_outlets import OutletStatus
 from study_app.protocol.load import load
 from study_app.protocol.trials.tasks import Stroke
-from study_app.session.preflight import Measurements, PredictedDelivery
-from study_app.session.start import Ready
+from study_app.session.preflight import Masking, Measurements, PredictedDelivery
+from study_app.session.start import NewSession, Ready
 from tests.session import small
 from tests.session.small import CHOSEN
 
@@ -36,6 +36,7 @@ FACTS = replace(
 )
 
 COSTS = Costs(tick_ns=146.0, rest_ns=40.0, effects=())
+ERRORS = Errors(wake=0.0, force_n=0.02, lag_s=0.0, left_out=())
 
 
 class Answering:
@@ -85,9 +86,9 @@ def ask(qapp: Any, machine: Any) -> Iterator[Callable[..., Preflight]]:
     """Return a function that asks before a session of the demo, of such facts and outlets."""
     made: list[Preflight] = []
 
-    def ask(facts: Measurements = FACTS, **given: Any) -> Preflight:
+    def ask(facts: Measurements = FACTS, chosen: NewSession = CHOSEN, **given: Any) -> Preflight:
         ready = Ready(machine, facts, **given)
-        made.append(Preflight(CHOSEN, load("demo"), ready, QGuiApplication.primaryScreen, "Participant P001", LIGHT))
+        made.append(Preflight(chosen, load("demo"), ready, QGuiApplication.primaryScreen, "Participant P001", LIGHT))
         made[-1].open()
         return made[-1]
 
@@ -100,6 +101,57 @@ def ask(qapp: Any, machine: Any) -> Iterator[Callable[..., Preflight]]:
 @pytest.fixture
 def asked(ask: Callable[..., Preflight]) -> Preflight:
     return ask()
+
+
+def rows_of(made: Preflight) -> dict[str, str]:
+    """Return the rows about the coming session."""
+    texts = [one.text() for one in made.window.runs.findChildren(QLabel)]
+    return dict(zip(texts[1::2], texts[2::2], strict=True))
+
+
+@pytest.mark.parametrize(("device", "masking"), [("mouse", None), ("falcon", Masking("noise", 60))])
+def test_a_session_begins_with_what_was_measured_and_answered(
+    ask: Callable[..., Preflight], monkeypatch: Any, qtbot: Any, device: str, masking: Masking | None
+) -> None:
+    errors = [replace(ERRORS, force_n=force_n) for force_n in (0.02, 0.25, 0.13)]
+    delivery = PredictedDelivery(missing=0, asked=0, out=0, judged=8, limit_percent=25)
+    count = len(preflight_controller.study_scenes(load("demo")))
+    monkeypatch.setattr(Answering, "given", (*errors[:count], delivery))
+    made = ask(chosen=replace(CHOSEN, device=device))
+    assert rows_of(made)["Expected force error"] == "measuring …"
+    qtbot.waitUntil(lambda: made.appraisal.is_over)
+    qtbot.waitUntil(lambda: rows_of(made)["Expected force error"] == "0.25 N")
+    assert made.window.who.text() == "demo  ·  Participant P001"
+    assert made._facts.delivery == delivery
+    assert made._facts.tick_s == pytest.approx(146e-9)
+    if made.window.masking is not None:
+        made.window.masking.means.setCurrentIndex(2)
+    with qtbot.waitSignal(made.started) as started:
+        made.window.start.click()
+    (ready,) = started.args
+    assert (ready.masking, ready.rig, ready.facts.tick_s) == (masking, made._ready.rig, pytest.approx(146e-9))
+    with qtbot.waitSignal(made.cancelled):
+        made.window._done = False
+        made.window.close()
+
+
+def test_the_most_expensive_scene_and_the_largest_errors_of_the_velocity_count(monkeypatch: Any) -> None:
+    costs_ns, velocities = (120.0, 150.0, 130.0), ((0.1, 0.2), (0.3, 0.05), (0.2, 0.4))
+    monkeypatch.setattr(preflight_controller, "start_appraisal_worker", Answering)
+    answers = [
+        [(number, replace(COSTS, tick_ns=tick_ns)), (number, replace(ERRORS, velocity=velocity))]
+        for number, (tick_ns, velocity) in enumerate(zip(costs_ns, velocities, strict=True), 1)
+    ]
+    late = (1, replace(COSTS, tick_ns=900.0))  # of a question that was answered
+    monkeypatch.setattr(Answering, "answers", lambda self: [late] * (self.asked > 1) + answers[self.asked - 1])
+    appraisal = Appraisal([preflight_controller.study_scenes(load("demo"))[0]] * 3, UNKNOWN)
+    ticks_s = []
+    while not appraisal.is_over:
+        assert appraisal.read_answers()
+        ticks_s.append(appraisal.tick_s)
+    assert ticks_s == pytest.approx([120e-9, 150e-9, 150e-9])
+    assert appraisal.velocity_errors == (0.3, 0.05)
+    assert not appraisal.read_answers()
 
 
 def test_a_device_that_is_lost_meanwhile_is_told_once(asked: Preflight, machine: Any, qtbot: Any) -> None:
