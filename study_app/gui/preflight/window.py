@@ -271,6 +271,7 @@ class PreflightWindow(QWidget):
         self.cancel = ActionButton("", "Cancel", height=46)
         self.again = ActionButton("repeat", "Check again", height=46)
         self.start = ActionButton("play", "Start", role="primary", height=46)
+        self._names: dict[str, QLabel] = {}
         self._values: dict[str, QLabel] = {}
         self._done = False
         self._busy = False
@@ -338,15 +339,21 @@ class PreflightWindow(QWidget):
             self.chip.show_state("ok", "check", view.passed_text)
 
     def _show_rows(self, view: PreflightView) -> None:
+        """Show the rows about the session; a row that is no longer known is hidden."""
         for row, (name, text) in enumerate(view.rows):
             if name not in self._values:
                 value = figures("", "label", weight=600)
                 value.setAlignment(Qt.AlignmentFlag.AlignRight)
                 value.setWordWrap(True)
-                self._grid.addWidget(label(name, "label", "text2"), row, 0)
+                self._names[name] = label(name, "label", "text2")
+                self._grid.addWidget(self._names[name], row, 0)
                 self._grid.addWidget(value, row, 1)
                 self._values[name] = value
             self._values[name].setText(text)
+        shown = dict(view.rows)
+        for name, value in self._values.items():
+            self._names[name].setVisible(name in shown)
+            value.setVisible(name in shown)
 
     def values(self) -> tuple[QLabel, ...]:
         return tuple(self._values.values())

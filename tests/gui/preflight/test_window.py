@@ -123,6 +123,16 @@ def test_a_row_states_a_check_and_stays_until_a_check_changes(window):
     assert [*map(window.checks.column.indexOf, (*window.rows, *rows))] == [0, 1, -1, -1, -1]
 
 
+def test_a_row_about_the_session_is_hidden_while_it_is_not_known(window):
+    for asked_error, is_hidden in ((True, False), (False, True), (True, False)):
+        window.show_view(checked(WELL, asked_error=asked_error))
+        labels = window.runs.findChildren(QLabel)
+        (name,) = (label for label in labels if label.text() == "Expected force error")
+        (value,) = (label for label in labels if label.text() == "measuring …")
+        assert (name.isHidden(), value.isHidden()) == (is_hidden, is_hidden)
+        assert [label.isHidden() for label in labels if label.text() in ("Ends about", "14:37")] == [False, False]
+
+
 def test_the_plot_shows_the_measured_lateness_in_microseconds(window):
     window.show_view(checked(replace(WELL, lateness_ns=np.array([20_000] * 99 + [3_000_000]))))
     assert window.plot.p99_name.toPlainText() == "p99 50"  # 99.01 of 100 steps from 20 to 3000 µs
