@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from PySide6.QtCore import QPoint
+from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QImage, QPointingDevice
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
@@ -24,7 +24,7 @@ from PySide6.QtWidgets import (
 from study_app.gui.participant.forms.questions import FIELDS
 from study_app.protocol.load import load
 from study_app.protocol.orders.schedule import build_schedule, draw_key, stream
-from study_app.protocol.questions import ChoiceView, ItemView, NumberView, RatingView, SliderView
+from study_app.protocol.questions import ChoiceView, ItemView, NumberView, RatingView, SliderView, TextView
 from study_app.protocol.wording.languages import words
 from study_app.session.pages import QuestionnairePage
 from study_app.session.transitions.events import (
@@ -270,6 +270,84 @@ def test_an_answer_taken_back_is_no_answer_and_text_keeps_to_its_length(opening:
     _, text = seen.answers[-1]
     assert len(text) <= 20
     assert "\x07" not in text
+
+
+def test_the_foot_says_what_is_missing_how_much_is_answered_and_which_keys_answer(opening: Opening) -> None:
+    seen, en = opening(form(), (1366, 2000)), words("en")
+
+    def foot(message: str, done: int, of: int) -> str:
+        kept = f"{message} {en.answers_kept} " if message else ""
+        return f"{kept}{en.answered.format(done=done, of=of)}"
+
+    def keys(answer_keys: str) -> str:
+        return f"↑ ↓ {en.key_move}, {answer_keys} {en.key_answer}"
+
+    told = [(seen.page.foot.accessibleName(), seen.page.foot.accessibleDescription())]
+    for act in (("42", KEY.Key_Return), (KEY.Key_3,), ("7", KEY.Key_Return), (KEY.Key_1,)):
+        give(seen, act)
+        told.append((seen.page.foot.accessibleName(), seen.page.foot.accessibleDescription()))
+    assert told == [
+        (foot("", 0, 6), keys(seen.question(1).answer_keys)),
+        (foot("", 1, 6), keys("1–3")),
+        (foot("", 2, 7), keys(seen.question(3).answer_keys)),  # a new question
+        (foot("", 3, 7), keys("1–3")),
+        (foot("", 4, 7), keys("1–3")),
+    ]
+    seen.click("Continue")
+    message = en.questions_missing([5, 6])
+    assert seen.page.foot.accessibleName() == foot(message, 4, 7)
+    assert seen.page.button.accessibleDescription() == message
+    assert (seen.question(5).missing, seen.question(7).missing, seen.focus) == (True, False, seen.question(5))
+    seen.click("Left", 2)  # which hides the third question
+    assert (seen.page.foot.accessibleName(), seen.question(3).isHidden()) == (foot(message, 3, 6), True)
+    seen.click("Both", 2)
+    assert (seen.page.foot.accessibleName(), entries(seen)[1]) == (foot(en.questions_missing([5, 6]), 3, 7), "")
+    seen.click("A mouse", 4)
+    assert seen.page.foot.accessibleName() == foot(message, 2, 7)
+    assert (seen.question(4).is_answered, seen.question(4).value) == (False, None)
+    assert description_of(seen.question(4)).endswith("no answer yet")
+
+
+def test_a_key_leads_to_the_next_question_and_a_click_stays(opening: Opening) -> None:
+    page = form(*(replace(QUESTIONS[index], number=at) for at, index in enumerate((1, 4), 1)))  # type: ignore[arg-type]
+    seen, pointed = opening(page, FULL), list[int]()
+    first, second = seen.question(1), seen.question(2)
+    first.pointed_at.connect(pointed.append)
+    seen.click("Left", 1)
+    assert (seen.focus, first.value) == (first, "left")
+    seen.press(KEY.Key_Right, KEY.Key_Right, KEY.Key_Right)
+    assert (pointed, first.value) == ([1, 2], "left")
+    seen.press(KEY.Key_Space)
+    assert (seen.focus, first.value, first.pointed, pointed[-1]) == (second, "both", -1, -1)
+    seen.press(KEY.Key_Left)
+    assert second.pointed == 5, "from the end"
+    seen.press(KEY.Key_Up, KEY.Key_2)
+    assert (seen.focus, first.value) == (second, "right")
+    seen.press(KEY.Key_6)  # five points
+    assert not second.is_answered
+    seen.press(KEY.Key_5)
+    assert (second.value, seen.focus) == (5, seen.page.button)
+
+
+def test_enter_begins_a_line_where_there_are_several_and_goes_on_with_ctrl(opening: Opening, qtbot: Any) -> None:
+    page = form(*(TextView(f"text{n}", n, "What else?", False, lines=lines) for n, lines in ((1, 3), (2, 1))))
+    seen = opening(page, FULL)
+    give(seen, ("One", KEY.Key_Return, "two"))
+    assert (entries(seen), seen.focus) == (["One\ntwo", ""], seen.question(1).entry)
+    qtbot.keyClick(seen.focus, KEY.Key_Return, Qt.KeyboardModifier.ControlModifier)
+    assert (seen.answers, seen.focus) == ([("text1", "One\ntwo")], seen.question(2).entry)
+    give(seen, ("three", KEY.Key_Return))
+    assert (seen.answers[1:], seen.focus) == ([("text2", "three")], seen.page.button)
+
+
+def test_a_line_begins_in_its_middle_and_says_that_it_has_no_answer(opening: Opening) -> None:
+    seen = opening(KINDS["slider"].page, FULL)
+    texts = [label.text() for label in seen.question(1).findChildren(QLabel)]
+    assert {"Unpleasant", "no answer yet", "Pleasant"} <= {*texts}
+    for key, value in (("Right", 50), ("Right", 55), ("Left", 50), ("PageUp", 100), ("PageDown", 50), ("Home", 0)):
+        seen.press(getattr(KEY, f"Key_{key}"))
+        assert seen.answers[-1] == ("pleasant", value), key
+    assert "no answer yet" not in seen.texts
 
 
 TLX = tuple(
