@@ -12,7 +12,16 @@ from typing import Any
 
 import pytest
 
-from study_app.designer.document.document import Document, check_version, next_version, version_standing
+from study_app.designer.document import document
+from study_app.designer.document.document import (
+    Document,
+    check_version,
+    next_version,
+    open_file,
+    open_new,
+    open_unsaved,
+    version_standing,
+)
 from study_app.designer.document.fields import rows
 from study_app.designer.document.study import read_study
 from study_app.designer.document.toml_edits import Insert, Set
@@ -83,6 +92,177 @@ def test_a_step_of_several_edits_is_undone_and_redone_as_one() -> None:
     assert (opened.study.text, opened.selected) == (DEMO.text, ("blocks", "liquids"))
     opened.redo()
     assert (opened.study.text, opened.selected) == (after, ("study",))
+
+
+def title_of(opened: Document) -> Any:
+    return opened.study.document["study"]["title"]
+
+
+def edit_title(opened: Document, title: str, **given: Any) -> None:
+    opened.edit(title, Set(("study", "title"), title), **given)
+
+
+def test_undo_and_redo_lose_no_step_and_an_edit_ends_what_can_be_redone() -> None:
+    opened = Document(DEMO, ("tasks",))
+    for title, selected in (("One", ("study",)), ("Two", ("scene",)), ("Three", None)):
+        edit_title(opened, title, select=selected, key="title")
+        opened.end_step()
+    assert [(step.title, step.before, step.after) for step in opened.done] == [
+        ("One", ("tasks",), ("study",)), ("Two", ("study",), ("scene",)), ("Three", ("scene",), ("scene",))
+    ]  # fmt: skip
+    seen = []
+    for act in (opened.undo, opened.undo, opened.redo, opened.undo, opened.undo, opened.undo, opened.redo):
+        act()
+        seen.append((title_of(opened), opened.selected, len(opened.done), len(opened.undone)))
+    first = DEMO.document["study"]["title"]
+    assert seen == [
+        ("Two", ("scene",), 2, 1), ("One", ("study",), 1, 2), ("Two", ("scene",), 2, 1), ("One", ("study",), 1, 2),
+        (first, ("tasks",), 0, 3), (first, ("tasks",), 0, 3), ("One", ("study",), 1, 2),
+    ]  # fmt: skip
+    edit_title(opened, "Four", key="title")
+    assert (len(opened.done), opened.undone) == (2, [])
+    opened.redo()
+    assert title_of(opened) == "Four"
+    edit_title(opened, "Five", select=("limits",), key="title")
+    assert [(step.title, step.before, step.after) for step in opened.done[1:]] == [("Five", ("study",), ("limits",))]
+    opened.undo()
+    edit_title(opened, "Six", key="title")
+    assert [step.title for step in opened.done] == ["One", "Six"], "an undone step is closed"
+    opened.undo()
+    assert (title_of(opened), opened.selected) == ("One", ("study",))
+
+
+def test_the_last_500_steps_can_be_undone(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(document, "_MAX_STEPS", 3)
+    opened = Document(DEMO)
+    for number in range(5):
+        edit_title(opened, f"Title {number}")
+    for _ in range(5):
+        opened.undo()
+    assert (title_of(opened), len(opened.undone)) == ("Title 1", 3)
+
+
+def test_a_text_and_edits_of_it_are_one_step() -> None:
+    opened = Document(DEMO)
+    opened.edit("Both", Set(("study", "version"), "7"), text=DEMO.text.replace('"A first look"', '"Typed"', 1))
+    assert (title_of(opened), opened.version, opened.title, opened.name) == ("Typed", "7", "Typed", "demo")
+    opened.undo()
+    assert opened.study.text == DEMO.text
+    opened.edit("Text", text=re.sub(r"(?m)^version = .*\n", "", DEMO.text, count=1))
+    assert (opened.version, len(opened.done)) == ("1", 1)
+
+
+@pytest.fixture
+def own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A study of the workspace."""
+    monkeypatch.setenv("LIQUID_STUDY_WORKSPACE", str(tmp_path))
+    file = tmp_path / "protocols" / "own.toml"
+    file.parent.mkdir()
+    file.write_text(TEXT.replace('name = "demo"', 'name = "own"'), encoding="utf-8", newline="\n")
+    return file
+
+
+def test_a_draft_is_kept_while_the_text_differs_from_the_file_and_comes_back(own: Path, tmp_path: Path) -> None:
+    opened = open_file(own, tmp_path / "results")
+    assert (opened.edited, opened.draft, opened.kept, opened.selected) == (False, None, None, ("pages", "welcome"))
+    edit_title(opened, "Draft", select=("tasks", "reach"))
+    opened.note_edit(5.0)
+    assert (opened.edited, opened.write_draft(5.0 + REST_S - 0.01), opened.kept) == (True, False, None)
+    assert opened.write_draft(5.0 + REST_S)
+    assert opened.kept is not None
+    again = open_file(own, tmp_path / "results")
+    assert (title_of(again), again.selected, [step.title for step in again.done]) == (
+        "Draft", ("tasks", "reach"), ["Restore the draft"]
+    )  # fmt: skip
+    assert (again.draft.text, again.base) == (opened.study.text, opened.base)  # type: ignore[union-attr]
+    again.undo()
+    assert again.study.text == own.read_text("utf-8")
+    again.note_edit(0.0)
+    assert (draft_of(own), again.kept) == (None, None), "the text is the file's"
+    edit_title(again, "Draft")
+    again.note_edit(0.0)
+    again.write_draft()
+    again.discard_draft()
+    assert (again.edited, again.draft, draft_of(own), again.done[-1].title) == (False, None, None, "Discard the draft")
+    again.undo()
+    assert title_of(again) == "Draft"
+
+
+def test_what_another_program_writes_is_taken_or_kept_out(own: Path, tmp_path: Path) -> None:
+    opened, other = open_file(own, tmp_path / "results"), TEXT.replace('"A first look"', '"Other"', 1)
+    edit_title(opened, "Mine")
+    assert not opened.changed_outside()
+    own.write_text(other, encoding="utf-8", newline="\n")
+    assert opened.changed_outside()
+    opened.keep_edits(0.0)
+    assert (title_of(opened), opened.saved, opened.changed_outside(), opened.edited) == ("Mine", other, False, True)
+    opened.take_file_content()
+    assert (title_of(opened), opened.edited, opened.done[-1].title) == ("Other", False, "Use the file's content")
+    assert opened.base == opened.keeper.base == content_hash(other.encode())
+    opened.undo()
+    assert title_of(opened) == "Mine"
+    own.unlink()
+    assert opened.changed_outside()
+    opened.keep_edits(0.0)
+    assert (opened.base, opened.saved, opened.changed_outside()) == ("", "", False)
+    opened.save(())
+    assert own.read_text("utf-8") == opened.study.text
+    assert (opened.edited, opened.changed_outside(), draft_of(own)) == (False, False, None)
+    own.unlink()
+    assert Document(DEMO, (), own).changed_outside() is False, "it was never saved"
+
+
+def test_a_study_that_cannot_be_changed_says_why(own: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    results = tmp_path / "results"
+    assert open_file(shipped()["demo"], results).read_only.startswith("This study ships with the program.")
+    edit_title(opened := open_file(own, results), "Draft")
+    opened.note_edit(0.0)
+    opened.write_draft()
+    path = results / "own" / "data" / "sub-P001" / "ses-01"
+    path.mkdir(parents=True)
+    monkeypatch.setattr(document, "is_open", lambda folder: folder == path)
+    reading = open_file(own, results)
+    assert reading.read_only == "A session of this study is running. Make a copy, or wait until it has ended."
+    assert (reading.draft, reading.edited) == (None, False)
+    assert open_file(own, tmp_path / "others").read_only == ""
+    monkeypatch.setattr(os, "access", lambda file, how: (file, how) != (own, os.W_OK))
+    assert open_file(own, tmp_path / "others").read_only.startswith("You do not have permission to write this file.")
+
+
+def test_a_copy_takes_the_edits_along_and_leaves_the_original_as_saved(own: Path, tmp_path: Path) -> None:
+    opened = open_file(own, tmp_path / "results")
+    edit_title(opened, "Mine", select=("scene",))
+    copy = opened.copy_as("other")
+    assert (copy.name, copy.version, title_of(copy), copy.selected) == ("other", "0.1", "Mine", ("scene",))
+    assert (copy.file, copy.base, [step.title for step in copy.done]) == (
+        own.with_name("other.toml"), "", ["Mine", "Save as other"]
+    )  # fmt: skip
+    assert draft_of(copy.file).text == copy.study.text  # type: ignore[union-attr]
+    assert (opened.edited, title_of(opened)) == (False, "A first look")
+    unsaved = open_unsaved(copy.file, draft_of(copy.file))  # type: ignore[arg-type]
+    assert (unsaved.study.text, unsaved.file, unsaved.base, unsaved.edited) == (copy.study.text, copy.file, "", True)
+    assert (unsaved.selected, open_unsaved(copy.file, Draft(text="", base="")).selected) == (("scene",), ("study",))
+    copy.discard()
+    assert draft_of(copy.file) is None
+    new = open_new(DEMO, "fresh")
+    assert (new.name, new.version, new.file, new.base) == ("fresh", "0.1", own.with_name("fresh.toml"), "")
+    with pytest.raises(Refused, match=r"own\.toml already exists; \"own2\" is free"):
+        open_new(DEMO, "own")
+
+
+def test_a_version_that_was_run_is_not_saved_with_other_content(own: Path, tmp_path: Path) -> None:
+    opened = open_file(own, tmp_path / "results")
+    ran = (Run(hash=content_hash(opened.study.source), version="1.0", sessions=2),)
+    opened.save(ran)
+    edit_title(opened, "Mine")
+    with pytest.raises(Refused, match=r"version 1\.0 has .* content \(2 sessions\): save the study as version 1\.1"):
+        opened.save(ran)
+    standing = opened.standing(ran)
+    assert (standing.version, standing.conflicts, standing.needs_confirmation) == ("1.1", 2, True)
+    assert opened.standing(()).needs_confirmation is False
+    opened.edit("Version", Set(("study", "version"), "1.1"))
+    opened.save(ran)
+    assert kept_content(content_hash(opened.study.source)) == opened.study.source == own.read_bytes()
 
 
 def test_a_step_that_changes_nothing_is_none() -> None:
