@@ -6,6 +6,7 @@ import sys
 import threading
 from collections.abc import Iterator
 from itertools import pairwise
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -59,6 +60,9 @@ def test_works_are_done_as_often_as_asked_where_there_is_room_and_else_wait_thei
     frame = Frame(plot=(30, 2), table=(500, 1))
     assert max(frame.run(120, 16)) == 0
     assert (len(frame.times("plot")), len(frame.times("table"))) == (60, 4)
+    frame = Frame(plot=(30, 1))
+    frame.run(9, 15)
+    assert frame.times("plot") == [2, 32, 62, 92, 122], "as soon as its period is over"
     frame = Frame(one=(30, 3), other=(30, 3))
     assert max(frame.run(100, 7)[2:]) == 0, "how long they take is known after the first time"
     frames = [at // 7 for _, at in frame.done[2:]]
@@ -73,6 +77,8 @@ def test_what_never_fits_is_done_one_thing_at_a_time_and_never_more_than_its_sha
         max(late - early for early, late in pairwise(frame.times("slow"))) <= (MOST_PERIODS + 1) * 30 + 9 / MOST_SHARE
     )
     assert 9 * len(frame.done) <= 1.1 * MOST_SHARE * 400 * 7
+    gaps = [late - early for early, late in pairwise(frame.times("slow"))]
+    assert min(gaps[1:]) >= 9 / MOST_SHARE + MOST_PERIODS * 30
     frame = Frame(one=(30, 9), other=(30, 9))
     assert max(frame.run(400, 7)[2:]) <= 9
     assert min(len(frame.times(name)) for name in ("one", "other")) > 10
@@ -167,6 +173,124 @@ def test_what_has_settled_is_looked_at_no_more_until_it_is_again() -> None:
         unfreeze_garbage()
     gc.collect()
     assert len(freed_in) == 3
+
+
+class Collector:
+    """In place of the module of the collector: has the counts it was given, and keeps what it is asked."""
+
+    def __init__(self, counts: tuple[int, ...] = (0, 0, 0), thresholds: tuple[int, ...] = (700, 10, 10)) -> None:
+        self.counts, self.thresholds, self.frozen = counts, thresholds, 0
+        self.enabled = True
+        self.asked: list[Any] = []
+
+    def get_count(self) -> tuple[int, ...]:
+        return self.counts
+
+    def get_threshold(self) -> tuple[int, ...]:
+        return self.thresholds
+
+    def get_freeze_count(self) -> int:
+        return self.frozen
+
+    def isenabled(self) -> bool:
+        return self.enabled
+
+    def collect(self, generation: int | None = None) -> None:
+        self.asked.append(generation)
+
+    def __getattr__(self, name: str) -> Any:
+        return lambda: self.asked.append(name)
+
+
+@pytest.fixture
+def collector(monkeypatch: pytest.MonkeyPatch) -> Iterator[Collector]:
+    made = Collector()
+    monkeypatch.setattr(timing, "gc", made)
+    yield made
+    unfreeze_garbage()
+
+
+@pytest.mark.parametrize(
+    ("counts", "thresholds", "oldest"),
+    [
+        ((700, 10, 10), (700, 10, 10), None), ((701, 10, 10), (700, 10, 10), 0), ((701, 11, 2), (700, 10, 10), 1),
+        ((3, 2, 11), (700, 10, 10), 2), ((701, 11, 11), (700, 10, 10), 2), ((701, 2, 50), (700, 10, 0), 0),
+        ((5, 2, 50), (700, 10, 0), None),
+    ],
+)  # fmt: skip
+def test_the_oldest_generation_that_is_due_is_collected(
+    collector: Collector, counts: tuple[int, ...], thresholds: tuple[int, ...], oldest: int | None
+) -> None:
+    collector.counts, collector.thresholds = counts, thresholds
+    assert timing.collect_if_due() == oldest
+    assert collector.asked == ([] if oldest is None else [oldest])
+
+
+@pytest.mark.parametrize(
+    ("counts", "took_s", "frozen", "in_session", "asked"),
+    [
+        ((0, 0, 11), 0.021, 400_000, False, [2, "freeze"]),
+        ((0, 0, 11), 0.021, 500_001, False, [2, "freeze", "unfreeze"]),
+        ((0, 0, 11), 0.021, 500_001, True, [2, "freeze"]),
+        ((0, 0, 11), 0.019, 500_001, False, [2]),
+        ((0, 11, 0), 0.021, 500_001, False, [1]),
+    ],
+)
+def test_objects_of_a_long_collection_are_frozen_unless_there_are_too_many(
+    collector: Collector, monkeypatch: pytest.MonkeyPatch, counts: Any, took_s: float, frozen: int,
+    in_session: bool, asked: list[Any],
+) -> None:  # fmt: skip
+    now_s = iter([5.0, 5.0 + took_s])
+    monkeypatch.setattr(timing, "time", SimpleNamespace(thread_time=lambda: next(now_s)))
+    collector.counts, collector.frozen = counts, frozen
+    if in_session:
+        freeze_garbage()
+        assert collector.asked == [timing.YOUNG, "freeze"]
+        collector.asked.clear()
+    timing._collect()
+    assert collector.asked == asked
+
+
+@pytest.mark.parametrize(("enabled", "at_the_end"), [(True, [None, "enable"]), (False, [])])
+def test_this_thread_collects_until_the_windows_are_closed(
+    qtbot: Any, collector: Collector, enabled: bool, at_the_end: list[Any]
+) -> None:
+    collector.enabled, collector.counts = enabled, (701, 0, 0)
+    with collecting_in_this_thread():
+        assert collector.asked == ["disable"]
+        qtbot.waitUntil(lambda: collector.asked == ["disable", 0, 0])
+        collector.counts = (0, 0, 0)
+    assert collector.asked[3:] == ["unfreeze", *at_the_end]
+    collector.asked.clear()
+    with collecting_in_this_thread():
+        timing.disable_collection()
+    assert collector.asked == ["disable", "unfreeze", *at_the_end[1:]]
+    collector.counts = (701, 0, 0)
+    qtbot.wait(250)
+    assert 0 not in collector.asked[3:], "its timer has stopped"
+
+
+def test_windows_and_macos_have_levels_of_their_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[tuple[Any, int]] = []
+
+    def set_priority(thread: Any, level: int) -> int:
+        asked.append((thread.value, level))
+        return 1
+
+    current = type("Call", (), {"__call__": lambda _self: 77})()
+    kernel = SimpleNamespace(GetCurrentThread=current, SetThreadPriority=set_priority)
+    made = ThreadPriority()
+    monkeypatch.setattr(timing, "sys", SimpleNamespace(platform="win32"))
+    monkeypatch.setattr(timing, "ctypes", SimpleNamespace(c_void_p=lambda value: SimpleNamespace(value=value)))
+    assert made.raise_priority() is False
+    monkeypatch.setattr(timing.ctypes, "windll", SimpleNamespace(kernel32=kernel), raising=False)
+    assert made.raise_priority() is True
+    made.restore()
+    assert asked == [(77, timing.ABOVE_NORMAL), (77, timing.NORMAL)]
+    monkeypatch.setattr(timing, "sys", SimpleNamespace(platform="darwin"))
+    assert made.raise_priority() is True
+    made.restore()
+    assert len(asked) == 2
 
 
 def level() -> int:
