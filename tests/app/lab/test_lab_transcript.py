@@ -9,9 +9,12 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import pytest
+
 from study_app.app import lab_controller
 from study_app.app.lab_controller import LabController
 from study_app.errors import DeviceNotFound, ServoFault
+from study_app.evidence.appraisal import Costs, EffectCost, Errors
 from study_app.lab.ab_comparison import Workbench
 from study_app.lab.presets import Choice
 from study_app.workers.server import Crashed
@@ -218,3 +221,52 @@ def test_every_signal(qtbot: Any, tmp_path: Path, monkeypatch: Any, caplog: Any)
     lines += [*map(str, sorted(path.name for path in tmp_path.iterdir()))]
     found = (line.replace(repr(str(tmp_path))[1:-1], "FOLDER").replace(str(tmp_path), "FOLDER") for line in lines)
     check_kept(Path(__file__).with_name("lab.txt"), what_comes(found))
+
+
+def test_the_parts_of_a_tick_are_listed_by_their_price_and_absent_ones_last() -> None:
+    effects = (
+        EffectCost("history", None, "not used"), EffectCost("drag", 10.0), EffectCost("wake", 80.0),
+        EffectCost("buoyancy", None, "no measurement"),
+    )  # fmt: skip
+    rows = lab_controller._cost_rows(Costs(tick_ns=160.0, rest_ns=60.0, effects=effects))
+    assert [(row.effect, row.ns, row.why) for row in rows] == [
+        ("Wake", 80.0, ""), ("Servo alone", 60.0, ""), ("Drag", 10.0, ""), ("History", None, "not used"),
+        ("Buoyancy", None, "no measurement"),
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("errors", "values", "note"),
+    [
+        (
+            Errors(wake=2e-15, force_n=0.00099, lag_s=0.0095, left_out=()),
+            ["2e−15", "< 0.001 N", "9.5 ms"],
+            "along programmed paths",
+        ),
+        (
+            Errors(wake=3.4e-7, force_n=0.001, lag_s=-1e-6, left_out=("history", "buoyancy")),
+            ["3e−7", "0.001 N", "0.0 ms"],
+            "for drag and wake only; no reference exists for history, buoyancy",
+        ),
+        (
+            Errors(wake=None, force_n=None, lag_s=0.0, left_out=()),
+            ["no wake", "no drag", "0.0 ms"],
+            "along programmed paths",
+        ),
+        (
+            Errors(wake=0.0, force_n=0.1236, lag_s=0.02, left_out=()),
+            ["0", "0.124 N", "20.0 ms"],
+            "along programmed paths",
+        ),
+    ],
+)
+def test_the_errors_of_a_setting_are_stated_with_what_they_hold_for(
+    errors: Errors, values: list[str], note: str
+) -> None:
+    rows = lab_controller._error_rows(errors)
+    assert [row.value for row in rows] == values
+    assert [(row.measure, row.note) for row in rows] == [
+        ("Largest relative wake error", note),
+        ("Largest force error", note),
+        ("Velocity filter lag", "at constant acceleration"),
+    ]

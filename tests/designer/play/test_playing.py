@@ -19,7 +19,7 @@ from study_app.app.session import playing
 from study_app.app.session.bridge import SessionBridge
 from study_app.designer.document.document import template
 from study_app.designer.participant.playable import StepPosition
-from study_app.errors import DeviceLost
+from study_app.errors import DeviceLost, StoreError
 from study_app.gui.operator.window import OperatorWindow
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.gui.sessions.session_facts import sessions
@@ -326,3 +326,44 @@ def test_the_end_of_a_pilot_is_told(
     notice = designer.place.header.strip.notice
     words = f"Played from Thin: {outcome}. The recorded data will be deleted unless you save them."
     assert (notice and notice.text, data.exists()) == ((words, True) if outcome else (None, False))
+
+
+def test_a_pilot_that_cannot_be_prepared_or_kept_says_why(
+    qtbot: Any, designer: Any, folders: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(error: Exception) -> Any:
+        def fail(*_given: Any, **_named: Any) -> None:
+            raise error
+
+        return fail
+
+    designer.open()
+    pilots, told = designer.playing, designer.messages
+    with monkeypatch.context() as patch:
+        patch.setattr(tempfile, "mkdtemp", refuse(OSError(28, "No space left on device")))
+        pilots.play()
+    assert told == [("The study cannot be played", "A temporary folder cannot be created: No space left on device.")]
+    assert (pilots.is_under_way, pilots.pilot) == (False, None)
+    with monkeypatch.context() as patch:
+        patch.setattr(playing, "write_file", refuse(StoreError("the disk is full")))
+        pilots.play()
+        qtbot.waitUntil(lambda: not pilots.is_under_way)
+    assert told[1:] == [("The study cannot be played", "the disk is full.")]
+    assert (list(folders.iterdir()), designer.place.header.strip.notice) == ([], None)
+    study = SimpleNamespace(study=SimpleNamespace(name="kitchen"))
+    (folders / "pilot" / "results").mkdir(parents=True)
+    (folders / "pilot" / "results" / "data.txt").write_text("8", encoding="utf-8", newline="\n")
+    what, choices = SimpleNamespace(words="Thin", protocol=study, source=b""), SimpleNamespace()
+    choices.results = folders / "pilot" / "results"
+    pilots.pilot = playing._Pilot(what, "scripted", folders / "pilot", choices)
+    with monkeypatch.context() as patch:
+        patch.setattr(playing, "copy_folder", refuse(StoreError("the disk is full")))
+        designer.place.header.strip.asked.emit("keep")
+    assert told[2:] == [("The pilot was not saved", "the disk is full.")]
+    assert (folders / "pilot" / "results").exists()
+    with qtbot.waitSignal(pilots.kept) as kept_in:
+        designer.place.header.strip.asked.emit("keep")
+    assert kept_in.args == [designer.results / "kitchen-pilot-1"]
+    assert (kept_in.args[0] / "data.txt").read_text("utf-8") == "8"
+    assert (list(folders.iterdir()), pilots.pilot) == ([], None)
+    assert "kitchen-pilot-1" in designer.place.header.strip.notice.text
