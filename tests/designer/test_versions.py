@@ -16,13 +16,18 @@ from PySide6.QtWidgets import QApplication, QLabel
 
 from study_app.app.main_controller import MainController
 from study_app.designer.controller import DesignerController
+from study_app.designer.document.document import Document, Standing
 from study_app.designer.document.steps import SetValue
+from study_app.designer.document.study import read_study
+from study_app.designer.version_rows import Comparison
+from study_app.designer.versions import SaveCard, Version, compare, latest_run, version_of
 from study_app.gui.sessions.session_facts import SessionFacts
 from study_app.gui.widgets.cards import Chip
 from study_app.protocol.source.files import protocol_hash, shipped_file
 from study_app.store.versions.drafts import draft_of
+from study_app.store.versions.study_runs import Run
 from study_app.store.versions.study_versions import kept_content, kept_versions
-from tests.designer.support.designer import Designer
+from tests.designer.support.designer import DEMO, Designer
 from tests.designer.support.runs import run
 
 pytestmark = pytest.mark.slow
@@ -33,6 +38,94 @@ def lines(designer: Any) -> list[str]:
     """The lines of the difference that is shown, without its context."""
     shown = designer.controller.changes.difference.toPlainText().splitlines()
     return [line.partition("  #")[0].rstrip() for line in shown if line[:1] in {"-", "+"}]
+
+
+STUDY = read_study(DEMO.encode())
+
+
+def run_with(content: str, version: str, **counts: int) -> Run:
+    return Run(hash=content, version=version, **counts)
+
+
+def test_the_last_run_with_participants_comes_before_later_pilots() -> None:
+    first, last, pilot = (
+        run_with("a", "1.0", sessions=2),
+        run_with("b", "1.1", sessions=1),
+        run_with("c", "1.2", pilots=3),
+    )
+    assert latest_run((first, last, pilot)) == last
+    assert latest_run(iter((pilot, run_with("d", "2", rehearsals=1)))) == run_with("d", "2", rehearsals=1)
+    assert latest_run(()) is None
+
+
+def test_a_study_is_compared_with_a_text_or_with_what_a_receipt_holds(designer: Any) -> None:
+    before = DEMO.replace("repetitions = 1 ", "repetitions = 3 ", 1)
+    shown = compare(Version(before.replace("\n", "\r\n")), STUDY)
+    assert [line.partition("  #")[0].rstrip() for line in shown.lines if line[0] in "+-"] == [
+        "-repetitions = 3", "+repetitions = 1"
+    ]  # fmt: skip
+    assert shown.note == ""
+    assert compare(Version(DEMO), STUDY) == Comparison((), "The study is identical to this version.")
+    designer.open()
+    run(designer, "P001", before.encode())
+    (held,) = designer.controller.runs.read()
+    sentences = compare(Version(None, held), STUDY)
+    assert any("repetitions" in sentence.lower() for sentence in sentences.lines), sentences
+    assert sentences.note.startswith("This computer does not have a copy of this version. The differences")
+    faulty = read_study(DEMO.replace("repetitions = 1 ", "repetitions = 0 ", 1).encode())
+    for version, study in ((Version(None, held), faulty), (Version(None), STUDY)):
+        assert compare(version, study).lines == ()
+        assert compare(version, study).note.startswith("This computer does not have a copy of this version. To list")
+
+
+def test_the_source_of_a_run_is_that_of_the_file_if_it_has_this_content(designer: Any) -> None:
+    designer.open()
+    opened: Document = designer.editing.opened
+    designer.editing.handle_request(SetValue(REPETITIONS, 3))
+    ran, other = run_with(protocol_hash(DEMO.encode()), "1.0", sessions=1), run_with("0" * 64, "1.0", sessions=1)
+    assert version_of(opened, ran) == Version(DEMO, ran)
+    assert version_of(opened, ran).text == DEMO
+    assert version_of(opened, other) == Version(None, other)
+    assert version_of(opened, other).text is None
+
+
+@pytest.mark.parametrize(
+    ("problems", "note"), [(0, ""), (1, "1 problem: correct it is"), (2, "2 problems: correct they are")]
+)
+def test_the_card_for_saving_asks_for_a_version_or_a_name(qtbot: Any, problems: int, note: str) -> None:
+    standing, known = (
+        Standing("1.2", "1.1", 0, True, 2),
+        (run_with("a", "1.0", sessions=2), run_with("b", "1.1", sessions=1, pilots=3)),
+    )
+    card, heard = (
+        SaveCard(standing, (*known, run_with("c", "0.9", pilots=1)), Comparison(("-a", "+b"), "Note."), problems),
+        [],
+    )
+    qtbot.addWidget(card)
+    for name in ("save_asked", "another_asked", "changes_asked"):
+        getattr(card, name).connect(lambda *given, name=name: heard.append((name, *given)))
+    words = " ".join(part.text() for part in card.findChildren(QLabel))
+    assert "has been run: 2 sessions with version 1.0; 1 session, 3 pilots with version 1.1. A version" in words
+    assert (card.difference.toPlainText(), card.difference.isHidden(), "Note." in words) == ("-a\n+b", False, True)
+    assert note in words
+    assert ("problem" in words) is bool(problems)
+    assert (card.version.text(), card.save.text(), card.first) == ("1.2", "Save 1.2", card.save)
+    card.refuse("not this.")
+    qtbot.keyClick(card.version, Qt.Key.Key_Backspace)
+    qtbot.keyClicks(card.version, "3 ")
+    assert (card.save.text(), card.refusal.text()) == ("Save 1.3", "")
+    qtbot.keyClick(card.version, Qt.Key.Key_Return)
+    card.changes.click()
+    card.another.click()
+    assert (card.save.text(), card.version.isHidden(), card.name.isHidden(), card.another.isHidden()) == (
+        "Save the new study", True, False, True
+    )  # fmt: skip
+    qtbot.keyClicks(card.name, " mine")
+    qtbot.keyClick(card.name, Qt.Key.Key_Return)
+    card.save.click()
+    card.refuse("taken.")
+    assert card.refusal.text() == "Taken."
+    assert heard == [("save_asked", "1.3"), ("changes_asked",), *[("another_asked", "mine")] * 2]
 
 
 def test_a_draft_can_be_continued_where_no_study_is_open(designer: Any) -> None:
