@@ -234,6 +234,24 @@ def test_two_programs_on_one_study_lose_no_edit_silently(designer: Any) -> None:
     assert any("Typed elsewhere" in line for line in lines(designer))
 
 
+def test_a_session_of_another_study_is_not_compared(designer: Any) -> None:
+    changed = designer.file.read_bytes().replace(b"repetitions = 1 ", b"repetitions = 3 ", 1)
+    folder = run(designer, "P001", changed, study="elsewhere")
+    designer.open()
+    changes, pane = designer.controller.changes, designer.place.pane
+    tab = pane.tab
+    changes.compare_with_session("demo", folder)
+    changes.compare_with_session("kitchen", folder.parent)  # there is no receipt
+    assert (pane.tab, changes.chosen) == (tab, "")
+    changes.compare_with_session("kitchen", folder)
+    assert (pane.tab, changes.chosen) == ("changes", protocol_hash(changed))
+    assert changes.note.text().startswith("This computer does not have a copy of this version. The differences")
+    assert (changes.restore.isEnabled(), changes.nothing.isHidden()) == (False, True)
+    designer.open("demo")
+    changes.compare_now()
+    assert protocol_hash(changed) not in [changes.version.itemData(at) for at in range(changes.version.count())]
+
+
 @pytest.mark.parametrize(("kind", "key"), [("pilot", "pilot"), ("rehearsal", "simulated")])
 def test_changes_begin_with_the_last_session_where_no_participant_was_run(
     designer: Any, qtbot: Any, kind: str, key: str

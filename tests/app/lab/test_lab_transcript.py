@@ -270,3 +270,14 @@ def test_the_errors_of_a_setting_are_stated_with_what_they_hold_for(
         ("Largest force error", note),
         ("Velocity filter lag", "at constant acceleration"),
     ]
+
+
+def test_liquids_of_a_file_are_listed_once_however_often_it_is_opened(tmp_path: Path) -> None:
+    file, honey = tmp_path / "oils.toml", Choice(source="rek2024", liquid="honey", title="Honey")
+    table = "[liquids.{}]\ndensity_kg_m3 = 900\n"
+    file.write_text(f"format = 2\n{table.format('thin_oil')}{table.format('thick')}", encoding="utf-8", newline="\n")
+    saving = lab_controller._LabSaving((honey,))
+    for _ in range(2):
+        assert saving.open_liquids(file).liquid == "thin_oil"
+    assert [choice.liquid for choice in saving.liquids] == ["honey", "thin_oil", "thick"]
+    assert saving.said == "Opened oils.toml: Thin oil, Thick"

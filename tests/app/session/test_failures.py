@@ -3,12 +3,14 @@
 import pkgutil
 import threading
 import weakref
+from types import SimpleNamespace
 
 import pytest
 from PySide6.QtCore import QEvent, Qt, QTimer
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QApplication, QLabel, QWidget
 
+from study_app.app.failures import Patience
 from study_app.errors import StudyError
 from study_app.gui.kit.dialogs import Question
 from study_app.gui.widgets.main_view import EscapeKey
@@ -54,6 +56,13 @@ def test_a_plug_in_that_fails_is_zero_force_and_named(bridge, world, caplog, tmp
     assert world.events().count("broke") == 1
     caplog.clear()
     forget("toy_plug")
+
+
+def test_several_waits_share_one_limit(monkeypatch):
+    times_s = iter([10.0, 10.0, 11.5, 12.0, 14.0])  # the first is that of the beginning
+    monkeypatch.setattr("study_app.app.failures.time", SimpleNamespace(perf_counter=lambda: next(times_s)))
+    patience = Patience(2.0)
+    assert [patience.left_s for _ in range(4)] == [2.0, 0.5, 0.0, 0.0]
 
 
 BROKEN = "no such colour"
