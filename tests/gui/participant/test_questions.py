@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from PySide6.QtCore import QPoint, Qt
-from PySide6.QtGui import QImage, QPointingDevice
+from PySide6.QtCore import QEvent, QPoint, Qt
+from PySide6.QtGui import QEnterEvent, QImage, QPointingDevice
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
     QAbstractButton,
@@ -329,6 +329,23 @@ def test_a_key_leads_to_the_next_question_and_a_click_stays(opening: Opening) ->
     assert (second.value, seen.focus) == (5, seen.page.button)
 
 
+def test_the_mouse_points_at_an_option_until_it_leaves_and_a_finger_at_none(
+    opening: Opening, finger: QPointingDevice
+) -> None:
+    seen, pointed = opening(alone(1), FULL), list[int]()
+    question = seen.question(1)
+    question.pointed_at.connect(pointed.append)
+    for place in (1, 0):
+        QApplication.sendEvent(question.options[place], QEnterEvent(QPoint(1, 1), QPoint(1, 1), QPoint(1, 1)))
+        assert [option.pointed for option in question.options] == [at == place for at in range(3)]
+        QApplication.sendEvent(question.options[place], QEvent(QEvent.Type.Leave))
+        assert not any(option.pointed for option in question.options)
+    assert pointed == [1, -1, 0, -1]
+    question.point_at(2)
+    tap(finger, question.options[2])
+    assert (question.pointed, seen.answers) == (-1, [("hand", "both")])
+
+
 def test_enter_begins_a_line_where_there_are_several_and_goes_on_with_ctrl(opening: Opening, qtbot: Any) -> None:
     page = form(*(TextView(f"text{n}", n, "What else?", False, lines=lines) for n, lines in ((1, 3), (2, 1))))
     seen = opening(page, FULL)
@@ -348,6 +365,34 @@ def test_a_line_begins_in_its_middle_and_says_that_it_has_no_answer(opening: Ope
         seen.press(getattr(KEY, f"Key_{key}"))
         assert seen.answers[-1] == ("pleasant", value), key
     assert "no answer yet" not in seen.texts
+
+
+def test_the_place_where_the_handle_is_let_go_is_the_answer(opening: Opening) -> None:
+    seen = opening(KINDS["slider"].page, FULL)
+    line = seen.page.findChild(QSlider)
+    middle = line.height() // 2
+    left, half, right = (QPoint(x, middle) for x in (0, line.width() // 2, line.width() - 1))
+    for button, places, answers in (
+        (Qt.MouseButton.RightButton, (half, right, left), []),
+        (Qt.MouseButton.LeftButton, (half, right, right), [100]),
+        (Qt.MouseButton.LeftButton, (right, half, left), [100, 0]),
+    ):
+        before = len(seen.answers)
+        QTest.mousePress(line, button, pos=places[0])
+        QTest.mouseMove(line, places[1])
+        if button is Qt.MouseButton.LeftButton:
+            assert line.value() == {half: 10, right: 20}[places[1]]
+        assert len(seen.answers) == before
+        QTest.mouseRelease(line, button, pos=places[2])
+        assert [value for _, value in seen.answers] == answers
+
+
+@pytest.mark.parametrize("text_scale", [1.0, 2.0])
+def test_what_is_hit_grows_with_the_text_but_never_shrinks(opening: Opening, text_scale: float) -> None:
+    seen = opening(KINDS["slider"].page, FULL, text_scale=text_scale)
+    scale = seen.question(1).scale
+    assert (scale > 1.3) is (text_scale == 2.0)
+    assert seen.page.findChild(QSlider).height() == round(LEAST_TARGET * max(1.0, scale))
 
 
 TLX = tuple(
