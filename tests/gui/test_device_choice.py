@@ -5,8 +5,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from PySide6.QtCore import Qt
+from PySide6.QtCore import Qt, QTimer
 from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QLabel, QProgressBar
 
 from study_app.errors import DeviceError, DeviceNotFound
 from study_app.gui.startup_window import OpeningWindow
@@ -58,6 +59,32 @@ def opening(qtbot: Any) -> OpeningWindow:
     made.show()
     qtbot.waitExposed(made)
     return made
+
+
+def test_the_note_says_what_takes_long_unless_the_device_asks_for_something(qtbot: Any) -> None:
+    now_s = [100.0]
+    made = OpeningWindow("A first look", "Participant P001", now_s=lambda: now_s[0])
+    qtbot.addWidget(made)
+    bar, tick = made.findChild(QProgressBar), made.findChild(QTimer).timeout.emit
+    texts = [part.text() for part in made.findChildren(QLabel)]
+    assert {"A first look", "Participant P001", "Preparing the device and the force model …"} <= {*texts}
+    for seconds, elapsed, is_long in ((3.9, "0:03", False), (4.0, "0:04", False), (72.5, "1:12", True)):
+        now_s[0] = 100.0 + seconds
+        tick()
+        assert (made.elapsed.text(), made.step.text().startswith("The force model")) == (elapsed, is_long)
+    assert bar.maximum() == 0
+    made.show_line("Pull the grip out.")
+    tick()
+    made.show_compiled(0.375)
+    assert (made.step.text(), bar.maximum(), bar.value()) == ("Pull the grip out.", 100, 38)
+    other = OpeningWindow("A first look", "Participant P001")
+    qtbot.addWidget(other)
+    other.show()
+    other.show_compiled(0.0)
+    assert other.step.text().startswith("The force model is being compiled.")
+    with qtbot.waitSignal(other.cancelled):
+        other.cancel.click()
+    assert not other.findChild(QTimer).isActive()
 
 
 @pytest.mark.parametrize("ready", [False, True])
