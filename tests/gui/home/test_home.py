@@ -177,6 +177,10 @@ def test_the_height_of_the_cards_is_that_of_their_texts_in_the_present_width(qtb
     grid.show_cards(cards)
     QApplication.processEvents()
     assert grid.whole_height == sum(card.heightForWidth(240) for card in cards) + grid.layout().verticalSpacing()
+    (other,) = made = [label("other", "label")]
+    grid.show_cards(made)
+    assert [grid.layout().indexOf(card) for card in (other, *cards)] == [0, -1, -1]
+    assert grid.cards is made
 
 
 def test_each_button_of_a_study_opens_what_it_says(qtbot, tmp_path):

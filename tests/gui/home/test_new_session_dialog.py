@@ -9,15 +9,18 @@ from PySide6.QtWidgets import QLabel, QScrollBar, QWidget
 
 from study_app.gui.display.screens import ScreenShown
 from study_app.gui.home import dialogs
-from study_app.gui.home.dialogs import NewSessionDialog, RehearsalDialog
+from study_app.gui.home.dialogs import NewSessionDialog, RehearsalDialog, WorkspaceDialog
 from study_app.gui.home.study_facts import study_facts
+from study_app.gui.theme.theme import LIGHT
 from study_app.gui.widgets.background import Background
+from study_app.gui.widgets.controls import ActionButton
 from study_app.protocol.load import load
 from study_app.protocol.source.files import source_bytes
 from study_app.session.start import MAX_SEED
 from study_app.store.blinded.blinding import open_or_draw_key
 from study_app.store.workstation import MachineSettings
 from tests import studies
+from tests.gui.windows import SCREENS
 from tests.protocol.groups.grouped import GROUPS, STUDY
 
 pytestmark = pytest.mark.slow
@@ -292,3 +295,104 @@ def test_a_randomised_group_is_not_asked_for(qtbot, tmp_path, opened):
     assert not made.editors["group"].control.isVisible()
     assert made.begin.isEnabled()
     assert made.chosen().group is None
+
+
+def test_each_question_says_what_it_asks_and_what_is_chosen_at_first(opened, monkeypatch, results):
+    monkeypatch.setattr(dialogs, "screens_shown", lambda: SCREENS)
+    drawn = iter([4711, 77])
+    monkeypatch.setattr(dialogs, "draw_seed", lambda: next(drawn))
+    made = opened(operator="AK", screen="eDP-1")
+    asked = {name: editor.field.label for name, editor in made.editors.items()}
+    assert asked.items() >= {
+        "participant": "Participant", "session": "Session", "seed": "Seed", "operator": "Operator",
+        "language": "Language of the participant's pages", "device": "Device", "screen": "Participant's screen",
+        "windowed": "In a window instead of full screen", "pilot": "Pilot: marked with a frame and stored separately",
+        "results": "Results folder for this study", "group": "Group", "row_of": "Replaces participant",
+        "firmware": "Falcon's firmware",
+    }.items()  # fmt: skip
+    asides = {name: made.editors[name].aside.text() for name in ("participant", "seed", "group")}
+    assert asides == {
+        "participant": "letters and digits, not a name", "seed": "determines all random orders and is recorded",
+        "group": "recorded as a property of the participant",
+    }  # fmt: skip
+    chosen = made.chosen()
+    assert (chosen.participant, chosen.session, chosen.seed, chosen.operator) == ("P001", 1, 4711, "AK")
+    assert (chosen.language, chosen.device, chosen.screen, chosen.windowed, chosen.pilot) == (
+        "en",
+        "mouse",
+        1,
+        False,
+        False,
+    )
+    assert (chosen.results, chosen.source) == (results / "rek2024", "rek2024")
+    screen = made.editors["screen"].control
+    assert [screen.itemText(at) for at in range(screen.count())] == [f"Screen {s.number}: {s.words}" for s in SCREENS]
+    languages = made.editors["language"].control
+    assert [(languages.itemText(at), languages.itemData(at)) for at in range(2)] == [("English", "en"), ("Dutch", "nl")]
+    assert (made.editors["operator"].control.maxLength(), made.editors["operator"].control.placeholderText()) == (
+        40, "Initials, such as AK"
+    )  # fmt: skip
+    limits = made.editors["session"].control
+    assert (limits.minimum(), limits.maximum()) == (1, 99)
+    texts = [part.text() for part in made.findChildren(QLabel)]
+    about = "Feeling simulated liquids  ·  2 parts, 10 settings, 62 answers  ·  about 18 min"
+    assert {"New session", about, "Nothing is created until you begin."} <= {*texts}
+    participant = made.editors["participant"].control
+    assert (made.focusWidget(), participant.selectedText()) == (participant, "P001")
+    (redraw,) = (button for button in made.findChildren(ActionButton) if button.text() == "Draw another")
+    redraw.click()
+    assert made.editors["seed"].value == 77
+
+
+def test_a_folder_that_was_chosen_stays_whatever_the_device(opened, results, tmp_path):
+    made = opened()
+    device, folder = made.editors["device"].control, made.editors["results"].control
+    for name, shown in (
+        ("scripted", "rek2024-scripted"),
+        ("falcon", "rek2024"),
+        ("falcon-emulated", "rek2024-falcon-emulated"),
+    ):
+        device.setCurrentIndex(device.findData(name))
+        assert folder.text() == str(results / shown)
+    folder.setText(str(tmp_path / "mine"))
+    for name in ("scripted", "mouse"):
+        device.setCurrentIndex(device.findData(name))
+    made.editors["pilot"].control.setChecked(True)
+    assert made.chosen().results == tmp_path / "mine"
+    folder.setText("")
+    assert (made.verdict.text(), made.begin.isEnabled()) == ("Choose a results folder", False)
+
+
+def test_a_verdict_is_sentence_icon_and_colour(opened):
+    made = opened()
+    looks = [(made.verdict.property("role"), made.verdict_icon.name, made.verdict_icon.ink)]
+    made.editors["seed"].control.setText("-1")
+    looks.append((made.verdict.property("role"), made.verdict_icon.name, made.verdict_icon.ink))
+    assert looks == [("ok", "check", "ok"), ("bad", "warning", "bad")]
+    assert made.verdict.text().startswith("The seed must be a whole number from 0 to")
+    with pytest.raises(ValueError, match="the seed must be a whole number"):
+        made.chosen()
+
+
+def test_the_suggested_workspace_can_be_changed_but_not_left_out(qtbot, tmp_path):
+    parent = QWidget()
+    qtbot.addWidget(parent)
+    dialog = WorkspaceDialog(parent, LIGHT, tmp_path / "offered")
+    assert (dialog.windowTitle(), dialog.go_on.text(), dialog.back.text()) == (
+        "Choose your workspace", "Use this folder", "Not now"
+    )  # fmt: skip
+    assert (dialog.folder, dialog.isModal(), dialog.path.field.label) == (
+        tmp_path / "offered",
+        True,
+        "Workspace folder",
+    )
+    assert dialog.path.below.text() == "The workspace will contain the folders protocols and results."
+    dialog.show()
+    dialog.path.control.setText("")
+    dialog.go_on.click()
+    assert (dialog.isVisible(), dialog.missing.text()) == (True, "Please choose a folder.")
+    dialog.path.control.setText("~/mine")
+    with qtbot.waitSignal(dialog.accepted):
+        dialog.go_on.click()
+    assert dialog.folder == Path.home() / "mine"
+    assert list(tmp_path.iterdir()) == []

@@ -1,15 +1,18 @@
 """The dialog of a rehearsal: it counts participants, says why it failed, and stops."""
 
 from collections.abc import Callable
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QLabel
 
 from study_app.gui.home import dialogs
 from study_app.gui.home.dialogs import RehearsalDialog
 from study_app.gui.home.study_facts import study_facts
 from study_app.gui.kit.dialogs import STEPS
+from study_app.session.simulated.rehearsal_worker import RehearsalOrder
 
 pytestmark = pytest.mark.slow
 
@@ -69,6 +72,35 @@ def test_a_rehearsal_counts_participants_and_leads_to_its_results(qtbot: Any, op
     assert dialog.go_on.text() == "Open results"
     with qtbot.waitSignal(dialog.accepted):
         qtbot.mouseClick(dialog.go_on, LEFT)
+
+
+def test_the_rehearsal_gets_the_answers_and_an_own_folder(
+    qtbot: Any, tmp_path: Any, opened: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[Any] = []
+
+    def client(task: str, *, name: str) -> Any:
+        asked.append((task, name))
+        idle = {"answers": list, "close": lambda: asked.append("close"), "wait_until_ended": bool, "ended": True}
+        return SimpleNamespace(order=asked.append, **idle)
+
+    (tmp_path / "demo-rehearsal-1").mkdir()
+    dialog = opened()
+    monkeypatch.setattr(dialogs, "WorkerClient", client)
+    texts = [part.text() for part in dialog.findChildren(QLabel)]
+    about = f"The sessions are marked as simulated and stored separately in {tmp_path / 'demo-rehearsal-2'}."
+    assert any(text.endswith(about) for text in texts), texts
+    assert (dialog.windowTitle(), dialog.value("seed")) == ("Rehearse A first look", 1)
+    count = dialog.editors["participants"].control
+    assert (count.minimum(), count.maximum()) == (1, 200)
+    dialog.editors["participants"].show_value(3)
+    dialog.editors["seed"].show_value(9)
+    qtbot.mouseClick(dialog.go_on, LEFT)
+    order = RehearsalOrder("demo", 3, 9, tmp_path / "demo-rehearsal-2")
+    assert asked == [(dialogs.TASK, "rehearsal"), order]
+    assert dialog.said.text() == "0 of 3: rehearsing …"
+    dialog.end()
+    assert (asked[2:], dialog.working) == (["close"], False)
 
 
 @pytest.mark.parametrize("at", ["participants", "seed", "go_on", "dialog"])
