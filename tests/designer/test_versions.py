@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 from PySide6.QtCore import QEvent, Qt
-from PySide6.QtGui import QResizeEvent
+from PySide6.QtGui import QColor, QResizeEvent
 from PySide6.QtWidgets import QApplication, QLabel
 
 from study_app.app.main_controller import MainController
@@ -22,6 +22,8 @@ from study_app.designer.document.study import read_study
 from study_app.designer.version_rows import Comparison
 from study_app.designer.versions import SaveCard, Version, compare, latest_run, version_of
 from study_app.gui.sessions.session_facts import SessionFacts
+from study_app.gui.theme.theme import DARK, LIGHT
+from study_app.gui.theme.themed import apply_theme
 from study_app.gui.widgets.cards import Chip
 from study_app.protocol.source.files import protocol_hash, shipped_file
 from study_app.store.versions.drafts import draft_of
@@ -110,6 +112,13 @@ def test_the_card_for_saving_asks_for_a_version_or_a_name(qtbot: Any, problems: 
     assert note in words
     assert ("problem" in words) is bool(problems)
     assert (card.version.text(), card.save.text(), card.first) == ("1.2", "Save 1.2", card.save)
+    for theme in (LIGHT, DARK):
+        apply_theme(card, theme)
+        for line, ink in enumerate((theme.bad, theme.ok)):
+            ranges = card.difference.document().findBlockByNumber(line).layout().formats()
+            coloured = ranges[0]
+            brush = coloured.format.foreground()
+            assert brush.color().name() == QColor(ink).name()
     card.refuse("not this.")
     qtbot.keyClick(card.version, Qt.Key.Key_Backspace)
     qtbot.keyClicks(card.version, "3 ")

@@ -1,6 +1,7 @@
 """The two windows of a session: what they say reaches servo and journal; its stops, its ends, both on one screen."""
 
 import threading
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -8,6 +9,7 @@ import pytest
 from PySide6.QtCore import QEvent, Qt
 from PySide6.QtWidgets import QApplication
 
+from study_app.app.session import bridge as bridge_module
 from study_app.gui.kit.dialogs import Question
 from study_app.gui.operator.session_panels import Strip
 from study_app.haptics.model.layout import LIMITER_FADE, LIMITER_NORM, SAMPLE, records
@@ -153,6 +155,49 @@ def test_the_strip_stops_the_force_though_nothing_can_be_recorded(one_screen, wo
     one_screen.show_tiles()
     assert "the drive is gone" in one_screen.operator.banner.what.text()
     caplog.clear()
+
+
+STALL_FACTS = ("trouble", "waits", "device_ready", "faults")
+
+
+def test_the_operators_view_has_each_fact_of_servo_recorder_and_outlets(
+    make: Any, world: World, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seen: list[dict[str, Any]] = []
+    view_session = bridge_module.view_session
+
+    def view(session: Any, progress: Any, vitals: Any, **facts: Any) -> Any:
+        seen.append({"session": session, "progress": progress, **facts})
+        return view_session(session, progress, vitals, **facts)
+
+    monkeypatch.setattr(bridge_module, "view_session", view)
+    recorder, outlets = SlowRecorder(), SimpleNamespace(lost={"LSL markers": "closed"})
+    recorder.lost, recorder.dropped = (SimpleNamespace(trial=3, reason="the disk is full"),), 7
+    bridge = make("single", recorder=recorder, outlets=outlets)
+    world.now_s, world.rate_hz = 12.5, 500.0
+    bridge.view()
+    assert seen[-1] == {
+        "session": bridge.parts.session, "progress": bridge.parts.journal.progress, "now_s": 12.5,
+        "force_on": world.force_is_on, "trouble": "", "waits": False, "device_ready": True, "faults": 0,
+        "rate_hz": 500.0, "forces": bridge.forces.figures(), "lost": {3: "the disk is full"}, "dropped": 7,
+        "outlets_lost": {"LSL markers": "closed"},
+    }  # fmt: skip
+    world.fault, world.force_is_on = "the servo stopped", False
+    for _ in range(2):
+        bridge.view()
+    assert [seen[-1][name] for name in (*STALL_FACTS, "force_on")] == ["the servo stopped", False, False, 1, False]
+    with monkeypatch.context() as patch:
+        patch.setattr(type(bridge.runner), "stalled", "the disk is full")
+        world.fault = None
+        bridge.view()
+        assert [seen[-1][name] for name in STALL_FACTS] == ["the disk is full", True, True, 1]
+        world.fault, bridge.trouble = "the servo stopped", "the window failed"
+        bridge.view()
+        assert [seen[-1][name] for name in STALL_FACTS] == ["the window failed", False, False, 2]
+    world.fault = None
+    bridge.leave_without_asking()
+    make().view()
+    assert [seen[-1][name] for name in ("forces", "lost", "dropped", "outlets_lost")] == [None, {}, 0, None]
 
 
 def pushes(world: World, count: int = 400) -> Any:
