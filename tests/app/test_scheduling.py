@@ -251,6 +251,7 @@ def test_objects_of_a_long_collection_are_frozen_unless_there_are_too_many(
     assert collector.asked == asked
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("enabled", "at_the_end"), [(True, [None, "enable"]), (False, [])])
 def test_this_thread_collects_until_the_windows_are_closed(
     qtbot: Any, collector: Collector, enabled: bool, at_the_end: list[Any]

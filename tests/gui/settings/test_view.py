@@ -35,6 +35,7 @@ def test_the_display_test_is_opened_once_and_left_by_esc(real_place, qtbot):
     assert real_place.test is None
 
 
+@pytest.mark.slow
 def test_the_display_test_is_for_the_participants_screen_if_that_is_connected(real_place, monkeypatch):
     monkeypatch.setattr(view, "screens_shown", lambda: (replace(SCREENS[0], refresh_hz=75.0), SCREENS[1]))
     show_settings(real_place, MachineSettings(screen="DP-1"))
@@ -51,6 +52,7 @@ def test_the_display_test_is_for_the_participants_screen_if_that_is_connected(re
     assert real_place.test is None
 
 
+@pytest.mark.slow
 def test_one_of_the_screens_is_the_participants(real_place, qtbot, monkeypatch):
     two_screens(monkeypatch)
     real_place.enter()
@@ -79,6 +81,7 @@ def test_one_of_the_screens_is_the_participants(real_place, qtbot, monkeypatch):
     qtbot.waitUntil(lambda: f"{SCREENS[0].words}  ·  size unknown" in [it.text() for it in card.findChildren(QLabel)])
 
 
+@pytest.mark.slow
 def test_each_field_shows_its_setting_and_hands_on_a_new_one(real_place, qtbot, tmp_path):
     settings = MachineSettings(
         viewing_distance_mm=600.0, screen_width_mm=500.0, lsl_markers=True, lsl_samples="always",
@@ -104,6 +107,7 @@ def test_each_field_shows_its_setting_and_hands_on_a_new_one(real_place, qtbot, 
     assert (real_place.undo.text(), real_place.undo.isEnabled()) == ("Undo", False)
 
 
+@pytest.mark.slow
 def test_each_button_asks_for_what_it_says(real_place, qtbot, monkeypatch):
     two_screens(monkeypatch)
     show_settings(real_place, MachineSettings(), undo="the width")
@@ -130,6 +134,7 @@ def test_each_button_asks_for_what_it_says(real_place, qtbot, monkeypatch):
     assert asked == [(real_place, "Workspace", "/there")] * 2
 
 
+@pytest.mark.slow
 def test_the_columns_are_side_by_side_where_they_fit(real_place):
     beside, below = QBoxLayout.Direction.LeftToRight, QBoxLayout.Direction.TopToBottom
     for width, direction in ((1300, beside), (999, below), (1000, beside)):
@@ -137,6 +142,7 @@ def test_the_columns_are_side_by_side_where_they_fit(real_place):
         assert real_place._body.direction() == direction
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("screen", "distance_mm", "width_mm", "scale", "sentence"),
     [  # an x of 8.73 px

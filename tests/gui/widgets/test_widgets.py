@@ -235,6 +235,7 @@ def test_a_card_has_its_title_a_chip_its_word_and_a_bar_its_share(qtbot: Any) ->
     )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_buttons_are_pressed_by_enter_and_their_key_and_keep_it_with_another_text(qtbot: Any) -> None:
     window, pressed = QWidget(), list[str]()
     qtbot.addWidget(window)
