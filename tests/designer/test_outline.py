@@ -12,7 +12,7 @@ from shiboken6 import isValid
 from study_app.designer.document.toml_edits import Insert, Set
 from study_app.designer.measures.study_facts import facts
 from study_app.designer.new_study_page import _current_title
-from study_app.designer.outline import ROW_ROLE
+from study_app.designer.outline import ROW_ROLE, icon_of
 from study_app.number_text import duration
 from study_app.protocol.source.files import shipped
 from study_app.store.versions.drafts import Keeper
@@ -55,6 +55,31 @@ def event_move(view: Any, at: QPoint) -> None:
 
 def sequence(designer: Any) -> tuple[str, ...]:
     return tuple(designer.value("sequence"))
+
+
+def test_each_element_has_the_icon_of_its_kind() -> None:
+    kinds = {"consent": "pen", "break": "pause", "debrief": "flag", "instructions": "file", "": "file"}
+    document = {"pages": {kind: {"kind": kind} for kind in kinds} | {"": 3}}
+    assert {kind: icon_of(("pages", kind), document) for kind in kinds} == kinds
+    sections = {"blocks": "layers", "tasks": "route", "liquids": "drop", "groups": "people", "unknown": "ring"}
+    assert {section: icon_of((section, "a"), document) for section in sections} == sections
+    assert [icon_of(path, document) for path in ((), ("device",), ("questionnaires", "a", "items", 0))] == [
+        "ring", "device", "list"
+    ]  # fmt: skip
+
+
+def test_the_outline_follows_a_selection_made_elsewhere_and_leads_on(designer: Any) -> None:
+    designer.open("kitchen", "blocks", "liquids")
+    outline, chosen = designer.place.outline, list[Any]()
+    outline.chosen.connect(chosen.append)
+    for path in (("tasks", "reach"), ("pages", "welcome")):
+        designer.editing.select(("device",))
+        outline.mark_row(("device",))
+        assert outline.tree.currentIndex().data(ROW_ROLE).path == ("device",)
+        outline.tree.setCurrentIndex(designer.index(*path))
+        assert (chosen.pop(), chosen, designer.editing.selected) == (path, [], path)
+    outline.mark_row(("no", "such"))
+    assert (outline.tree.currentIndex().isValid(), outline.tree.selectedIndexes()) == (False, [])
 
 
 def test_the_outline_scrolls_towards_the_edge_that_a_row_is_dragged_to(qtbot: Any, designer: Any) -> None:

@@ -328,3 +328,23 @@ def test_the_id_that_a_title_gives_an_entry_is_selected_and_stays_unfinished(des
     designer.editing.handle_request(SetText(("pages", "a_short_rest", "title"), "en", "A long rest"))
     designer.editing.suggest_id()
     assert designer.editing.selected == ("pages", "a_short_rest"), "the ID follows the text only once"
+
+
+def test_an_addition_ends_earlier_ones_that_do_not_contain_it(designer: Any) -> None:
+    designer.open()
+
+    def unfinished() -> list[Any]:
+        return [entry.path for entry in designer.study.unfinished]
+
+    for request, entries in (
+        (AddElement(("pages",)), [("pages", "page")]),
+        (AddElement(("tasks",)), [("tasks", "task")]),
+        (AddNamed(("conditions", "thin", "liquid"), "liquids"), [("conditions", "thin"), ("liquids", "liquid")]),
+        (SetValue(("liquids", "liquid", "density_kg_m3"), 1100), [("conditions", "thin"), ("liquids", "liquid")]),
+        (AddKey(("conditions", "thin", "delay_ms")), [("conditions", "thin", "delay_ms"), ("conditions", "thin")]),
+    ):
+        designer.editing.handle_request(request)
+        assert sorted(unfinished()) == sorted(entries), request
+    designer.editing.select(("scene",))
+    designer.editing.leave_entries(("scene",))
+    assert unfinished() == []
