@@ -82,6 +82,23 @@ def test_the_outline_follows_a_selection_made_elsewhere_and_leads_on(designer: A
     assert (outline.tree.currentIndex().isValid(), outline.tree.selectedIndexes()) == (False, [])
 
 
+def test_enter_at_a_field_that_was_found_leads_to_it_and_ends_the_search(designer: Any, qtbot: Any) -> None:
+    designer.open()
+    outline, asked = designer.place.outline, list[Any]()
+    outline.field_asked.connect(asked.append)
+    outline.form_asked.connect(lambda: asked.append("form"))
+    for words, path, answer in (
+        ("dwell", ("tasks", "reach"), ("tasks", "reach", "dwell_s")),
+        ("", ("device",), "form"),
+    ):
+        outline.search_field.setText(words)
+        qtbot.waitUntil(lambda path=path: any(one.data(ROW_ROLE).path == path for one in outline.indexes()))
+        outline.tree.setCurrentIndex(designer.index(*path))
+        assert bool(outline.tree.currentIndex().data(ROW_ROLE).field) is bool(words)
+        qtbot.keyClick(outline.tree, Qt.Key.Key_Return)
+        assert (asked.pop(), asked, outline.search_field.text()) == (answer, [], "")
+
+
 def test_the_outline_scrolls_towards_the_edge_that_a_row_is_dragged_to(qtbot: Any, designer: Any) -> None:
     designer.open()
     tree = designer.place.outline.tree

@@ -3,7 +3,7 @@
 from typing import Any
 
 import pytest
-from PySide6.QtCore import QPointF
+from PySide6.QtCore import QEvent, QPointF, Qt
 from PySide6.QtGui import QEnterEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
@@ -59,6 +59,18 @@ def test_a_problem_solved_in_the_form_leaves_the_list_under_the_pointer(designer
     assert solved.identity not in {line.row.identity for line in problems.lines}
     assert [line.row for line in problems.lines] == list(problems.problems)
     assert len(problems.lines) == 2
+    assert all(line.isEnabled() for line in problems.lines)
+
+
+def test_a_problem_that_is_repaired_by_key_leaves_the_list_at_once(designer: Any, qtbot: Any) -> None:
+    problems = four_problems(designer, qtbot)
+    qtbot.waitUntil(lambda: all(line.repairs for line in problems.lines))
+    QApplication.sendEvent(problems, QEvent(QEvent.Type.Leave))
+    button = problems.lines[1].repairs[0]
+    button.setFocus()
+    qtbot.keyClick(button, Qt.Key.Key_Return)
+    qtbot.waitUntil(lambda: len(problems.problems) == 3)
+    assert [line.row for line in problems.lines] == list(problems.problems)
     assert all(line.isEnabled() for line in problems.lines)
 
 
