@@ -116,6 +116,7 @@ def test_the_card_for_saving_asks_for_a_version_or_a_name(qtbot: Any, problems: 
         apply_theme(card, theme)
         for line, ink in enumerate((theme.bad, theme.ok)):
             ranges = card.difference.document().findBlockByNumber(line).layout().formats()
+            assert len(ranges) == 1
             coloured = ranges[0]
             brush = coloured.format.foreground()
             assert brush.color().name() == QColor(ink).name()
