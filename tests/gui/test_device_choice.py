@@ -85,6 +85,9 @@ def test_the_note_says_what_takes_long_unless_the_device_asks_for_something(qtbo
     with qtbot.waitSignal(other.cancelled):
         other.cancel.click()
     assert not other.findChild(QTimer).isActive()
+    other.show()
+    with qtbot.assertNotEmitted(other.cancelled):
+        other.close()
 
 
 @pytest.mark.parametrize("ready", [False, True])

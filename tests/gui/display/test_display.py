@@ -58,6 +58,23 @@ def test_a_frame_for_every_refresh_and_no_drift(screen, early_ns, late_ns):
     assert np.array_equal(np.rint(places - late_ns / period_ns), np.arange(1, len(places) + 1))
 
 
+def test_the_timer_of_the_next_frame_runs_before_a_frame_is_drawn(qapp):
+    made, waits_ms = Screen(10.0), []
+    made.frames.start()
+    assert (made.timer.isActive(), made.timer.interval(), made.timer.isSingleShot()) == (True, 100, True)
+    made.frames.due.connect(lambda: waits_ms.append(made.timer.interval()))
+    for at_ms in (100, 230, 305):  # on time, late, and late again
+        made.now_ns = 10**9 + at_ms * MS
+        made.timer.timeout.emit()
+    assert waits_ms == [100, 70, 95]
+    made.now_ns = 10**9 + 340 * MS
+    made.frames.note_swap()  # the next one comes at 440 ms; its frame is drawn 5 ms before it
+    assert (made.timer.isActive(), made.timer.interval()) == (True, 95)
+    made.frames.stop()
+    made.frames.note_swap()
+    assert not made.timer.isActive()
+
+
 def test_a_slow_frame_costs_its_own_refreshes_and_no_more(screen):
     screen.run(1.0)
     before = len(screen.drawn_ns)

@@ -3,8 +3,9 @@
 from pathlib import Path
 
 import pytest
-from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QPushButton, QVBoxLayout
+from PySide6.QtCore import QEvent, Qt
+from PySide6.QtWidgets import QApplication, QPushButton, QVBoxLayout
+from shiboken6 import isValid
 
 from study_app.errors import StudyError
 from study_app.gui.home.main_window import DESTINATIONS, MainWindow, bug_sentence
@@ -75,8 +76,25 @@ def test_what_a_place_says_is_shown_until_one_leaves_it_and_after_a_session(main
     main.show_message("The studies could not be read", "The folder is gone.")
     assert not main.notice.isVisible()
     main.return_from_session()
-    assert main.notice.isVisible()
-    main.notice.accept()
+    notice = main.notice
+    assert notice.isVisible()
+    notice.accept()
+    QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
+    assert not isValid(notice)
+    main.show_message("It did not work", "The cable is out.")
+    notice = main.notice
+    assert notice.isVisible(), "the session is over"
+    main.close()
+    assert not notice.isVisible()
+
+
+def test_the_rail_leads_to_the_places_that_there_are(qtbot):
+    window = MainWindow({"home": Place, "help": Place})
+    qtbot.addWidget(window)
+    assert [*window.rail.buttons] == ["home", "help"]
+    assert (window.rail.switch.icon_name, window.rail.switch.word, window.rail.switch.short) == (
+        "moon", "Dark theme", "Dark"
+    )  # fmt: skip
 
 
 def test_places_are_reached_and_the_window_is_closed_by_the_keyboard_alone(main, qtbot):
@@ -147,7 +165,7 @@ def test_the_switch_of_the_rail_changes_the_theme_to_the_one_that_it_names(main,
         assert heard.args == [theme]
         assert main.theme is theme
         assert (main.rail.switch.icon_name, main.rail.switch.word, main.rail.switch.short) == (icon, *words)
-        assert main.rail.switch.accessibleName() == words[0]
+        assert (main.rail.switch.accessibleName(), main.rail.switch.text()) == words
     with qtbot.assertNotEmitted(main.theme_changed):
         main.show_theme(DARK)
     assert main.rail.switch.word == "Light theme"
