@@ -92,6 +92,8 @@ def test_a_row_states_what_a_device_can_do_and_follows_its_state(qtbot: Any, pla
     place.show_devices(devices_shown([MOUSE, *WAYS[2], EMULATED]))
     falcon_row, mouse_row, emulated_row = rows = [place.rows[name] for name in ("falcon", "mouse", "falcon-emulated")]
     assert [row.title.text() for row in rows] == ["Novint Falcon", "Mouse", "Emulated Falcon"]
+    headings = {simulated: card.heading.text() for simulated, card in place.lists.items()}
+    assert headings == {False: "Input devices", True: "Simulated devices"}
     assert [isinstance(row.title, Radio) and row.title.isChecked() for row in rows] == [True, False, False]
     assert [row.diagnose.isHidden() for row in rows] == [False, True, False]
     assert falcon_row.diagnose.accessibleName() == "Diagnose Novint Falcon"
@@ -113,9 +115,10 @@ def test_a_row_states_what_a_device_can_do_and_follows_its_state(qtbot: Any, pla
     assert heard.args == [{"device": "mouse"}]
     assert not falcon_row.title.isChecked()
     assert [len(place.lists[simulated].findChildren(Rule)) for simulated in (False, True)] == [1, 0]
-    place.show_settings(MachineSettings.model_validate({"device": "mouse", "firmware": "/there/f.bin"}))
+    place.show_settings(MachineSettings.model_validate({"device": "falcon-emulated", "firmware": "/there/f.bin"}))
     checked = [name for name, row in place.rows.items() if isinstance(row.title, Radio) and row.title.isChecked()]
-    assert checked == ["mouse"]
+    assert checked == ["falcon-emulated"]
+    assert place.isAncestorOf(place.options["firmware"].editor)
     assert place.options["firmware"].editor.control.text() == str(Path("/there/f.bin"))
     place.options["firmware"].editor.control.selectAll()
     with qtbot.waitSignal(place.changed) as heard:
@@ -133,6 +136,7 @@ def test_a_row_states_what_a_device_can_do_and_follows_its_state(qtbot: Any, pla
 
 @pytest.mark.slow
 def test_devices_are_looked_for_on_request_until_the_windows_close(qtbot: Any, place: DevicesPlace) -> None:
+    assert (place.refresh.text(), place.refresh.isEnabled()) == ("Refresh", True)
     for look in (place.enter, place.refresh.click):
         with qtbot.waitSignal(place.looked):
             look()

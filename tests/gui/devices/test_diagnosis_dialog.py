@@ -4,9 +4,10 @@ import zipfile
 from functools import partial
 
 import pytest
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QEvent, Qt, QTimer
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QApplication, QFileDialog
+from shiboken6 import isValid
 
 from study_app.devices.doctor import report_lines
 from study_app.devices.doctor_worker import start_examination
@@ -46,13 +47,15 @@ def test_closing_ends_what_goes_on(dialog, begun, qtbot, close):
     else:
         dialog.close()
     qtbot.waitUntil(lambda: begun[0].closed)
-    assert not dialog.isVisible()
+    assert (dialog.isVisible(), dialog.findChild(QTimer).isActive(), dialog.isModal()) == (False, False, False)
 
 
 def test_steps_come_first_then_the_report_and_it_can_run_again(dialog, begun, qtbot):
     buttons = dialog.again, dialog.copy, dialog.support
     assert [(one.name, one.options) for one in begun] == [("falcon", {"firmware": "f.bin"})]
     assert dialog.windowTitle() == "Diagnose Novint Falcon"
+    assert dialog.close_button.isDefault()
+    assert [button.autoDefault() for button in buttons] == [False] * 3
     begun[0].told = ["Pull the grip out.", "Push it in."]
     qtbot.waitUntil(lambda: dialog.step.text() == "Push it in.")
     assert dialog.text.toPlainText() == "Pull the grip out.\nPush it in."
@@ -110,14 +113,15 @@ def test_a_diagnosis_uses_the_settings_and_says_if_a_session_holds_the_device(
     monkeypatch.setattr("study_app.gui.devices.diagnosis_dialog.DiagnosisDialog", dialog)
     firmware = tmp_path / "f.bin"
     made = open_diagnosis(None, DARK, "falcon:FT1", MachineSettings(firmware=str(firmware), sound=sound), held=held)
-    qtbot.addWidget(made)
     assert [(one.name, one.options) for one in begun] == [("falcon:FT1", {"firmware": firmware})]
     assert made.note.text().startswith("This session is using the device") is held
     assert made.note.isHidden() is not held
     begun[0].told = [FALCON_WELL]
     qtbot.waitUntil(lambda: made.report is not None)
     assert beeps == [True] * sound
-    made.close()
+    made.reject()
+    QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
+    assert not isValid(made)
 
 
 @needs_servo
@@ -146,10 +150,13 @@ def test_a_zip_for_whoever_helps_is_saved_with_the_report_and_a_failure_is_a_sen
     begun[0].told = [REFUSED]
     qtbot.waitUntil(dialog.support.isEnabled)
     dialog.save_support(tmp_path / "missing" / "help.zip")
-    assert "cannot be written" in dialog.saved.text()
+    assert ("cannot be written" in dialog.saved.text(), dialog.saved.isVisible()) == (True, True)
     qtbot.mouseClick(dialog.support, Qt.MouseButton.LeftButton)
     asked = dialog.findChild(QFileDialog)
-    assert asked.isVisible()
+    assert (asked.isVisible(), asked.windowTitle()) == (True, "Save a zip file for support")
+    assert (asked.acceptMode(), asked.nameFilters(), asked.defaultSuffix()) == (
+        QFileDialog.AcceptMode.AcceptSave, ["Zip files (*.zip)"], "zip"
+    )  # fmt: skip
     asked.fileSelected.emit(str(tmp_path / "help.zip"))
     asked.close()
     with zipfile.ZipFile(tmp_path / "help.zip") as packed:
