@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from scipy.stats import binom
+from scipy.stats import binom, binomtest
 
 from study_app.analysis.data.blocks import AFTER, AT_THE_START, Block, Decided, Item, LevelBlock, Setting
 from study_app.analysis.evaluate import evaluate, evaluate_block
@@ -140,6 +140,7 @@ def test_the_page_says_what_each_block_presented() -> None:
     settings = (presented(("slime", 73.0)),)
     late = LevelBlock("late", "Liquids late", "main", default_design("abx"), None, settings)
     blocks = [
+        replace(late, id="e", settings=(Setting(code="L1"),)),
         replace(late, reference=presented(("gear_oil", 73.0))),
         replace(late, id="b", settings=(presented(("slime", 0.0)), presented(("slime", 41.0)))),
         replace(late, id="c", title="On time", settings=(presented(("slime", 0.0), link="force 20 ms late"),)),
@@ -149,7 +150,6 @@ def test_the_page_says_what_each_block_presented() -> None:
             design=default_design("2ifc"),
             settings=(Setting(code="L1", condition="8/1", of=presented(("slime", None))),),
         ),
-        replace(late, id="e", settings=(Setting(code="L1"),)),
     ]
     had = [*["late"] * 3, *["b"] * 2, "c"], [*["late"] * 3, *["b"] * 4, "c", "late"]
     trials = pd.DataFrame(
@@ -374,13 +374,16 @@ def test_the_figure_of_differences_has_the_intervals_of_the_equivalence_tests(al
     assert f"means with {level} confidence intervals" in picture.caption
 
 
-@pytest.mark.parametrize(("participants", "n"), [(1, 5), (10, 12), (200, 24)])
-def test_the_measured_rate_is_that_of_the_nearest_size(participants: int, n: int) -> None:
-    told = false_claims_sentence(participants)
-    assert f"with {n} participants" in told
+@pytest.mark.parametrize(("participants", "n"), [(1, 5), (8, 5), (9, 12), (18, 12), (19, 24), (200, 24)])
+def test_the_measured_rate_is_that_of_the_nearest_size_with_wilsons_interval(participants: int, n: int) -> None:
     claims, studies = CLAIMS[n]
-    assert f"In {studies} simulated studies" in told
-    assert f"({claims} reports, 95 % confidence interval" in told
+    ends = binomtest(claims, studies).proportion_ci(method="wilson")
+    share, low, high = (f"{100 * value:.1f}" for value in (claims / studies, *ends))
+    assert false_claims_sentence(participants) == (
+        f"In {studies} simulated studies with {n} participants, three liquids, seven delays and no true effect, "
+        f"{share} % of the reports claimed a difference or a noticed delay ({claims} reports, 95 % confidence interval "
+        f"{low} to {high} %; liquid-study validate-report)."
+    )
 
 
 def test_a_claim_needs_the_test_over_all_statements_corrected_over_the_blocks() -> None:
@@ -462,15 +465,16 @@ def test_known_liquids_are_called_recognised(n: int) -> None:
 
 
 @pytest.mark.parametrize(
-    ("reaching", "recorded", "said"), [((), False, 0), (("reach",), False, 1), (("reach",), True, 2)]
+    ("reaching", "recorded", "said"),
+    [((), "", 0), (("reach",), "", 1), (("reach",), "reach", 2), (("reach",), "other", 1)],
 )
 def test_a_block_without_reaching_measures_says_why(
-    reaching: tuple[str, ...], recorded: bool, said: int, monkeypatch: pytest.MonkeyPatch
+    reaching: tuple[str, ...], recorded: str, said: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     sentences = "This block does not contain a reaching task", "Without readable recordings of this block"
-    measured = SimpleNamespace(reaching=reaching, recorded_in=lambda _block: recorded)
-    block = SimpleNamespace(id="reach", title="Reaching")
-    results: Any = SimpleNamespace(blocks=[block], performance=measured, delivered=())
+    measured = SimpleNamespace(reaching=(*reaching, "other"), recorded_in=lambda block: block == recorded)
+    blocks = [SimpleNamespace(id=name, title=name) for name in ("reach", "other")]
+    results: Any = SimpleNamespace(blocks=blocks, performance=measured, delivered=())
     made = {
         "_movement_measures": [],
         "_motion_rows": [["thin", "1", "2"]],
@@ -480,8 +484,9 @@ def test_a_block_without_reaching_measures_says_why(
     for name, value in made.items():
         monkeypatch.setattr(sections, name, lambda *_, value=value, **__: value)
     page = "".join(sections.motion(results))
-    assert [sentence in page for sentence in sentences] == [said == 0, said == 1]
-    assert ("overshoot, mm: " in page) is recorded
+    of_block = page.partition(">other<")[0]
+    assert [sentence in of_block for sentence in sentences] == [said == 0, said == 1]
+    assert ("overshoot, mm: " in page) is bool(recorded), "of any block"
 
 
 def test_of_successive_short_cards_each_pair_is_side_by_side(monkeypatch: pytest.MonkeyPatch) -> None:
