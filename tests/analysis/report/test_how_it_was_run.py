@@ -197,11 +197,17 @@ def motion() -> Iterator[str]:
         SimpleNamespace(block="b", code=code, measure=what, n=n, median=at + 0.26, q1=at - 1.5, q3=at + 2.0)
         for at, (code, what, n) in enumerate(measures, start=7)
     ]
+    elsewhere = SimpleNamespace(block="c", code="L1", measure="path_mm", n=9, median=99.0, q1=98.0, q3=100.0)
+    moved = [elsewhere, *moved, elsewhere]
     measured: Any = SimpleNamespace(
         moved=moved, reaching=("b",), recorded_in=lambda _block: True, trials=9, recorded=8, unread=(), judged=0,
         invalid=0,
     )  # fmt: skip
-    rows = [SimpleNamespace(block="b", code=f"L{at}", valid=at, judged=9) for at in (1, 2, 3)]
+    rows = [
+        SimpleNamespace(block=block, code=f"L{at}", valid=at, judged=9)
+        for block, at in zip("bbbc", (1, 2, 3, 1), strict=True)
+    ]
+    rows[-1].valid = 8
     found = results(LIQUIDS, performance=measured, delivered=rows)
     yield text_of(sections.motion(found)).partition("duration, s: from")[0]
     found.performance = None

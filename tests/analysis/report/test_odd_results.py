@@ -6,7 +6,6 @@ from dataclasses import replace
 from datetime import datetime, timedelta
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from study_app.analysis.data.study_tables import group_counts, group_means, load_study
@@ -45,20 +44,6 @@ def test_methods_distinguish_primary_and_exploratory_statements(tmp_path: Path) 
     assert both.format("eight") in told
     assert both.format("four") in told
     assert "and 90 % confidence intervals" in told, "two one-sided tests at 5 %"
-
-
-def test_limits_count_the_trials_in_which_the_device_answered_late() -> None:
-    study = load_study(SAMPLE.path)
-    results, trials = evaluate(study), study.trials.assign(loop_delay_ticks=1.0, device_delay_ticks=np.nan)
-    assert not [line for line in limits(replace(study, trials=trials), results) if "device responded" in line]
-    main = trials.index[trials["counted"] & (trials["phase"] == "main")]
-    trials.loc[trials.index[trials["phase"] != "main"], "device_delay_ticks"] = 7.0
-    trials.loc[main[:3], "device_delay_ticks"] = 3.0, 4.0, 3.0
-    (told,) = [line for line in limits(replace(study, trials=trials), results) if "device responded" in line]
-    assert told.startswith(
-        f"In 3 of {len(main)} trials in the main blocks, the device responded later than the servo assumed: in the "
-        "worst case after at least 4 ticks instead of 1. "
-    )
 
 
 @pytest.mark.parametrize(

@@ -250,6 +250,14 @@ def test_orders_are_shown_by_position_for_blocks_with_several_orders() -> None:
         )  # fmt: skip
 
     blocks = [SimpleNamespace(id=name, title=name.upper(), revealed=False) for name in "abcd"]
+    blocks[1] = SimpleNamespace(
+        id="b",
+        title="B",
+        revealed=True,
+        delays_ms=(),
+        settings=[SimpleNamespace(code=code) for code in ("M2", "M1")],
+        names=("Wax", "Oil"),
+    )
     orders = {
         "a": order(7, ("L1", "L2"), ((3, 4), (5, 2)), (1, 6), False),
         "b": order(9, ("M1", "M2"), ((8, 8), (8, 8)), (2, 5), True),
@@ -261,8 +269,8 @@ def test_orders_are_shown_by_position_for_blocks_with_several_orders() -> None:
     assert text == (
         "Trial orders A (seven orders): positions were not balanced; each condition occurred 2 to 5 times in each "
         "position and followed every other condition equally often. Position L1 L2 1 3 4 2 5 2 B (nine orders): each "
-        "condition occurred eight times in each position and followed every other condition 2 to 5 times. Position M1 "
-        "M2 1 8 8 2 8 8 The tables show how often each condition occurred in each position of its block."
+        "condition occurred eight times in each position and followed every other condition 2 to 5 times. Position Oil "
+        "Wax 1 8 8 2 8 8 The tables show how often each condition occurred in each position of its block."
     )
 
 
