@@ -234,6 +234,29 @@ def test_chance_is_no_limit_of_an_interaction() -> None:
         assert ["mean d′ in Oil includes 0" in line for line in lines] == [True] * count
 
 
+@pytest.mark.parametrize(
+    ("sequence", "changes", "sentence"),
+    [
+        (["prompt", "rest", "late"], {}, "Hypothesis: all participants completed Prompt before “Quite late”, so the"),
+        (
+            ["late", "prompt"],
+            {},
+            "Hypothesis: all participants completed “Quite late” before Prompt, so the difference",
+        ),
+        (["prompt", "late"], {"groups": ("old", "new")}, None),
+        (["prompt", "late"], {"blocks": ("late",)}, None),
+        (["prompt", "late", "prompt"], {}, None),
+    ],
+)
+def test_a_fixed_order_of_two_blocks_is_a_limit_of_their_comparison(
+    sequence: list[str], changes: dict[str, Any], sentence: str | None
+) -> None:
+    stated = hypothesis(**{"blocks": ("late", "prompt"), **changes}, compared=("Quite late", "Prompt"))
+    made = of_people(3, protocol={"sequence": sequence, "blocks": {}, "questionnaires": {}, "study": {}})
+    lines = list(sections._fixed_order_sentences(made, results_of(contrasts=[stated])))
+    assert [line[: len(sentence or "")] for line in lines] == ([] if sentence is None else [sentence])
+
+
 def test_conclusions_are_all_hypotheses_and_then_all_answers(monkeypatch: pytest.MonkeyPatch) -> None:
     contrasts = [SimpleNamespace(name=name, verdict=f"verdict {name}") for name in ("first", "second")]
     monkeypatch.setattr(sections, "question", lambda contrast: f"{contrast.name}?")
