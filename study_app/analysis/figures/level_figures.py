@@ -37,6 +37,7 @@ from study_app.analysis.page_layout import MARGIN_PT, SMALL, FigureTask, Look, P
 from study_app.analysis.results import LevelsResult
 from study_app.analysis.statistics.outcome import Array
 from study_app.analysis.wording import counted
+from study_app.number_text import capitalised
 from study_app.psychophysics.families import Family, success
 
 COLUMNS: Final = 4
@@ -149,7 +150,8 @@ def _level_picture(
     bands = _psychometric_bands(study, result, study_tracks)
     further = len(people(result)) - _MOST_PEOPLE
     verb = "is" if further == 1 else "are"
-    left_out = f" {counted(further, 'further participant')} {verb} shown only in the table." if further > 0 else ""
+    number = capitalised(counted(further, "further participant"))
+    left_out = f" {number} {verb} shown only in the table." if further > 0 else ""
     chance = "" if result.guess_rate is None else f" Dashed line: chance ({100 * result.guess_rate:.0f} %)."
     where = "for each comparison" if result.vary is None else "at each level"
     caption = (
@@ -409,10 +411,7 @@ def _track_picture(
     """Draw the adaptive tracks of a block, once the key is open."""
     block = next(block for block in study.levels if block.id == result.block)
     courses = list(track_courses(block, study_tracks(), _MOST_PANELS))
-    further = len(Thresholds.participant_rows(result)) - len(courses)
-    left_out = (
-        f" {counted(further, 'further panel')} {'is' if further == 1 else 'are'} not shown." if further > 0 else ""
-    )
+    left_out = _panels_left_out(len(Thresholds.participant_rows(result)) - len(courses))
     success = "correctly" if result.counts == "correct" else f"“{result.counts}”"
     marks = " Colours: tracks." if any(course.tracks.max() > 1 for course in courses) else ""
     marks += " Rings: reversals." if any(course.reversals.any() for course in courses) else ""
@@ -426,6 +425,12 @@ def _track_picture(
     return picture_of(
         study, result.block, name, f"{result.title}: tracks", caption, partial(_draw_tracks, result, courses), forms
     )
+
+
+def _panels_left_out(further: int) -> str:
+    """Return a sentence on the panels that are not shown, with a leading space; "" without any."""
+    verb = "is" if further == 1 else "are"
+    return f" {capitalised(counted(further, 'further panel'))} {verb} not shown." if further > 0 else ""
 
 
 @style.own_settings()
@@ -492,10 +497,7 @@ def _settings_picture(
     study: Study, result: LevelsResult, forms: Sequence[str], name: str, _study_tracks: _TracksFunction
 ) -> Picture:
     """Draw the settings of an adjustment block, once the key is open."""
-    further = len(Settings.participant_rows(result)) - _MOST_PANELS
-    left_out = (
-        f" {counted(further, 'further panel')} {'is' if further == 1 else 'are'} not shown." if further > 0 else ""
-    )
+    left_out = _panels_left_out(len(Settings.participant_rows(result)) - _MOST_PANELS)
     compared = any(setting.constant_error is not None for setting in Settings.participant_rows(result))
     standard = " Dashed line: standard." if compared else ""
     caption = (

@@ -515,3 +515,7 @@ def test_the_caption_of_levels_says_what_is_drawn(monkeypatch: pytest.MonkeyPatc
         "; thin lines show individual participants after removing differences between participants' units." in caption
     )
     assert "intervals for the answers; crosses: catch trials." in caption
+    assert "Two further participants are shown only in the table. 25 participants (SIM" in caption
+    assert [level_figures._panels_left_out(further) for further in (-1, 0, 1, 3)] == [
+        "", "", " 1 further panel is not shown.", " Three further panels are not shown.",
+    ]  # fmt: skip
