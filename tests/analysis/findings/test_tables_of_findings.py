@@ -257,6 +257,8 @@ def test_comparisons_with_the_shortest_delay_have_their_own_numbers() -> None:
         ["warm", "90 ms − 10 ms", "inconclusive", "D3 D1", "b: warm at 90 ms"],
     ]
     assert delay_findings.equivalent_up_to(AGAINST) == {"warm": 40.0, "thick": None}
+    again = against("warm", 40.0, "inconclusive"), against("warm", 90.0, "equivalent")
+    assert delay_findings.equivalent_up_to(again) == {"warm": None}, "the first that fails ends the sequence"
     entries = finding.entries(finding.result)
     assert (entries["against"], entries["equivalent_up_to"]) == (AGAINST, {"warm": 40.0, "thick": None})
     first, second = finding.limits()
@@ -411,7 +413,7 @@ def test_the_figure_of_the_threshold_has_the_share_of_each_participant() -> None
     settings = delays((10, 40, 90))
     made = study(settings, list(everybody(settings, 2, given, repetitions=2)), replace(DECIDED, noticed="different"))
     made = replace(made, responses=made.responses.assign(response=made.responses["response"].astype("Int64")))
-    result = block("delays", findings={"threshold": threshold(), "lowest": LOWEST})
+    result = block("delays", findings={"threshold": threshold(), "lowest": (*LOWEST, lowest("thick", (40.0, 0.01)))})
     results: Any = SimpleNamespace(decided=made.decided)
     drawing = Drawing(made, made.blocks[0], result, results, "threshold-b", ())
     finding = delay_findings.DetectionThreshold(result, results)
@@ -420,7 +422,7 @@ def test_the_figure_of_the_threshold_has_the_share_of_each_participant() -> None
     assert picture is not None
     assert picture.numbers.splitlines()[:2] == ["participant\t10 ms\t40 ms\t90 ms", "P000\t0.0\t0.5\t1.0"]
     assert "diamond: the detection threshold, 57 ms (95 % interval [41, 89] ms)." in picture.caption
-    assert picture.caption.endswith(" Dashed line: the shortest delay at which any statement shows a trend, 90 ms.")
+    assert picture.caption.endswith(" Dashed line: the shortest delay at which any statement shows a trend, 40 ms.")
 
 
 RATES = tuple(
