@@ -167,7 +167,9 @@ LEVELS = {
 def test_a_value_of_a_participant_is_the_mean_of_those_that_were_estimated() -> None:
     late = LEVELS["discrimination"]
     stated = Contrast.model_validate({"measure": "d_prime", "blocks": ("late", "prompt")})
-    values = contrasts._participant_values(MADE, stated, "late", None, (), (replace(late, block="prompt"), late))
+    values = contrasts._participant_values(
+        MADE, stated, "late", None, (), (replace(late, block="prompt", statistics={}), late)
+    )
     assert {person: value.value for person, value in values.items()} == {"P000": 0.5, "P001": 1.5}
 
 
@@ -218,10 +220,11 @@ def test_differences_are_those_of_participants_with_both_answers_and_the_first_m
 def test_an_interaction_has_the_differences_of_each_group_and_its_values_under_each_condition() -> None:
     groups = pd.array(["old", "new", "old", "other"], "string")
     made = replace(MADE, participants=MADE.participants.assign(group=groups))
-    given = answers_of(P000=[6.0, 2.0], P001=[1.0, 3.0], P002=[5.0, 4.0], P003=[7.0, 1.0])
+    given = answers_of(P000=[6.0, 2.0], P001=[1.0, 3.0], P002=[5.0, 4.0], P003=[NAN, 1.0])
     crossed = Contrast.model_validate({**STATED, "groups": ("new", "old")})
     samples = contrasts._collect_samples(made, crossed, [given], ())
     assert [[held.value for held in sample] for sample in samples.samples] == [[-2.0], [1.0, 4.0]]
+    assert samples.left_out == {}, "P003 is in neither group"
     held = [{who: value.value for who, value in values.items()} for values in (*samples.sides, *samples.cells)]
     assert held == [
         {"P001": -2.0}, {"P000": 4.0, "P002": 1.0}, {"P001": 1.0}, {"P001": 3.0}, {"P000": 6.0, "P002": 5.0},

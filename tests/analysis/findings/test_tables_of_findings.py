@@ -479,7 +479,7 @@ def test_the_answer_on_liquids_names_recognised_and_differing_ones() -> None:
         "named": named(), "pairs": pairs, "effects": effects,
         "omnibus": (
             *(with_verdict(item, ranks()) for item in ("thick", "warm")),
-            with_verdict("calm", ranks(), result="not shown"),
+            with_verdict("calm", ranks(), result="suggested", primary=False),
         ),
     }  # fmt: skip
 

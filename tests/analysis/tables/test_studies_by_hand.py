@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from study_app.analysis.data import blocks, measures, motion, session_files, study_tables
-from study_app.analysis.data.blocks import Block, OwnDynamics, Setting
+from study_app.analysis.data.blocks import Block, OtherQuestions, OwnDynamics, Setting
 from study_app.analysis.data.study_tables import Study, group_means, groups_shown, pool_sites, split_study
 from study_app.protocol.model import Published
 from study_app.protocol.participants.groups import EACH_GROUP
@@ -76,7 +76,9 @@ def test_a_split_study_has_the_members_of_its_group_alone(made: Study) -> None:
     assert [(name, one.split, one.people) for name, one in groups_shown(each)] == [
         ("art", "art", ("P2",)), ("zoo", "zoo", ("P1",)),
     ]  # fmt: skip
-    assert set(split_study(grouped, "art").trials["participant"]) == {"P2"}
+    tables = ("trials", "responses", "answered", "participants")
+    art = split_study(grouped, "art")
+    assert {name: set(getattr(art, name)["participant"]) for name in tables} == {name: {"P2"} for name in tables}
     assert groups_shown(grouped) == [("", grouped)]
     rows = [(row.item, row.code, row.group, row.n, row.mean) for row in group_means(grouped)]
     assert rows == [
@@ -226,3 +228,157 @@ def test_bench_masking_and_estimators_of_receipts_are_read() -> None:
     assert means == OwnDynamics(damping_nspm=2.0, friction_n=5.25, mass_kg=0.5, sessions=2, of=3)
     lengths = np.array([3, 2])
     assert [session_files._row_location(lengths, index) for index in (0, 2, 3, 4)] == [(0, 2), (0, 4), (1, 2), (1, 3)]
+
+
+def test_a_merged_study_reads_each_site_alike_and_stays_sealed_until_all_keys_are_open(
+    made: Study, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    merged: Any = SimpleNamespace(path=tmp_path, names=("A", "B", "C"), folder=lambda name: tmp_path / name)
+    read: list[tuple[str, bool, bool]] = []
+
+    def load(path: Path, *, sealed: bool = False, planned: bool = True) -> Study:
+        read.append((path.name, sealed, planned))
+        return made
+
+    for name in merged.names:
+        (tmp_path / name).mkdir()
+    monkeypatch.setattr(study_tables, "_load", load)
+    monkeypatch.setattr(study_tables.StudyFolder, "sessions", lambda site: [] if site.path.name == "B" else [1])
+    monkeypatch.setattr(study_tables, "tombstones", lambda site: {"P9": f"gone from {site.path.name}"})
+    for is_open, planned in ((True, False), (False, True)):
+        read.clear()
+        monkeypatch.setattr(study_tables, "has_opened_keys", lambda _path, is_open=is_open: is_open)
+        pooled = study_tables._load_sites(merged, planned=planned)
+        assert read == [(name, not is_open, planned) for name in "AC"]
+        assert pooled.withdrawn == ("gone from A", "gone from B", "gone from C")
+
+
+def test_groups_and_sites_are_those_of_counted_rows_of_an_opened_study(made: Study) -> None:
+    """P3 and P4 are not included; P1 gave a third answer in a row that does not count."""
+    names = {"P1": "zoo", "P2": "art", "P3": "bus", "P4": "bus"}
+    rows = made.trials.assign(group=made.trials["participant"].map(names).astype("string"))
+    randomised = replace(made, trials=rows.assign(counted=rows["participant"].isin(["P1", "P2"])))
+    assert study_tables.group_counts(randomised) == {"art": 1, "zoo": 1}
+    assert study_tables.group_counts(replace(randomised, settings={})) == {}
+    assert study_tables.group_assignment(randomised) is None
+    protocol = {"groups": {"zoo": {}}, "study": {}}
+    assert study_tables.group_assignment(replace(randomised, protocol=protocol)) == "randomised"
+    merged = replace(made, sites=("P1", "P2"))
+    assert study_tables.group_counts(merged, "site") == {"P1": 1, "P2": 1}
+    assert study_tables.group_counts(replace(merged, settings={}), "site") == {}
+    extra = made.responses[made.responses["participant"] == "P1"].assign(counted=False, response="7")
+    means = group_means(replace(randomised, responses=pd.concat([made.responses, extra])))
+    assert [(row.code, row.group, row.mean) for row in means if row.item == ITEMS[0]] == [
+        ("L1", "art", 1.0), ("L1", "zoo", 2.0), ("L2", "art", 1.0), ("L2", "zoo", 2.0),
+    ]  # fmt: skip
+
+
+def test_answers_to_a_form_are_those_of_its_place_with_the_block_that_they_follow(made: Study) -> None:
+    rows = [
+        ("load", "sure", None, True), ("load", "sure", "b", True), ("load", "age", "b", True),
+        ("end", "sure", "b", True),
+        (None, "sure", None, True), ("load", "sure", "c", False),
+    ]  # fmt: skip
+    answered = pd.DataFrame(rows, columns=["form", "item", "after_block", "counted"]).assign(code="L1")
+    answered["block"] = ["x", "x", "x", "x", "b", "x"]
+    shown = replace(made, answered=answered.convert_dtypes())
+
+    def asked(where: str, item: str, *, is_form: bool, settings: tuple[int, ...]) -> Any:
+        return SimpleNamespace(id=item, where=SimpleNamespace(id=where, is_form=is_form, settings=settings))
+
+    repeated = asked("load", "sure", is_form=True, settings=(1, 2))
+    assert list(shown.rows_of(repeated)["code"]) == [study_tables.START, "b", "c"]
+    assert list(shown.answers_to(repeated)["code"]) == [study_tables.START, "b"]
+    assert list(shown.answers_to(asked("end", "sure", is_form=True, settings=()))["code"]) == ["L1"]
+    assert list(shown.answers_to(asked("b", "sure", is_form=False, settings=(1,))).index) == [4]
+
+
+def test_a_folder_is_read_with_its_key_exclusions_and_last_attempts(monkeypatch: pytest.MonkeyPatch) -> None:
+    """P1 repeated trial 2; P2 did not finish; P3 lacks too many trials; P4 is excluded by a planned rule."""
+
+    def record(person: str, status: str, plan: Any) -> Any:
+        folder = SimpleNamespace(participant=person, number=1)
+        visit = {
+            "participant": person,
+            "session": 1,
+            "status": status,
+            "missing": f"{person} lacks",
+            "ended_at": f"{person} end",
+        }
+        return SimpleNamespace(
+            folder=folder, visit=visit, study="oils", title="Oils", version="2", protocol={"analysis": plan},
+            blocks=("b",),
+            levels=("l",), others=OtherQuestions(), own_dynamics=None, device_velocity=False,
+        )  # fmt: skip
+
+    plan = {"alpha": 0.04, "equivalence_bound": None, "noticed": None, "primary": [], "names": [], "rising": []}
+    plan |= {"falling": []}
+    states = {"P1": "completed", "P2": "aborted", "P3": study_tables.INCOMPLETE, "P4": "completed"}
+    records = {person: record(person, status, plan) for person, status in states.items()}
+    records["P4"].protocol = {"analysis": {**plan, "alpha": 0.01}}
+    rule = Exclusion(
+        participant="P4", session=1, trial=None, rule_or_person="fast_answers", reason="fast", excluded_at="t"
+    )
+    places = [
+        ("P1", 1, 1, "main", "sure"), ("P1", 2, 1, "main", "sure"), ("P1", 2, 2, "main", "sure"),
+        ("P1", 3, 1, "practice", "sure"), ("P2", 1, 1, "main", "sure"), ("P3", 1, 1, "main", "sure"),
+        ("P4", 1, 1, "main", "sure"), ("P1", None, None, None, "age"), ("P2", None, None, None, "age"),
+        ("P3", None, None, None, "age"), ("P4", None, None, None, "age"),
+    ]  # fmt: skip
+    rows = pd.DataFrame(places, columns=["participant", "trial", "attempt", "phase", "item"]).convert_dtypes()
+    rows = rows.assign(
+        session=1, kind=np.where(rows["trial"].isna(), "number", "statement"), value=range(11), force_mean_n=0.5,
+        session_status=rows["participant"].map(states),
+    )  # fmt: skip
+    tables = {"responses": rows, "trials": rows[rows["trial"].notna()]}
+    given: dict[str, Any] = {
+        "is_never_begun": lambda _path: False, "refuse_earlier_columns": lambda _place: None,
+        "read_session": lambda session, _key, like=None: records[session.participant],
+        "read_tables": lambda _records, name: tables[name], "exclusions": lambda _path: (rule,),
+        "reversals": lambda _path: (), "late_exclusions": lambda _path, listed: listed[:1],
+        "tombstones": lambda _place: {"P9": "gone"}, "check_exclusions_exist": lambda *_: None,
+        "session_discrepancies": lambda place: [f"{place.folder.participant} changed"],
+        "has_intervals": lambda _protocol: False,
+        "settings_from_key": lambda key: {("b", "L1"): key}, "contrasts_of": lambda _key: ("contrast",),
+        "_check_poolable": lambda *_: None,
+    }  # fmt: skip
+    for name, value in given.items():
+        monkeypatch.setattr(study_tables, name, value)
+    monkeypatch.setattr(study_tables, "Place", lambda _place, folder, _study: SimpleNamespace(folder=folder))
+    sessions = [SimpleNamespace(participant=person, path=Path(person)) for person in states]
+    monkeypatch.setattr(study_tables.StudyFolder, "sessions", lambda _place: sessions)
+    key = SimpleNamespace(tables={"liquids": {"oil": {}}})
+    monkeypatch.setattr(study_tables, "_read_key", lambda *_: key)
+    read = study_tables._load(Path("oils"))
+    assert (read.name, read.title, read.version, read.blocks, read.levels) == ("oils", "Oils", "2", ("b",), ("l",))
+    assert [(row.participant, row.rule_or_person, row.reason, row.excluded_at) for row in read.exclusions] == [
+        ("P4", "fast_answers", "fast", "t"), ("P3", study_tables.MISSING_RULE, "P3 lacks", "P3 end"),
+    ]  # fmt: skip
+    assert (read.late, read.kept, read.withdrawn) == (read.exclusions[:1], (), ("gone",))
+    assert (read.settings, read.contrasts, read.liquids) == ({("b", "L1"): key}, ("contrast",), {"oil": {}})
+    assert read.doubts == tuple(f"{person} changed" for person in states)
+    assert (read.decided.alpha, read.decided.changed) == (0.04, True)
+    assert dict(zip(read.participants["participant"], read.participants["counted"], strict=True)) == {
+        "P1": True, "P2": False, "P3": False, "P4": False,
+    }  # fmt: skip
+    counted = read.responses[read.responses["counted"]]
+    assert list(zip(counted["participant"], counted["trial"], counted["response"], strict=True)) == [
+        ("P1", 1, 0), ("P1", 2, 2),
+    ]  # fmt: skip
+    assert list(read.trials["counted"]) == [True, False, True, False, False, False, False]
+    forms = read.answered[read.answered["trial"].isna()]
+    assert list(zip(forms["participant"], forms["counted"], strict=True)) == [
+        ("P1", True), ("P2", False), ("P3", False), ("P4", False),
+    ]  # fmt: skip
+    assert read.trials["force_mean_n"].notna().all()
+    monkeypatch.setattr(study_tables, "_read_key", lambda *_: None)
+    sealed = study_tables._load(Path("oils"), planned=False)
+    assert (sealed.settings, sealed.contrasts, sealed.liquids) == ({}, (), {})
+    assert sealed.trials["force_mean_n"].isna().all()
+    assert [row.participant for row in sealed.exclusions] == ["P3"]
+    assert sealed.people == ("P1", "P4"), "a planned rule does not exclude P4"
+    kept = SimpleNamespace(what=("P3", 1, None))
+    monkeypatch.setattr(study_tables, "reversals", lambda _path: (kept,))
+    again = study_tables._load(Path("oils"))
+    assert [row.participant for row in again.exclusions] == ["P4"], "a person has kept P3"
+    assert (again.people, again.kept) == (("P1", "P3"), (kept,))
