@@ -26,7 +26,7 @@ from study_app.protocol.blocks import Block, block_titles, display_language
 from study_app.protocol.descriptions import describe, limit_rows
 from study_app.protocol.load import parse, protocol_hash, source_bytes
 from study_app.protocol.model import Analysis, Contrast, Protocol
-from study_app.protocol.orders import block_orders_by_group
+from study_app.protocol.orders import block_orders_by_group, variants
 from study_app.protocol.source import text_in
 from study_app.protocol.warnings import PRECISION, expected_of, precision_plan, precision_rows, threshold_plan
 from study_app.psychophysics.people import BETWEEN_PEOPLE
@@ -402,13 +402,27 @@ def _design_lines(protocol: Protocol) -> Iterator[str]:
             f"start of their first session; the planned ratio is {ratio}. The groups are not randomised, so a "
             "difference between them may have other causes."
         )
-    for group, words in block_orders_by_group(protocol).items():
-        yield f"The order of blocks{f' in group {group}' if group else ''} is {words}."
+    yield from _block_order_lines(protocol)
     yield ("Each participant's trial orders are generated from the session's seed, as described below for each block.")
     for block in protocol.main_blocks:
         compared = f"levels of {block.stimulus}" if block.stimulus is not None else listed(list(block.conditions))
         alone, title = block.stimulus is None and len(block.conditions) == 1, _title(protocol, block.id)
         yield f"Block {title} {'presents' if alone else 'compares'} {compared}."
+
+
+def _block_order_lines(protocol: Protocol) -> Iterator[str]:
+    """Yield the order of blocks; that of each group or session if these have different fixed orders."""
+    titles = {
+        variant.name: tuple(_title(protocol, block.id) for block in variant.protocol.main_blocks)
+        for variant in variants(protocol)
+        if len(variant.protocol.main_blocks) > 1
+    }
+    if protocol.study.block_order == "fixed" and len({*titles.values()}) > 1:
+        for name, in_order in titles.items():
+            yield f"The order of blocks in {name} is fixed: {listed(list(in_order))}."
+        return
+    for group, words in block_orders_by_group(protocol).items():
+        yield f"The order of blocks{f' in group {group}' if group else ''} is {words}."
 
 
 def _participant_lines(protocol: Protocol, committed: Commitment, power: str | None) -> Iterator[str]:

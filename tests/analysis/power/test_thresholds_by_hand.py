@@ -126,8 +126,8 @@ def test_a_preregistration_states_each_hypothesis_with_its_test_and_bound() -> N
     first, second, inclusion, *questions = documents.hypotheses(two(), "en")
     assert first.startswith(
         "Hypothesis: threshold is higher in “Late” (late_one) than in “Prompt” (prompt_one), with an equivalence bound "
-        "of 1.25. We test it with a one-sided paired t test on log-transformed values, using one value per participant. "
-        "Participants are weighted as in the group mean."
+        "of 1.25. We test it with a one-sided paired t test on log-transformed values, using one value per participant."
+        " Participants are weighted as in the group mean."
     )
     assert " We test equivalence with two one-sided t tests and a bootstrap. This requires at least " in first
     assert "with a two-sided paired t test" in second
@@ -172,4 +172,16 @@ def test_a_preregistration_states_how_groups_are_formed_and_in_which_order_they_
     lines = list(documents._design_lines(protocol))
     assert lines[1].startswith(sentence)
     assert "1:1" in lines[1]
+    assert [line for line in lines if line.startswith("The order of blocks")] == [
+        "The order of blocks in group first_thin is fixed: “Thin” and “Thick”.",
+        "The order of blocks in group first_thick is fixed: “Thick” and “Thin”.",
+    ]
     assert "Block “Thin” compares water and honey." in lines
+
+
+def test_a_preregistration_states_one_order_of_blocks_if_all_groups_have_it() -> None:
+    groups = "".join(
+        f'\n[groups.{name}]\nsequence = ["hello", "thin", "thick", "end"]\n' for name in ("early", "later")
+    )
+    lines = list(documents._design_lines(grouped(groups=groups)))
+    assert "The order of blocks is fixed: the same order for all participants." in lines
