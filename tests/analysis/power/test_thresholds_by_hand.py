@@ -11,6 +11,7 @@ from scipy.special import stdtrit
 from study_app.analysis.planning import preregistration as documents
 from study_app.analysis.planning.power_curves import interval
 from study_app.analysis.planning.threshold_studies import PrecisionResult, Precisions, threshold_csv, threshold_markdown
+from study_app.analysis.statistics.mean_tests import equivalence_power
 from study_app.protocol.load import parse
 from study_app.protocol.model import Protocol
 from tests.protocol.groups.grouped import grouped
@@ -102,11 +103,12 @@ def test_the_tables_of_precision_have_a_row_for_each_size_and_the_contrasts_of_b
     assert lines[prompt + 6] == "| 20 | 5 | – | ±50 % | 0 % |"
 
 
+@pytest.mark.slow
 def test_a_contrast_has_the_errors_of_both_blocks_and_the_alpha_of_its_family() -> None:
     """Student's t(11) at 97.5 % is 2.201, and one of two hypotheses has a bound."""
     found = {("late", 20): result_of(0.2, (0.3, 0.3)), ("prompt", 20): result_of(0.1, (0.3, 0.3))}
     found |= {("late", 40): result_of(0.05, (0.3, 0.3))}  # of one block only
-    precisions = Precisions(protocol=two(), sizes=(12,), studies=1, asked=1, seed=1, found=found)
+    precisions = Precisions(protocol=two(), sizes=(12, 40), studies=1, asked=1, seed=1, found=found)
     lines = threshold_markdown(precisions).splitlines()
     spread = math.hypot(math.log(1.2), 0.2 * math.sqrt(2), 0.1 * math.sqrt(2))
     half = spread * stdtrit(11, 0.975) / math.sqrt(12)
@@ -114,6 +116,9 @@ def test_a_contrast_has_the_errors_of_both_blocks_and_the_alpha_of_its_family() 
     for row in rows:
         assert row.startswith(f"| 20 | 12 (planned) | ×/÷ {math.exp(spread):.2f} | ×/÷ {math.exp(half):.2f} | ×")
     assert [row.count("|") for row in rows] == [7, 6], "only the first hypothesis has a bound"
+    equal = equivalence_power(40, alpha=0.05, bound=math.log(1.25) / spread)
+    ends = [line.rpartition(" | ")[2] for line in lines if line.startswith("| 20 | 40 | ×/÷")]
+    assert ends[0] == f"{100 * equal:.0f} % |"
     first, second = (line for line in lines if "The “smallest difference” is the difference that 80 %" in line)
     assert "(one-sided, α = 0.025 (0.05 divided by 2 hypotheses))" in first
     assert "participants, at α = 0.05." in first

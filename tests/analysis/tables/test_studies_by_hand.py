@@ -15,6 +15,7 @@ from study_app.analysis.data.study_tables import Study, group_means, groups_show
 from study_app.protocol.model import Published
 from study_app.protocol.participants.groups import EACH_GROUP
 from study_app.store.exclusions import Exclusion
+from study_app.store.files.columns import INTERVALS
 from tests.analysis.made_up import DECIDED, ITEMS, delays, everybody, liquids, study
 
 PEOPLE = {"P2": ("1.2", "h", "0.2"), "P1": ("1.1", "i", "0.3"), "P4": ("1.0", "k", "0.1"), "P3": ("0.9", "l", "0.4")}
@@ -382,3 +383,33 @@ def test_a_folder_is_read_with_its_key_exclusions_and_last_attempts(monkeypatch:
     again = study_tables._load(Path("oils"))
     assert [row.participant for row in again.exclusions] == ["P4"], "a person has kept P3"
     assert (again.people, again.kept) == (("P1", "P3"), (kept,))
+
+
+def test_the_look_at_a_study_is_that_of_its_included_participants(made: Study, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of four sessions, those of two participants are included."""
+    looking = replace(made, decided=replace(DECIDED, looks=(2, 4)))
+    monkeypatch.setattr(study_tables, "read_merged", lambda _path: None)
+    monkeypatch.setattr(study_tables, "_load", lambda _path, planned: replace(looking, title=f"planned {planned}"))
+    for planned in (True, False):
+        read = study_tables.load_study(Path("oils"), planned=planned)
+        assert (read.decided.look, read.title) == (1, f"planned {planned}")
+
+
+@pytest.mark.parametrize("opened", [True, False])
+def test_sealed_columns_of_intervals_are_empty_until_the_key_is_open(
+    opened: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sealed, *_ = (column.name for column in INTERVALS if column.sealed)
+    place = {"participant": ["P1", "P1"], "session": [1, 1], "trial": [1, 1], "attempt": [1, 2]}
+    table = pd.DataFrame(
+        {**place, sealed: [0.5, 0.25], "interval": [1, 2], "phase": "main", "session_status": "completed"}
+    )
+    monkeypatch.setattr(study_tables, "has_intervals", lambda protocol: protocol == "levels")
+    monkeypatch.setattr(study_tables, "read_tables", lambda _records, name: {"intervals": table}[name])
+    records: Any = [SimpleNamespace(protocol="levels")]
+    last = pd.Series([2], index=pd.MultiIndex.from_tuples([("P1", 1, 1)], names=["participant", "session", "trial"]))
+    read = study_tables._read_intervals(records, (), last.rename("last_attempt"), opened=opened)
+    assert list(read[sealed].fillna(-1)) == ([0.5, 0.25] if opened else [-1, -1])
+    assert (list(read["interval"]), list(read["counted"])) == ([1, 2], [False, True])
+    statements: Any = [SimpleNamespace(protocol="statements")]
+    assert study_tables._read_intervals(statements, (), last, opened=opened).empty
