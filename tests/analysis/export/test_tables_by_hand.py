@@ -20,9 +20,12 @@ from pyarrow import parquet
 from study_app.analysis.data.blocks import Item, OtherQuestions, PlacedScore, Setting
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.export import psychds_dataset, spss, table_files
+from study_app.analysis.export import tables as table_module
 from study_app.analysis.export.table_files import codebook_bytes, credit_lines, file_name
 from study_app.analysis.export.tables import ExportTable, exported_tables, sealed_interval_columns, wide_table
+from study_app.analysis.levels.columns import JUDGED
 from study_app.protocol.source.files import StudySource, _has_study_name
+from study_app.store.files import TRIALS_MISSING
 from study_app.store.files.columns import INTERVALS
 from study_app.store.files.csv_files import Column, header, optional, unsealed_columns
 from tests.analysis.made_up import ITEMS, study
@@ -523,3 +526,110 @@ def test_footage_outside_of_the_folder_or_with_other_content_is_missing(
         (tmp_path / name).write_bytes(text.encode())
         assert _has_study_name("oil", tmp_path / name) == is_of
     assert not _has_study_name("oil", tmp_path / "nowhere")
+
+
+def test_the_tables_of_levels_have_all_intervals_groups_and_results_once_the_key_is_open(
+    made: Study, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One block has two intervals in a trial, the other three."""
+    sealed = {*header(INTERVALS)} - {*header(unsealed_columns(INTERVALS))}
+    intervals = pd.DataFrame({name: [name] for name in (*header(INTERVALS), *header((*JUDGED, TRIALS_MISSING)))})
+    levels: Any = [
+        SimpleNamespace(id=name, design=SimpleNamespace(intervals=count)) for name, count in (("p", 3), ("q", 2))
+    ]
+    rows = {"participant": ["A-P001", "B-P001"], "group": ["old", "new"], "level": [0.5, 0.25]}
+    rows |= {"force_mean_n_2": [7.0, 8.0]}
+    monkeypatch.setattr(
+        table_module, "tracks", lambda _study: pd.DataFrame({**rows, "block": "b", "code": ["L1", "L2"]})
+    )
+    monkeypatch.setattr(table_module, "level_results", lambda _study, frame: list(frame["level"]))
+    table = next(iter(table_module.RESULTS))
+    columns = table_module.RESULTS[table].columns
+
+    def statistic(name: str, *, is_exported: bool) -> Any:
+        def rows_of(level: float) -> Any:
+            person = "A-P001" if level == 0.5 else "B-P001"
+            return SimpleNamespace(export_rows=lambda: [{"participant": person, columns[-1].name: None}])
+
+        return type("Statistic", (), {"table": name, "is_exported_in": staticmethod(lambda _study: is_exported),
+                                      "__new__": lambda _cls, level: rows_of(level)})  # fmt: skip
+
+    kinds = [statistic(table, is_exported=True), statistic("none", is_exported=False)]
+    monkeypatch.setattr(table_module, "statistics", lambda: kinds)
+    opened = replace(made, levels=levels, intervals=intervals)
+    found = {one.name: one for one in table_module._level_tables(opened)}
+    assert list(found) == ["intervals", "tracks", table]
+    assert set(header(found["intervals"].columns)) >= sealed
+    tracks = found["tracks"]
+    assert list(tracks.frame["level_asked"]) == [0.5, 0.25]
+    assert list(tracks.frame["condition"]) == ["c1", "c2"]
+    numbered = [column for column in tracks.columns if column.name.startswith("force_mean_n_")]
+    assert [column.name for column in numbered] == [f"force_mean_n_{number}" for number in (1, 2, 3)]
+    assert [column.description[-15:] for column in numbered] == [f" In interval {number}." for number in (1, 2, 3)]
+    assert tracks.frame["force_mean_n_1"].isna().all()
+    assert list(tracks.frame["force_mean_n_2"]) == [7.0, 8.0]
+    results = found[table].frame
+    assert [list(results[name]) for name in ("participant", "group", "study", "simulated", "pilot")] == [
+        ["A-P001", "B-P001"], ["old", "new"], ["made_up"] * 2, [True] * 2, [False] * 2,
+    ]  # fmt: skip
+    closed = list(table_module._level_tables(replace(opened, settings={})))
+    assert [one.name for one in closed] == ["intervals"]
+    assert not set(header(closed[0].columns)) & sealed
+    assert list(table_module._level_tables(made)) == []
+
+
+def test_a_wide_column_is_named_with_its_block_only_if_another_block_has_the_name(made: Study) -> None:
+    (block,) = made.blocks
+    other = replace(block, id="c", items=block.items[:1])
+    _, cells = wide_table(replace(made, blocks=(block, other)))
+    shared, own = (item.id for item in block.items)
+    assert list(cells) == [name for place in (1, 2, 3) for name in (f"b__{shared}__c{place}", f"{own}__c{place}")] + [
+        f"c__{shared}__c{place}" for place in (1, 2, 3)
+    ]
+    people = made.participants.assign(simulated=made.participants["participant"] == "B-P001")
+    assert list(wide_table(replace(made, participants=people))[0].frame["simulated"]) == [False, False, True, False]
+
+
+@pytest.mark.parametrize(
+    ("extras", "written"),
+    [
+        ((), {"csv": "trials wide"}),
+        (("parquet",), {"csv": "trials", "parquet": "trials"}),
+        (("parquet", "wide"), {"csv": "trials wide", "parquet": "trials wide"}),
+        (("sav",), {"csv": "trials", "sav": "trials wide tracks"}),
+    ],
+)
+def test_each_format_has_its_tables(
+    extras: Any, written: dict[str, str], made: Study, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The first table is that of the answers; tracks are added to the .sav files."""
+    monkeypatch.setattr(table_files, "codebook_bytes", lambda _study, files: repr(sorted(files)).encode())
+    monkeypatch.setattr(table_files, "_parquet_bytes", lambda table: f"parquet {table.name}")
+    monkeypatch.setattr(table_files, "table_bytes", lambda table: f"csv {table.name}")
+    monkeypatch.setattr(table_files.spss, "sav", lambda _study, table, _coded: f"sav {table.name}")
+    monkeypatch.setattr(table_files.spss, "wide_sav", lambda _study, table, _cells: f"sav {table.name}")
+    names = ["trials", "tracks", "wide"] if "sav" in extras else ["trials", "wide"]
+    given = [ExportTable(name, (), pd.DataFrame()) for name in names]
+    files: dict[str, Any] = dict(table_files.table_files(made, given, extras, {}))
+    book = files.pop("codebook.json").decode()
+    if "sav" in extras:
+        written = {**written, "csv": "trials tracks"}
+    expected = {
+        file_name(made, ExportTable(name, (), pd.DataFrame()), ending): f"{ending} {name}"
+        for ending, of_ending in written.items()
+        for name in of_ending.split()
+    }
+    assert files == expected
+    assert book == repr(sorted(name for name in expected if name.endswith(".csv")))
+
+
+def test_parquet_describes_each_column_with_its_unit_and_small_whole_numbers(made: Study) -> None:
+    frame = pd.DataFrame({"a_text": ["x"], "a_flag": [True], "a_whole": [7], "a_number": [0.5], "a time": ["z"]})
+    schema = parquet.read_schema(io.BytesIO(table_files._parquet_bytes(ExportTable("t", COLUMNS, frame))))
+    assert [str(schema.field(column.name).type) for column in COLUMNS] == ["string", "bool", "int8", "double", "string"]
+    assert {name: text.decode() for name, text in schema.field("a_number").metadata.items() if name == b"unit"} == {
+        b"unit": "mm"
+    }
+    assert [schema.field(column.name).metadata[b"description"].decode() for column in COLUMNS] == [
+        "Words.", "Whether.", "Count.", "Length.", "When.",
+    ]  # fmt: skip

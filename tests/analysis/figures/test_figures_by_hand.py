@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from study_app import figure_style as style
 from study_app.analysis.data.study_tables import Study
-from study_app.analysis.figures import level_figures, question_figures, summary_figures
+from study_app.analysis.figures import answer_figures, level_figures, question_figures, summary_figures
 from study_app.analysis.figures.people_figures import Mean
 from study_app.analysis.figures.summary_figures import Numbers, numbers_of, summary_figure_tasks
 from study_app.analysis.findings import statement_tests
@@ -519,3 +519,140 @@ def test_the_caption_of_levels_says_what_is_drawn(monkeypatch: pytest.MonkeyPatc
     assert [level_figures._panels_left_out(further) for further in (-1, 0, 1, 3)] == [
         "", "", " 1 further panel is not shown.", " Three further panels are not shown.",
     ]  # fmt: skip
+
+
+LABELS = ("not at all", *"23456", "fully")
+
+
+def answered(*, is_open: bool = True, over_delay: bool = False) -> Study:
+    """Return answers of three participants: P002 was not asked about the last setting, and one answer is missing."""
+    settings = delays((0, 40)) if over_delay else liquids(2)
+    given = {"P000": ((1, 4), (7, 4)), "P001": ((2, 5), (6, None)), "P002": ((4, 6),)}
+    rows = [
+        (person, 1, setting.code, values)
+        for person, of_person in given.items()
+        for setting, values in zip(settings, of_person, strict=False)
+    ]
+    made = study(settings, rows)
+    if not is_open:
+        settings = tuple(replace(setting, condition=None, liquid=None, delay_ms=None) for setting in settings)
+    block = replace(made.blocks[0], labels=LABELS, settings=settings)
+    responses = made.responses.assign(response=made.responses["response"].astype("Int64"))
+    valid = pd.array([True, False, None, True, False], "boolean")
+    trials = made.trials.assign(delay_error_mean_ms=[-2.0, 1.0, 0.5, 3.0, -0.5], valid=valid)
+    return replace(made, blocks=(block,), responses=responses, trials=trials, settings=made.settings if is_open else {})
+
+
+def test_the_caption_of_answers_counts_participants_missing_answers_exclusions_and_limits() -> None:
+    made = answered()
+    (block,) = made.blocks
+    assert answer_figures.counts(made, block) == [
+        "n = 2 to 3 of 3 participants per liquid, 1 of 10 ratings missing", "n = 2 to 3, 1 of 10 ratings missing",
+    ]  # fmt: skip
+    people = made.participants
+    extra = [people.iloc[[place]].assign(participant=f"P{place}9") for place in (0, 1, 2)]
+    extra = [extra[0].assign(counted=False), *(one.assign(counted=False, excluded=True) for one in extra[1:])]
+    doubts: Any = [SimpleNamespace(path=made.folder / f"{name}.csv", what="differs") for name in "dacbd"]
+    shown = replace(made, participants=pd.concat([people.assign(pilot=True), *extra]), doubts=tuple(doubts))
+    caption = answer_figures._caption(shown, block)
+    assert caption.startswith(
+        "Pilot. Agreement with 2 statements about 2 liquids (simulated participants, not people; n = 2 to 3 of 3 "
+        "participants per liquid, 1 of 10 ratings missing). Bars show the number of answers, with disagreement to the "
+        "left of the line and agreement to the right;"
+    )
+    assert caption.endswith(
+        "The scale points from 1 to 7 are: not at all, 2, 3, 4, 5, 6, fully. “Cannot judge” answers: 0; missing "
+        "answers: 1. 1 session is excluded because it was not completed. 2 sessions are excluded. 2 of 5 trials exceeded "
+        "the protocol's limits but are included. 4 files are used although they have changed since recording: a.csv, "
+        "b.csv, c.csv and 1 more."
+    )
+    late = answered(over_delay=True)
+    caption = answer_figures._caption(late, late.blocks[0])
+    assert "about 2 delays (simulated" in caption
+    assert "Thin lines: participants, shifted slightly" in caption
+    assert (
+        "Answers range from 1 (not at all) to 7 (fully). The axis shows the requested delay; the achieved delay "
+        in caption
+    )
+    assert "differed from it by +0.4 ms on average (range across trials: −2.0 to +3.0 ms)." in caption
+    sealed = answered(is_open=False)
+    caption = answer_figures._caption(sealed, sealed.blocks[0])
+    assert "about 2 conditions (" in caption
+    assert "Conditions appear as codes because the study is blinded; their order has no meaning." in caption
+    blocks = made.blocks[0], late.blocks[0], sealed.blocks[0]
+    assert [answer_figures.title(shown_block) for shown_block in blocks] == [
+        "Agreement for each liquid", "Answers as a function of added delay", "Agreement by condition",
+    ]  # fmt: skip
+
+
+@pytest.mark.slow
+def test_bars_have_the_answers_of_each_level_and_n_where_some_are_missing() -> None:
+    """The second statement about the second liquid has one answer less."""
+    made = answered()
+    figure = answer_figures.draw_block(made, made.blocks[0], {}, LOOK).figure
+    first, second = figure.axes
+    bars = [
+        {str(bar.get_gid()): (bar.get_x(), bar.get_width()) for bar in axes.patches if bar.get_gid()}
+        for axes in (first, second)
+    ]
+    edge = bars[0]["L1-row1-level4"][0]
+    assert bars[0] == {
+        "L1-row1-level1": (-2.0, 1), "L1-row1-level2": (-1.0, 1), "L1-row1-level4": (edge, 1),
+        "L1-row2-level5": (0.0, 1), "L1-row2-level6": (1.0, 1), "L1-row2-level4": (edge, 1),
+    }  # fmt: skip
+    assert bars[1] == {"L2-row1-level6": (0.0, 1), "L2-row1-level7": (1.0, 1), "L2-row2-level4": (edge, 1)}
+    texts = texts_of(figure)
+    assert [text for text in texts if text in ("n 1", "n 2", "n 3")] == ["n 1"]
+    names = [made.blocks[0].name(setting) for setting in made.blocks[0].settings]
+    assert [text for text in texts if text in names] == names
+    assert [text for text in texts if text in ("Different", "Harder")] == ["Different", "Harder"]
+
+
+@pytest.mark.slow
+def test_answers_over_delay_have_a_plot_for_each_statement_with_its_lowest_delay() -> None:
+    made = answered(over_delay=True)
+    figure = answer_figures.draw_block(made, made.blocks[0], {"harder": 40.0}, LOOK).figure
+    first, second = figure.axes
+    assert [text for text in texts_of(figure) if text in ("Different", "Harder")] == ["Different", "Harder"]
+    assert "Added delay in ms.   1 = not at all, 7 = fully." in texts_of(figure)
+    lines = [{str(line.get_gid()): line for line in axes.lines} for axes in (first, second)]
+    assert np.asarray(lines[0]["item1-median"].get_xydata()).tolist() == [[0.0, 2.0], [40.0, 6.5]]
+    assert "item1-lowest" not in lines[0]
+    assert np.asarray(lines[1]["item2-lowest"].get_xdata()).tolist() == [40.0, 40.0]
+    assert "≤ 40" in {text.get_text() for text in second.texts}
+
+
+def test_the_labels_of_a_legend_are_shortened_by_the_ending_that_they_share() -> None:
+    agree = (
+        "Fully disagree",
+        "Mostly disagree",
+        "Rather disagree",
+        "Neither",
+        "Rather agree",
+        "Mostly agree",
+        "Fully agree",
+    )
+    assert answer_figures._legend_labels(agree) == [
+        "Fully disagree", "Mostly", "Rather", "Neither", "Rather", "Mostly", "Fully agree",
+    ]  # fmt: skip
+    same = ("A b", "C b", "C b", "n", "d e", "f e", "g e")
+    assert answer_figures._legend_labels(same) == list(same)
+
+
+@pytest.mark.slow
+def test_the_matrix_of_names_has_the_counts_and_outlines_the_correct_one() -> None:
+    table = ((5, 1, 2, 0), (0, 6, 0, 0))
+    figure = answer_figures.draw_recognition(table, ("Wax", "Oil"), ("like wax", "like oil"), (0, None), LOOK).figure
+    columns = [[text.get_text() for text in axes.texts] for axes in figure.axes]
+    assert columns == [["5  (62%)", "0"], ["1  (12%)", "6  (100%)"], ["2  (25%)", "0"]]
+    outlined = [
+        str(cell.get_gid())
+        for axes in figure.axes
+        for cell in axes.patches
+        if cell.get_linewidth() == pytest.approx(1.6)
+    ]
+    assert outlined == ["name1-setting1"]
+    texts = texts_of(figure)
+    assert [text for text in texts if text in ("Wax", "Oil")] == ["Wax", "Oil"]
+    assert "undecided" in texts
+    assert "unanswered" not in texts, "nobody left it unanswered"
