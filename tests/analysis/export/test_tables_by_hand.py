@@ -25,7 +25,8 @@ from study_app.analysis.export.table_files import codebook_bytes, credit_lines, 
 from study_app.analysis.export.tables import ExportTable, exported_tables, sealed_interval_columns, wide_table
 from study_app.analysis.levels.columns import JUDGED
 from study_app.protocol.source.files import StudySource, _has_study_name
-from study_app.store.files import TRIALS_MISSING
+from study_app.store.exclusions import Exclusion
+from study_app.store.files import SEALED, TRIALS_MISSING
 from study_app.store.files.columns import INTERVALS
 from study_app.store.files.csv_files import Column, header, optional, unsealed_columns
 from tests.analysis.made_up import ITEMS, study
@@ -212,7 +213,7 @@ def test_questions_and_scores_have_their_answers_and_texts_in_the_wide_table_sps
     raw = PlacedScore(form, "raw", "tlx", score, ())
     given = pd.DataFrame(
         [
-            ("A-P001", "stir", 3), ("A-P001", "stir", 6), ("A-P002", "stir", 7), ("A-P001", "again", 8),
+            *(("A-P001", "stir", value) for value in (3, 8, 4)), ("A-P002", "stir", 7), ("A-P001", "again", 8),
             ("A-P002", "again", None), ("B-P001", "again", None),
         ],
         columns=["participant", "code", "value"],
@@ -231,14 +232,18 @@ def test_questions_and_scores_have_their_answers_and_texts_in_the_wide_table_sps
     for method in ("answers_to", "rows_of"):
         monkeypatch.setattr(Study, method, lambda _study, question: given if question is sure else picked)
     monkeypatch.setattr("study_app.analysis.export.tables.scored", lambda _study, _score: given)
+    of_levels: Any = SimpleNamespace(id="size", where=SimpleNamespace(id="track", settings=()))
+    asked = replace(made, others=OtherQuestions(questions=(sure, pick, of_levels), scores=(raw,)))
+    track: Any = SimpleNamespace(id="track")
+    assert "track__size" not in wide_table(replace(asked, levels=(track,)))[1]
     asked = replace(made, others=OtherQuestions(questions=(sure, pick), scores=(raw,)))
     table, cells = wide_table(asked)
     median, last = (f" The {which} of each participant's answers." for which in ("median", "last"))
     expected = {
-        "end__sure__stir": (4.5, 7, f"How sure? In End. After stir.{median}", 2, 9),
+        "end__sure__stir": (4, 7, f"How sure? In End. After stir.{median}", 2, 9),
         "end__sure__again": (8, None, "How sure? In End. After again.", 2, 9),
         "q__pick__mild": ("o", "w", f"Pick one. In Oils. About mild.{last}", None, None),
-        "end__raw__stir": (46, 71, f"Score raw of tlx, in End. After stir.{median}", None, None),
+        "end__raw__stir": (41, 71, f"Score raw of tlx, in End. After stir.{median}", None, None),
         "end__raw__again": (81, None, "Score raw of tlx, in End. After again.", None, None),
     }
     columns = {column.name: column for column in table.columns if column.name in expected}
@@ -252,7 +257,7 @@ def test_questions_and_scores_have_their_answers_and_texts_in_the_wide_table_sps
     frame, about = pyreadstat.read_sav(tmp_path / "wide.sav", user_missing=True)
     assert frame[["end__sure__stir", "end__sure__again", "q__pick__mild", "end__raw__stir"]].fillna(
         -1
-    ).T.to_numpy().tolist() == [[4.5, 7, 99, 99], [8, 98, 97, 99], [1, 2, 99, 99], [46, 71, -1, -1]]
+    ).T.to_numpy().tolist() == [[4, 7, 99, 99], [8, 98, 97, 99], [1, 2, 99, 99], [41, 71, -1, -1]]
     off = {97: "Excluded", 99: "No answer"}
     labels = {"end__sure__again": {2: "low", 9: "high", 98: "no idea", **off}}
     labels["q__pick__mild"] = {1: "Oil", 2: "Water", 98: "Cannot judge", **off}
@@ -299,20 +304,25 @@ def test_the_codebook_and_the_sav_file_name_every_level_setting_and_missing_answ
 ) -> None:
     monkeypatch.setattr("study_app.analysis.export.table_files.reveals_of", lambda _folder: ({"by": "AK"},))
     table, cells = wide_table(made)
-    labelled = replace(made, blocks=(replace(made.blocks[0], labels=tuple("abcdefg"), cannot_judge="unsure"),))
+    excluded = Exclusion(
+        participant=LEFT_OUT, session=1, trial=None, rule_or_person="AK", reason="spoke", excluded_at="t"
+    )
+    block = replace(made.blocks[0], labels=tuple("abcdefg"), cannot_judge="unsure")
+    labelled = replace(made, blocks=(block,), exclusions=(excluded,))
     cells = {name: replace(cell, block=labelled.blocks[0]) for name, cell in cells.items()}
     files = table_files.table_files(labelled, (*exported_tables(labelled), table), ("sav", "wide", "parquet"), cells)
     book: dict[str, Any] = json.loads(files["codebook.json"])
     (block,) = book["blocks"]
     assert block["levels"] == dict(zip("1234567", "abcdefg", strict=True))
+    assert [row["participant"] for row in book["exclusions"]] == [LEFT_OUT]
     assert (block["cannot_judge"], book["key_opened"], book["blinded"]) == ("unsure", [{"by": "AK"}], False)
     assert block["settings"] == [
         {"code": f"L{n}", "condition": f"c{n}", "liquid": f"oil{n}", "delay_ms": 10.0 * n + 0.5} for n in (1, 2, 3)
     ]
     assert block["items"] == [{"id": item, "text": f"It is {item}.", "short": item[:3]} for item in ITEMS]
     assert block["sessions"] == [1]
-    head = ("participants", "sites", "sessions", "sessions_left_out", "simulated", "pilot")
-    assert [book["study"][name] for name in head] == [4, ["A", "B"], 5, made.left_out, True, False]
+    head = ("participants", "sites", "sessions", "sessions_left_out", "sessions_excluded", "simulated", "pilot")
+    assert [book["study"][name] for name in head] == [4, ["A", "B"], 5, 0, 1, True, False]
     schema = parquet.read_schema(io.BytesIO(files["study-made_up_description-responses_data.parquet"]))
     kinds = {"trial": "int64", "counted": "bool", "code": "string", "delay_ms": "double"}
     assert {name: str(schema.field(name).type) for name in kinds} == kinds
@@ -443,6 +453,19 @@ def test_the_codebook_describes_columns_doubts_and_credits(made: Study) -> None:
     sealed = sealed_interval_columns(of_levels)
     assert sealed == {*header(INTERVALS)} - {*header(unsealed_columns(INTERVALS))} != set()
     assert sealed_interval_columns(made) == set()
+    design, varied = (
+        SimpleNamespace(kind="pair", name="higher"),
+        SimpleNamespace(vary="pitch_hz", level_kind="weber", direction="up", unit="Hz"),
+    )
+    levels: Any = [
+        SimpleNamespace(id="pitch", title="Pitch", phase="main", design=design, stimulus=stimulus)
+        for stimulus in (None, varied)
+    ]
+    book = json.loads(codebook_bytes(replace(credited, levels=levels), {}))
+    entry = {"block": "pitch", "title": "Pitch", "phase": "main", "design": "pair", "item": "higher"}
+    assert book["levels"] == [entry, {**entry, "vary": "pitch_hz", "level": "weber", "direction": "up"}]
+    assert book["sealed_columns"] == sorted(SEALED | sealed)
+    assert json.loads(codebook_bytes(made, {}))["sealed_columns"] == []
     table = ExportTable("trials", COLUMNS, pd.DataFrame())
     assert file_name(made, table, "sav") == "study-made_up_description-trials_data.sav"
 
@@ -633,3 +656,27 @@ def test_parquet_describes_each_column_with_its_unit_and_small_whole_numbers(mad
     assert [schema.field(column.name).metadata[b"description"].decode() for column in COLUMNS] == [
         "Words.", "Whether.", "Count.", "Length.", "When.",
     ]  # fmt: skip
+
+
+def test_a_text_in_sav_is_cut_between_characters_and_ends_with_an_ellipsis() -> None:
+    """A letter with an accent has two bytes, the ellipsis three."""
+    assert spss._truncate("é" * 5, 10) == "é" * 5
+    assert spss._truncate("é" * 6, 10) == "ééé…"
+    assert spss._truncate("abcdefghijk", 10) == "abcdefg…"
+
+
+def test_an_answer_has_the_delay_of_its_own_session_and_the_condition_behind_a_track(made: Study) -> None:
+    """Each session numbers its trials from 1; the setting of a track names the condition that it presents."""
+    place = {"participant": ["A-P001"] * 2, "session": [1, 2], "trial": [1, 1], "attempt": [1, 1]}
+    trials = pd.DataFrame({**place, "delay_error_mean_ms": [1.5, -2.5]})
+    answers = pd.DataFrame({**place, "block": "pitch", "code": ["T1", "T2"]})[::-1].reset_index(drop=True)
+    behind = Setting(code="x", condition="late", liquid="oil", delay_ms=60.0)
+    settings = {
+        ("pitch", "T1"): Setting(code="T1", condition="8/1", of=behind),
+        ("pitch", "T2"): replace(behind, code="T2"),
+    }
+    shown = replace(made, answered=answers, trials=trials, settings=settings)
+    frame = table_module._add_conditions(shown, table_module._add_delay_error(shown))
+    assert list(frame["delay_achieved_ms"]) == [57.5, 61.5]
+    opened = [list(frame[name]) for name in ("condition", "liquid", "delay_ms")]
+    assert opened == [["late"] * 2, ["oil"] * 2, [60.0] * 2]

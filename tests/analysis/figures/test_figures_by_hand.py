@@ -540,6 +540,7 @@ def answered(*, is_open: bool = True, over_delay: bool = False) -> Study:
     responses = made.responses.assign(response=made.responses["response"].astype("Int64"))
     valid = pd.array([True, False, None, True, False], "boolean")
     trials = made.trials.assign(delay_error_mean_ms=[-2.0, 1.0, 0.5, 3.0, -0.5], valid=valid)
+    trials = pd.concat([trials, trials.assign(block="c", valid=False, delay_error_mean_ms=9.0)])
     return replace(made, blocks=(block,), responses=responses, trials=trials, settings=made.settings if is_open else {})
 
 
@@ -562,9 +563,9 @@ def test_the_caption_of_answers_counts_participants_missing_answers_exclusions_a
     )
     assert caption.endswith(
         "The scale points from 1 to 7 are: not at all, 2, 3, 4, 5, 6, fully. “Cannot judge” answers: 0; missing "
-        "answers: 1. 1 session is excluded because it was not completed. 2 sessions are excluded. 2 of 5 trials exceeded "
-        "the protocol's limits but are included. 4 files are used although they have changed since recording: a.csv, "
-        "b.csv, c.csv and 1 more."
+        "answers: 1. 1 session is excluded because it was not completed. 2 sessions are excluded. 2 of 5 trials "
+        "exceeded the protocol's limits but are included. 4 files are used although they have changed since recording: "
+        "a.csv, b.csv, c.csv and 1 more."
     )
     late = answered(over_delay=True)
     caption = answer_figures._caption(late, late.blocks[0])
@@ -656,3 +657,5 @@ def test_the_matrix_of_names_has_the_counts_and_outlines_the_correct_one() -> No
     assert [text for text in texts if text in ("Wax", "Oil")] == ["Wax", "Oil"]
     assert "undecided" in texts
     assert "unanswered" not in texts, "nobody left it unanswered"
+    decided = answer_figures.draw_recognition(((5, 1, 0, 0),), ("Wax",), ("like wax", "like oil"), (0,), LOOK).figure
+    assert {"undecided", "unanswered"} & {*texts_of(decided)} == {"undecided"}
