@@ -29,6 +29,7 @@ _NOT_ANSWERED: Final = 99
 _CODES: Final = frozenset((_EXCLUDED, _CANNOT_JUDGE, _NOT_ANSWERED))
 _NAME_BYTES: Final = 64
 _LABEL_BYTES: Final = 255
+_VALUE_LABEL_BYTES: Final = 120
 _FILE_LABEL_BYTES: Final = 64
 _TEXT_BYTES: Final = 32_767
 _RESERVED: Final = frozenset(("ALL", "AND", "BY", "EQ", "GE", "GT", "LE", "LT", "NE", "NOT", "OR", "TO", "WITH"))
@@ -118,7 +119,7 @@ def sav(study: Study, table: ExportTable, coded: Mapping[str, dict[int, str]], o
                 name: _truncate(_column_label(name, column), _LABEL_BYTES) for name, column in columns.items()
             },
             variable_value_labels={
-                name: {value: _truncate(label, _LABEL_BYTES // 2) for value, label in found.items()}
+                name: {value: _truncate(label, _VALUE_LABEL_BYTES) for value, label in found.items()}
                 for name, found in (levels | flags).items()
             },
             missing_ranges={name: [*sorted(_CODES & level.keys())] for name, level in levels.items()},

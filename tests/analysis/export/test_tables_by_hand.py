@@ -680,3 +680,11 @@ def test_an_answer_has_the_delay_of_its_own_session_and_the_condition_behind_a_t
     assert list(frame["delay_achieved_ms"]) == [57.5, 61.5]
     opened = [list(frame[name]) for name in ("condition", "liquid", "delay_ms")]
     assert opened == [["late"] * 2, ["oil"] * 2, [60.0] * 2]
+
+
+def test_a_long_label_of_an_answer_is_cut_in_sav(made: Study, tmp_path: Path) -> None:
+    """SPSS cuts the label of a value after 120 bytes, without a word."""
+    table = ExportTable("t", COLUMNS[2:3], pd.DataFrame({"a_whole": pd.array([1], "Int64")}))
+    (tmp_path / "x.sav").write_bytes(spss.sav(made, table, {"a_whole": {1: "w" * 200}}))
+    _, about = pyreadstat.read_sav(tmp_path / "x.sav")
+    assert about.variable_value_labels == {"a_whole": {1: f"{'w' * 117}…"}}
