@@ -187,7 +187,7 @@ def test_a_block_is_introduced_once_and_a_single_setting_has_a_card_of_its_own(m
         block("a", kind="views"),
         block("b", kind="delays", settings=delays([0, 9])),
         block("c", measures=measures, **single),
-        block("d", n=0, **single),
+        block("d", n=0, measures=({**measures[0], "n": 0},) * 3, **single),
         block("e", measures=measures, presentations=(1, 2), **single),
     )
     results = results_of(*blocks, contrasts=[hypothesis(measure="warm", blocks=("a",), conditions=("c1", "c2"))])
@@ -331,7 +331,7 @@ def test_the_first_page_has_the_look_the_cards_the_limits_and_the_rate_of_false_
     monkeypatch.setattr(pages, "cards", lambda *_: cards)
     monkeypatch.setattr(pages, "answers", lambda _results: ("an answer",))
     monkeypatch.setattr(pages, "false_claims_sentence", lambda n: f"Of {n} people.")
-    monkeypatch.setattr(pages, "picture", lambda figure, beside: f"{figure.name} {beside}")
+    monkeypatch.setattr(pages, "picture", lambda figure, beside=False: f"{figure.name} {beside}")
     drawn = [picture("late-b", "b")]
     results = results_of(block("a", n=7), block("b", n=11), people=("P1",) * 15)
     page = pages.first_page(results, ["Block b: few.", "No key."], {}, drawn, {})

@@ -257,6 +257,22 @@ def test_a_fixed_order_of_two_blocks_is_a_limit_of_their_comparison(
     assert [line[: len(sentence or "")] for line in lines] == ([] if sentence is None else [sentence])
 
 
+@pytest.mark.slow
+def test_the_limits_of_a_hypothesis_are_its_power_chance_and_order() -> None:
+    stated = hypothesis(
+        measure="d_prime", blocks=("late", "prompt"), compared=("Late", "Prompt"), p_adjusted=0.3, verdict="not shown",
+        sides=(side("Late", 12, 1.0, low=-0.5), TWO[1]), sd=1.5,
+    )  # fmt: skip
+    made = of_people(12, protocol={"sequence": ["prompt", "late"], "blocks": {}, "questionnaires": {}, "study": {}})
+    lines = list(sections._general_sentences(made, results_of(block("b"), contrasts=[stated])))
+    assert [line[:40] for line in lines] == [
+        "Hypothesis: with twelve participants and", "Hypothesis: the interval of the mean d′ ",
+        "Hypothesis: all participants completed P",
+    ]  # fmt: skip
+    shown = hypothesis(measure="d_prime", sides=stated.sides, verdict="shown")
+    assert list(sections._chance_level_sentences(results_of(contrasts=[shown]))) == []
+
+
 def test_conclusions_are_all_hypotheses_and_then_all_answers(monkeypatch: pytest.MonkeyPatch) -> None:
     contrasts = [SimpleNamespace(name=name, verdict=f"verdict {name}") for name in ("first", "second")]
     monkeypatch.setattr(sections, "question", lambda contrast: f"{contrast.name}?")
