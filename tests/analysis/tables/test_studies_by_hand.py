@@ -281,15 +281,18 @@ def test_answers_to_a_form_are_those_of_its_place_with_the_block_that_they_follo
         (None, "sure", None, True), ("load", "sure", "c", False),
     ]  # fmt: skip
     answered = pd.DataFrame(rows, columns=["form", "item", "after_block", "counted"]).assign(code="L1")
-    answered["block"] = ["x", "x", "x", "x", "b", "x"]
+    answered["block"], answered["session"] = ["x", "x", "x", "x", "b", "x"], [2, 1, 1, 1, 1, 3]
     shown = replace(made, answered=answered.convert_dtypes())
 
-    def asked(where: str, item: str, *, is_form: bool, settings: tuple[int, ...]) -> Any:
-        return SimpleNamespace(id=item, where=SimpleNamespace(id=where, is_form=is_form, settings=settings))
+    def asked(where: str, item: str, *, is_form: bool, settings: tuple[int, ...], by_session: bool = False) -> Any:
+        place = SimpleNamespace(id=where, is_form=is_form, settings=settings, by_session=by_session)
+        return SimpleNamespace(id=item, where=place)
 
     repeated = asked("load", "sure", is_form=True, settings=(1, 2))
     assert list(shown.rows_of(repeated)["code"]) == [study_tables.START, "b", "c"]
     assert list(shown.answers_to(repeated)["code"]) == [study_tables.START, "b"]
+    by_session = asked("load", "sure", is_form=True, settings=(1, 2), by_session=True)
+    assert list(shown.rows_of(by_session)["code"]) == [f"{study_tables.START}__2", "b__1", "c__3"]
     assert list(shown.answers_to(asked("end", "sure", is_form=True, settings=()))["code"]) == ["L1"]
     assert list(shown.answers_to(asked("b", "sure", is_form=False, settings=(1,))).index) == [4]
 

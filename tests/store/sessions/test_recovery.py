@@ -137,7 +137,7 @@ def test_files_that_say_more_than_the_journal_are_not_replaced(start: Start, aga
     )
     with_receipt(store, resumed=entries, status="completed")
     assert refusal(again, folder.path) == (
-        f"{folder.receipt} its status is 'completed', but the journal's is 'unfinished': {restore}"
+        f"{folder.receipt} has the status 'completed', but the journal 'unfinished': {restore}"
     )
     with_receipt(store, status=receipt.UNFINISHED)
     folder.checksums.write_bytes(b"")
