@@ -314,7 +314,7 @@ def test_power_of_a_hypothesis_on_a_form_is_stated_in_standard_deviations() -> N
 @pytest.mark.parametrize(
     ("before", "after", "words"),
     [
-        ('"late", "load"]', '"late"]', "load does not always follow prompt"),
+        ('"late", "load"]', '"late"]', "load does not always follow late"),
         ('measure = "raw"', 'measure = "raws"', '"load" does not have a numeric question or score raws'),
         ('measure = "raw"', 'measure = "threshold"', "compare its questions or scores"),
     ],

@@ -162,4 +162,4 @@ def test_the_doctor_writes_one(tmp_path: Path) -> None:
     ran = CliRunner().invoke(cli.commands, [*words, str(tmp_path / "a.zip")])
     assert ran.exit_code == 3, ran.output
     assert f"Written: {tmp_path / 'a.zip'}" in ran.output
-    assert "FOUND" in members(tmp_path / "a.zip")["diagnosis.txt"]
+    assert "FAULT" in members(tmp_path / "a.zip")["diagnosis.txt"]

@@ -240,7 +240,7 @@ def first_page_of_questions() -> Iterator[str]:
     for of in (LIQUIDS, DELAYS):
         yield from (presented.sentence for presented in first_page.presented_in(of).values())
     groups = [
-        GroupAnswers(code, name, {"n": n, "counts": {"left": n - 2, "right": 2}})
+        GroupAnswers(code, name, {"n": n, "participants": n, "counts": {"left": n - 2, "right": 2}})
         for code, name, n in (("L1", "Water", 9), ("L2", "Honey", 7), ("L3", "Oil", 0))
     ]
     asked = [

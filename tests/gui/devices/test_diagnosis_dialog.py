@@ -137,7 +137,7 @@ def test_a_fault_of_an_emulated_falcon_is_found_by_the_real_examination(qtbot, f
     with qtbot.waitSignal(made.over, timeout=120_000):
         pass
     assert [finding.id for finding in made.report.findings if finding.state == "found"] == [mode]
-    assert made.text.toPlainText().count("FOUND") == 1
+    assert made.text.toPlainText().count("FAULT") == 1
     assert made.step.text()[1:] == f"{made.report.failure[1:]}."
     assert (made.bar.isHidden(), made.copy.isEnabled(), made.close_button.text()) == (True, True, "Close")
     made.close()

@@ -196,10 +196,10 @@ def test_a_reversed_sign_is_noticed_and_the_explained_share_is_told():
 def test_millimetres_and_millinewtons_are_noticed(metres, newtons, warning):
     force_n = newtons * force_of(TANK, REACH)
     moved = Motion(REACH.t_s, metres * REACH.position_m, velocity_mps=metres * REACH.velocity_mps)
-    speed_mps = np.linalg.norm(moved.velocity_mps, axis=1).max()
+    speed_mps = np.linalg.norm(moved.velocity_mps, axis=1).max() / BALL.scale
     value = speed_mps if metres > 1 else np.linalg.norm(force_n, axis=1).max()
     warnings = fit(BALL, "tank", ["drag_coefficient"], moved, force_n).warnings
-    assert sum(line.endswith(f"{value:.3g} {warning}") for line in warnings) == 1
+    assert sum(line.endswith(f" {value:.3g} {warning}") for line in warnings) == 1
     usual = fit(BALL, "tank", ["drag_coefficient"], REACH, force_of(TANK, REACH)).warnings
     assert not [line for line in usual if "specify" in line]
 
