@@ -75,8 +75,8 @@ def test_the_note_says_what_takes_long_unless_the_device_asks_for_something(qtbo
     assert bar.maximum() == 0
     made.show_line("Pull the grip out.")
     tick()
-    made.show_compiled(0.375)
-    assert (made.step.text(), bar.maximum(), bar.value()) == ("Pull the grip out.", 100, 38)
+    made.show_compiled(0.6)
+    assert (made.step.text(), bar.maximum(), bar.value()) == ("Pull the grip out.", 100, 60)
     other = OpeningWindow("A first look", "Participant P001")
     qtbot.addWidget(other)
     other.show()

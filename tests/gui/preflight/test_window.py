@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QLabel, QWidget
+from PySide6.QtWidgets import QLabel, QScrollArea, QWidget
 
 from study_app.devices.descriptor import NONE, NOT_AVAILABLE, Backend
 from study_app.gui.preflight.window import (
@@ -97,6 +97,9 @@ def test_one_goes_back_without_a_trace_and_finishing_is_not_going_back(window, q
         getattr(window, how)()
     assert cancelled == ([] if how == "finish" else [how])
     assert not window.isVisible()
+    window.show()
+    window.close()
+    assert len(cancelled) == (how != "finish"), "it is said once"
 
 
 def test_a_row_states_a_check_and_stays_until_a_check_changes(window):
@@ -217,8 +220,9 @@ def test_the_check_of_a_computer_is_asked_for_again_once_it_is_over(qtbot) -> No
     window.show_measuring()
     assert window.state.text().startswith("Measuring … On first use")
     assert (window.back.isEnabled(), window.bar.isHidden(), window.bar.maximum()) == (False, False, 0)
-    window.show_compiled(0.4)
-    assert (window.bar.value(), window.bar.maximum()) == (40, 100)
+    window.show_compiled(0.6)
+    assert (window.bar.value(), window.bar.maximum()) == (60, 100)
+    assert [area.accessibleName() for area in window.findChildren(QScrollArea)] == ["Checks"]
     window.show_checks(CHECKS)
     assert [row.check for row in window.rows] == list(CHECKS)
     assert (window.state.text(), window.bar.isHidden()) == ("1 of 3 passed.", True)

@@ -3,8 +3,9 @@
 from dataclasses import replace
 
 import pytest
-from PySide6.QtCore import Qt, QTimer
-from PySide6.QtWidgets import QBoxLayout, QFileDialog, QLabel
+from PySide6.QtCore import QEvent, Qt, QTimer
+from PySide6.QtWidgets import QApplication, QBoxLayout, QFileDialog, QLabel
+from shiboken6 import isValid
 
 from study_app.gui.settings import view
 from study_app.gui.widgets.labels import Elided
@@ -31,8 +32,10 @@ def test_the_display_test_is_opened_once_and_left_by_esc(real_place, qtbot):
         qtbot.keyClick(test, Qt.Key.Key_Escape)
     assert real_place.test is None
     real_place.open_test()
+    again = real_place.test
     real_place.leave()
-    assert real_place.test is None
+    QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
+    assert (real_place.test, isValid(again)) == (None, False)
 
 
 @pytest.mark.slow
@@ -91,6 +94,7 @@ def test_each_field_shows_its_setting_and_hands_on_a_new_one(real_place, qtbot, 
     show_settings(real_place, settings, undo="the width")
     shown = {name: editor.value for name, editor in real_place.editors.items()}
     assert real_place.editors["device"].isAncestorOf(real_place.devices)
+    assert all(real_place.isAncestorOf(editor) for editor in real_place.editors.values())
     assert shown == {name: getattr(settings, name) for name in shown} | {"device": "falcon"}
     assert (real_place.undo.text(), real_place.undo.isEnabled()) == ("Undo the width", True)
     assert (real_place.folder.whole, real_place.kept_in.whole) == ("/there", "Saved in /there/machine.json")
@@ -103,7 +107,10 @@ def test_each_field_shows_its_setting_and_hands_on_a_new_one(real_place, qtbot, 
         with qtbot.assertNotEmitted(real_place.changed):
             qtbot.keyClicks(real_place.editors[name].control, refused)
             qtbot.keyClick(real_place.editors[name].control, Qt.Key.Key_Return)
-    show_settings(real_place, settings)
+    assert real_place.offset.said.text().startswith("Not measured.")
+    offset = DisplayOffset(mean_ms=23.5, screen=real_place.participants.name)
+    show_settings(real_place, settings.model_copy(update={"display_offset": offset}))
+    assert real_place.offset.said.text() == "23.5 ± 0 ms (photodiode)."
     assert (real_place.undo.text(), real_place.undo.isEnabled()) == ("Undo", False)
 
 
