@@ -9,7 +9,7 @@ from PySide6.QtCore import QEvent, QPoint, QSize, Qt
 from PySide6.QtWidgets import QApplication, QDialog, QFileDialog, QLabel
 
 from study_app.gui.home import view
-from study_app.gui.home.cards import BrokenCard, DeviceCard, ResumeBanner, SessionsCard, StudyCard
+from study_app.gui.home.cards import BrokenCard, CardGrid, DeviceCard, ResumeBanner, SessionsCard, StudyCard
 from study_app.gui.home.dialogs import NewSessionDialog, RehearsalDialog
 from study_app.gui.home.study_facts import BrokenFacts, DraftFacts, DraftNote, Interrupted, StudyFacts
 from study_app.gui.kit.devices import DeviceShown
@@ -183,6 +183,26 @@ def test_the_height_of_the_cards_is_that_of_their_texts_in_the_present_width(qtb
     assert grid.cards is made
 
 
+def test_as_many_cards_as_fit_stand_in_a_row(qtbot):
+    grid = CardGrid()
+    qtbot.addWidget(grid)
+    grid.show()
+    cards = [label("word " * count, "label", wraps=True) for count in (40, 90, 300)]
+    least, gap = 330, 18
+    for width, columns in ((2 * least + gap - 1, 1), (2 * least + gap, 2), (5 * least, 4)):
+        grid.resize(width, 900)
+        grid.show_cards(cards) if width < 2 * least + gap else grid.arrange(width)
+        QApplication.processEvents()
+        places = [grid.layout().getItemPosition(grid.layout().indexOf(card))[:2] for card in cards]
+        assert places == [(at // columns, at % columns) for at in range(3)]
+        stretched = [grid.layout().columnStretch(column) for column in range(grid.layout().columnCount())]
+        assert stretched == [1] * min(columns, 3)
+        card_width = (width + gap) // columns - gap
+        assert grid.row_height == max(card.heightForWidth(card_width) for card in cards[:columns])
+    with qtbot.waitSignal(grid.laid_out):
+        cards[0].setText("word " * 99)
+
+
 def test_each_button_of_a_study_opens_what_it_says(qtbot, tmp_path):
     home = open_home(qtbot, tmp_path)
     card = home.grid.cards[0]
@@ -296,6 +316,9 @@ def test_the_card_of_sessions_counts_each_kind_and_says_which_ones_it_does_not_s
     qtbot.addWidget(card)
     assert card.nothing.text() == "No sessions yet. The first session will appear here when it starts."
     assert (card.kind.isHidden(), card.all.isHidden(), card.rows.isHidden()) == (True, True, True)
+    assert not card.details.isEnabled()
+    emptied = []
+    card.emptied.connect(lambda: emptied.append(card.is_empty))
     card.show_sessions(facts[:3], "results", now)
     counts = [card.kind.itemText(at) for at in range(card.kind.count())]
     assert counts == ["Participants (0)", "Pilot (2)", "Simulated (1)", "Sample (0)", "All (3)"]
@@ -309,6 +332,7 @@ def test_the_card_of_sessions_counts_each_kind_and_says_which_ones_it_does_not_s
         assert card.nothing.isHidden() == bool(shown)
         assert shown or card.nothing.text() == f"{none[kind]} {others}"
         assert not card.details.isEnabled()
+    assert emptied == [False, True]
     card.show_sessions(facts[3:], "results", now)
     for kind, words in (("pilot", "No pilot sessions."), ("simulated", "No simulated sessions.")):
         card.show_kind(kind)
@@ -327,6 +351,11 @@ def test_the_card_of_the_device_shows_why_it_cannot_be_used(qtbot, tone, ink):
     assert [part.text() for part in (card.name, card.about, card.why)] == ["Falcon", "Can.", "Why."]
     assert (card.state.tone, card.state.icon, card.state.word) == (tone, "clock", "Word")
     assert card.why.property("role") == ink
+    assert (card.about.isHidden(), card.why.isHidden()) == (False, False)
+    card.show_device(home_device())
+    assert (card.name.text(), card.about.isHidden(), card.why.isHidden()) == ("Hammer", True, True)
+    card.show_screens(("One", "Two"))
+    assert card.screens.text() == "One\nTwo"
 
 
 def texts_of(card):
@@ -392,6 +421,8 @@ def test_the_banner_resumes_the_session_that_it_names(qtbot):
     session = Interrupted(folder=Path("x"), source="demo", participant="P007", heading="P007 stopped", line="8 of 62.")
     banner = ResumeBanner()
     qtbot.addWidget(banner)
+    assert banner.isHidden()
+    banner.show()
     banner.show_interrupted(session)
     assert (banner.heading.text(), banner.line.text(), banner.isHidden()) == ("P007 stopped", "8 of 62.", False)
     assert (banner.resume.text(), banner.resume.accessibleName()) == ("Resume P007", "Resume P007")
