@@ -19,6 +19,7 @@ from study_app.gui.kit.devices import (
     device_or_default,
     devices_shown,
     remembered_options,
+    text_scale_on,
     theme_named,
 )
 from study_app.gui.theme.theme import DARK, LIGHT
@@ -27,6 +28,7 @@ from study_app.gui.widgets.controls import Radio
 from study_app.store.workstation import DEFAULTS, MachineSettings
 from tests.golden import check_kept
 from tests.golden_values import value_lines
+from tests.gui.windows import SCREENS
 
 MOUSE = Backend("mouse", "the window", state=READY, can="seen, not felt")
 EMULATED = Backend("falcon-emulated", "the program", state=READY, can="by command")
@@ -78,6 +80,25 @@ def test_names_are_chosen_by_their_labels_and_unknown_ones_have_a_default() -> N
     assert [device_or_default(name) for name in ("falcon:FT1", "hammer")] == ["falcon:FT1", "mouse"]
     assert [option.name for option in remembered_options()] == ["firmware"]
     assert [theme_named(name) for name in ("light", "dark", "blue")] == [LIGHT, DARK, LIGHT]
+
+
+def test_the_library_that_is_ready_comes_before_one_without_a_device() -> None:
+    for states, word, is_ready in (
+        ((NONE, READY), "Ready", True),
+        ((NOT_AVAILABLE, NONE), "Not connected", False),
+        ((NONE, DRIVER_READY), "Driver ready", False),
+        ((READY, "connected: FT1"), "Connected", True),
+    ):
+        (shown,) = devices_shown([falcon(states[0]), ftdi(states[1])])
+        assert (shown.word, shown.is_ready) == (word, is_ready)
+    assert device_before_search("toy-hand:3").icon == device_before_search("falcon").icon == "device"
+    assert (device_before_search("mouse").icon, device_before_search("mouse").title) == ("mouse", "Mouse")
+
+
+def test_the_participants_text_grows_with_the_distance_on_their_screen(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("study_app.gui.kit.devices.screen_shown", lambda _screen: SCREENS[1])
+    settings = MachineSettings(viewing_distance_mm=600.0)
+    assert text_scale_on(settings, None) == pytest.approx(1.7473, abs=1e-4)  # type: ignore[arg-type]  # 527 mm, 1920 px
 
 
 @pytest.fixture

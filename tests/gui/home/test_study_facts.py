@@ -280,6 +280,8 @@ def test_drafts_come_first_the_newest_of_all_and_a_copy_names_its_original(tmp_p
     ]
     assert {Path(it.source).stem for it in found[:2]} == {"fresh", "broken"}
     assert found[3].draft.words.endswith(", not saved: Device")
+    (fresh,) = (it for it in found if Path(it.source).stem == "fresh")
+    assert (fresh.title, fresh.origin, fresh.draft.words[-13:]) == ("Fresh", "Own study", ", never saved")
     assert [it.draft for it in found[4:]] == [None] * len(found[4:])
     assert {it.origin for it in found[5:]} == {"Shipped study"}
 
@@ -290,5 +292,7 @@ def test_a_file_of_liquids_that_becomes_a_study_is_noticed(tmp_path: Path) -> No
     assert holds_liquids_alone(str(file))
     file.write_text(f"{file.read_text('utf-8')}[study]\nname = 'mine'\n", encoding="utf-8", newline="\n")
     assert not holds_liquids_alone(str(file))
+    file.write_text("format = [", encoding="utf-8", newline="\n")
+    assert not holds_liquids_alone(str(file)), "it cannot be read"
     file.unlink()
     assert not holds_liquids_alone(str(file))

@@ -15,7 +15,7 @@ from study_app.errors import StudyError
 from study_app.gui.theme.theme import LIGHT, font
 from study_app.gui.widgets.accessible import button_text, describe_plot, plain_tip
 from study_app.gui.widgets.background import Background, delayed_call, wait_for_jobs
-from study_app.gui.widgets.boxes import STRETCH, grid, hbox, vbox
+from study_app.gui.widgets.boxes import STRETCH, grid, hbox, insert_layout, vbox
 from study_app.gui.widgets.cards import Bar, Card, Chip, Icon, MaskedPanel, scrolled
 from study_app.gui.widgets.controls import ActionButton, Check, Choice, CompactStop, IconButton, Radio, Toggle
 from study_app.gui.widgets.labels import Clamped, Elided, figures, label, set_ink
@@ -80,7 +80,10 @@ def test_a_refusal_that_nothing_listens_to_is_logged(
 def test_the_end_of_the_program_waits_for_jobs_but_not_for_ever() -> None:
     parent = QObject()
     background, go_on, ended = Background(parent), threading.Event(), []
+    assert background.wait(0), "nothing runs"
     background.run(lambda: ended.append(go_on.wait(10)))
+    assert not background.wait(0)
+    assert "background" in {thread.name for thread in threading.enumerate()}
     wait_for_jobs(0.01)
     assert ended == []
     go_on.set()
@@ -201,6 +204,8 @@ def test_boxes_place_parts_gaps_and_stretches_in_order(qtbot: Any) -> None:
     assert [box.stretch(place) for place in range(box.count())] == [0, 0, 3, 0, 2, 5]
     assert box.itemAt(1).spacerItem().sizeHint().height() == 7
     assert hbox(margins=6).getContentsMargins() == (6, 6, 6, 6)
+    insert_layout(box, 1, hbox(QLabel("4")))
+    assert [box.indexOf(part) for part in (first, second)] == [0, 3]
     cells = grid(8, 9, margins=5)
     assert (cells.horizontalSpacing(), cells.verticalSpacing(), cells.contentsMargins().left()) == (8, 9, 5)
 
@@ -248,7 +253,7 @@ def test_buttons_are_pressed_by_enter_and_their_key_and_keep_it_with_another_tex
     window.activateWindow()
     qtbot.waitUntil(window.isActiveWindow)
     for count, text in enumerate(("Refresh", "Looking …"), 1):
-        button.show_action("clock", text)
+        button.show_action("repeat", text)
         qtbot.keyClick(window, Qt.Key.Key_F5)
         qtbot.waitUntil(lambda count=count: len(pressed) == count and not button.isDown())
     for made in (button, other):
@@ -262,6 +267,7 @@ def test_buttons_are_pressed_by_enter_and_their_key_and_keep_it_with_another_tex
     assert (button.role, button.property("role")) == ("primary", "primary")
     assert (other.accessibleName(), other.toolTip(), other.width()) == ("Discard it", "Discard it", 36)
     assert IconButton("trash", "Discard it", "Discard …").toolTip() == "Discard …"
+    assert (stop.property("role"), other.property("dense")) == ("stop", "true")
     assert (stop.accessibleName(), stop.toolTip()) == (
         "Stop force and play. Holding Esc does the same.", "Stop force and play (or hold Esc)"
     )  # fmt: skip
@@ -297,7 +303,8 @@ def test_the_wheel_over_a_choice_changes_nothing_and_a_label_has_its_name(qtbot:
     window.show()
     choice.setCurrentIndex(1)
     QTest.wheelEvent(window.windowHandle(), choice.geometry().center(), QPoint(0, 120))
-    assert choice.currentIndex() == 1
+    assert (choice.currentIndex(), choice.accessibleName()) == (1, "Number")
+    assert choice.focusPolicy() == Qt.FocusPolicy.StrongFocus
     named = [part for part in window.findChildren(QLabel) if part.buddy() is choice]
     assert [(part.text(), part.isHidden()) for part in named] == [("Number", True)]
     assert choice.fitted("Three", 1000) == "Three"
