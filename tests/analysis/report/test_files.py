@@ -53,7 +53,7 @@ IN, OUT, GONE = (True, False), (False, True), (False, False)
          "to 2026-01-10."),
         ([("P1", 1, *IN), ("P2", 1, *OUT), ("P3", 1, *GONE), ("P4", 1, *OUT), ("P5", 1, *OUT)],
          {"exclusions": (*(excluded(who, by) for who, by in (("P2", "AK"), ("P4", "catch"), ("P5", "catch"))),
-                         excluded("P3", "BL", 2))},
+                         excluded("P3", "BL", 2), excluded("P4", "AK", 3))},
          "1 participant. 4 of 5 were not included (errors in catch trials: 2, a researcher's decision: 1, unfinished "
          "session: 1; see “How the study was run”). Sessions on 2026-01-09."),
         ([("P1", 1, *IN), ("P2", 1, *GONE)], {}, "1 participant. 1 of 2 was not included (unfinished session: 1; see "

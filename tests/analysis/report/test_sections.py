@@ -329,7 +329,8 @@ def test_a_block_has_its_parts_in_order_with_its_own_figures() -> None:
         "A", presentations=(2, 3), sessions=(1, 2), incomplete={"warm": ("P7",)},
         absent=(NotTested("trend", "few"), NotTested("pairs", "so")),
     )  # fmt: skip
-    drawn = [png(f"{kind}-x", of) for of in "BA" for kind in ("effects", "liquids", "delays")]
+    made = replace(made, findings={"overall": SimpleNamespace(p=None, note="alike")})
+    drawn = [png(f"{kind}-x", of) for of in "AB" for kind in ("effects", "liquids", "delays")]
     results = results_of(made, block("B"))
     assert lines_of(sections.block(made, results, drawn)) == [
         "Block A (liquids)",
@@ -338,12 +339,25 @@ def test_a_block_has_its_parts_in_order_with_its_own_figures() -> None:
         "Participants excluded from tests across all liquids because an answer is missing: P7 (“Warm”).",
         "Figure effects-x of A.",
         "Figure liquids-x of A.",
+        "The test over all statements was not possible (alike).",
         "What could not be computed, and why",
         "The trend was not computed because few.",
         "The pairs was not computed because so.",
     ]
     single = replace(made, names=("Thin",), settings=liquids(1))
     assert "What could not be computed, and why" not in lines_of(sections.block(single, results, drawn))
+    late = replace(made, kind="delays", settings=delays([0, 50]), absent=())
+    lines = lines_of(sections.block(late, results, drawn))
+    assert [line for line in lines if line.startswith("Figure")] == ["Figure effects-x of A.", "Figure delays-x of A."]
+    assert "Participants excluded from tests across all delays because an answer is missing: P7 (“Warm”)." in lines
+
+
+def test_verdicts_are_explained_with_the_alpha_of_the_study_if_statements_are_tested() -> None:
+    decided = replace(DECIDED, alpha=0.04)
+    heading, text = lines_of(sections.verdicts_mean(results_of(block("A"), decided=decided)))
+    assert heading == "What the verdicts mean"
+    assert "the adjusted p value is at most 0.04. Suggested" in text
+    assert lines_of(sections.verdicts_mean(results_of(decided=decided))) == []
 
 
 @pytest.mark.parametrize(
