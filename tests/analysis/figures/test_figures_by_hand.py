@@ -19,7 +19,7 @@ from study_app.analysis.figures.summary_figures import Numbers, numbers_of, summ
 from study_app.analysis.findings import statement_tests
 from study_app.analysis.findings.statement_tests import Effects
 from study_app.analysis.levels.answers import LevelAnswers
-from study_app.analysis.levels.thresholds import ThresholdEstimate
+from study_app.analysis.levels.thresholds import ThresholdEstimate, TrackCourse
 from study_app.analysis.page_layout import Drawing, Look
 from study_app.analysis.results import ContrastResult, ContrastSide, GroupAnswers, LevelsResult, QuestionResult
 from study_app.analysis.statistics.outcome import Interval
@@ -659,3 +659,92 @@ def test_the_matrix_of_names_has_the_counts_and_outlines_the_correct_one() -> No
     assert "unanswered" not in texts, "nobody left it unanswered"
     decided = answer_figures.draw_recognition(((5, 1, 0, 0),), ("Wax",), ("like wax", "like oil"), (0,), LOOK).figure
     assert {"undecided", "unanswered"} & {*texts_of(decided)} == {"undecided"}
+
+
+def course(person: str, standard: float, **changes: Any) -> TrackCourse:
+    """Return six trials of two tracks: the third is a catch trial, the fifth presents the standard alone."""
+    held = {
+        "tracks": np.array([1, 2, 1, 1, 2, 2]), "levels": np.array([4.0, 8.0, 2.0, 5.0, 6.0, 3.0]),
+        "successes": np.array([1, 0, 1, 0, 1, 1], bool), "reversals": np.array([0, 0, 0, 1, 0, 0], bool),
+        "catches": np.array([0, 0, 1, 0, 0, 0], bool), "noises": np.array([0, 0, 0, 0, 1, 0], bool),
+        "low": np.linspace(1, 2, 6), "high": np.linspace(9, 4, 6),
+    }  # fmt: skip
+    return TrackCourse(participant=person, standard=standard, **{**held, **changes})
+
+
+@pytest.mark.slow
+def test_tracks_have_a_line_for_each_track_and_a_mark_for_each_answer() -> None:
+    linear = replace(THRESHOLDS, spacing="linear", level_kind="value")
+    figure = level_figures._draw_tracks(linear, [course("P000", 40.0), course("P000", 80.0)], LOOK).figure
+    first, _ = figure.axes
+    assert [text for text in texts_of(figure) if text.startswith("standard")] == ["standard 40", "standard 80"]
+    assert {"Frequency [Hz]", "Trial number at this standard"} <= {*texts_of(figure)}
+    assert [np.asarray(line.get_xydata()).tolist() for line in first.lines] == [
+        [[1.0, 4.0], [4.0, 5.0]], [[2.0, 8.0], [6.0, 3.0]],
+    ]  # fmt: skip
+    marks = [collection.get_offsets().tolist() for collection in first.collections if len(collection.get_offsets())]
+    assert [[1.0, 4.0]] in marks, "answered correctly in the first track"
+    assert [[4.0, 5.0]] in marks, "answered incorrectly in the first track, and a reversal"
+    assert [[3.0, 2.0]] in marks, "a catch trial"
+    assert [[5.0, 6.0], [6.0, 3.0]] in marks
+    assert [[2.0, 8.0]] in marks
+    faces = {
+        tuple(map(tuple, collection.get_offsets().tolist())): to_hex(collection.get_facecolor()[0])
+        for collection in first.collections
+        if len(collection.get_offsets()) and len(collection.get_facecolor())
+    }
+    assert faces[(1.0, 4.0),] != faces[(4.0, 5.0),] == "#ffffff"
+    alone = level_figures._draw_tracks(linear, [course("P000", 40.0)], LOOK).figure
+    assert "Trial number" in texts_of(alone)
+    assert not [text for text in texts_of(alone) if text.startswith("standard")]
+
+
+def test_the_caption_of_tracks_says_which_marks_there_are(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(level_figures, "picture_of", lambda _study, *given: given)
+    none = np.zeros(6, bool)
+    plain = course("P000", 40.0, tracks=np.ones(6, int), reversals=none, catches=none)
+    answers = tuple(answers_at(person, 2.0, 0.5) for person in PEOPLE)
+    rows = tuple(threshold(person, 40.0, 2.0) for person in PEOPLE)
+    result = replace(THRESHOLDS, statistics={"answers": answers, "thresholds": rows}, adaptive=True)
+    made = replace(MADE, levels=(SimpleNamespace(id="other"), SimpleNamespace(id="pitch")))  # type: ignore[arg-type]
+
+    def caption(shown: LevelsResult, *courses: TrackCourse) -> str:
+        monkeypatch.setattr(level_figures, "track_courses", lambda block, *_: courses if block.id == "pitch" else ())
+        drawn: Any = level_figures._track_picture(made, shown, ("svg",), "tracks-pitch", pd.DataFrame)
+        of, name, title, text, *_ = drawn
+        assert (of, name, title) == ("pitch", "tracks-pitch", "Pitch: tracks")
+        return str(text)
+
+    assert caption(result, plain, plain, plain) == (
+        "Pitch: the level of each trial. Filled: answered correctly; hollow: other answers. Band: 95 % interval for the "
+        f"threshold, given the answers up to that trial. {SAMPLE}"
+    )
+    marked = caption(replace(result, counts="louder"), course("P000", 40.0), plain)
+    kinds = "Colours: tracks. Rings: reversals. ×: catch trial answered correctly; +: catch trial answered incorrectly."
+    assert f"Filled: answered “louder”; hollow: other answers. {kinds} Band" in marked
+    assert " 1 further panel is not shown. Three participants" in marked
+
+
+@pytest.mark.slow
+def test_a_psychometric_function_passes_its_threshold_with_its_interval_and_areas() -> None:
+    """Half of the answers that are neither guesses nor lapses are correct at the threshold: 0.5 + 0.45 / 2."""
+    own = threshold("P000", 40.0, 4.0, width=2.0, guess=0.5, lapse=0.05, low=3.0, high=6.0)
+    answers = (
+        answers_at(None, 2.0, 0.6), answers_at(None, 8.0, 0.9), answers_at("P000", 2.0, 0.625, n=8),
+        answers_at("P000", 8.0, 0.9, n=20),
+    )  # fmt: skip
+    result = replace(THRESHOLDS, spacing="linear", statistics={"answers": answers, "thresholds": (own,)})
+    band = {"P000": (np.array([2.0, 8.0]), np.array([0.5, 0.8]), np.array([0.7, 1.0]))}
+    figure = level_figures._draw_levels(result, band, LOOK).figure
+    assert "Proportion correct" in texts_of(figure)
+    _, axes = figure.axes
+    curve = next(np.asarray(line.get_xydata()) for line in axes.lines if len(line.get_xdata()) == 120)
+    assert np.interp(4.0, *curve.T) == pytest.approx(0.725, abs=0.002)
+    interval = [np.asarray(line.get_xydata()).tolist() for line in axes.lines if line.get_linewidth() == 1.2]
+    assert interval == [[[3.0, pytest.approx(0.725)], [6.0, pytest.approx(0.725)]]]
+    points = next(collection for collection in axes.collections if len(collection.get_offsets()) == 2)
+    assert points.get_offsets().tolist() == [[2.0, 0.625], [8.0, 0.9]]
+    assert points.get_sizes().tolist() == [16.0, 40.0]
+    chance = [line.get_ydata()[0] for line in axes.lines if list(line.get_ydata()) == [0.5, 0.5]]
+    assert chance == [0.5]
+    assert level_figures._standards(result) == [40.0]
