@@ -720,9 +720,12 @@ def test_the_caption_of_tracks_says_which_marks_there_are(monkeypatch: pytest.Mo
         f"threshold, given the answers up to that trial. {SAMPLE}"
     )
     marked = caption(replace(result, counts="louder"), course("P000", 40.0), plain)
-    kinds = "Colours: tracks. Rings: reversals. ×: catch trial answered correctly; +: catch trial answered incorrectly."
+    catch = "×: catch trial answered correctly; +: catch trial answered incorrectly."
+    kinds = f"Colours: tracks. Rings: reversals. {catch}"
     assert f"Filled: answered “louder”; hollow: other answers. {kinds} Band" in marked
     assert " 1 further panel is not shown. Three participants" in marked
+    without_catches = caption(result, course("P000", 40.0, catches=none), plain, plain)
+    assert "hollow: other answers. Colours: tracks. Rings: reversals. Band" in without_catches
 
 
 @pytest.mark.slow
