@@ -716,8 +716,8 @@ def test_the_caption_of_tracks_says_which_marks_there_are(monkeypatch: pytest.Mo
         return str(text)
 
     assert caption(result, plain, plain, plain) == (
-        "Pitch: the level of each trial. Filled: answered correctly; hollow: other answers. Band: 95 % interval for the "
-        f"threshold, given the answers up to that trial. {SAMPLE}"
+        "Pitch: the level of each trial. Filled: answered correctly; hollow: other answers. Band: 95 % interval for "
+        f"the threshold, given the answers up to that trial. {SAMPLE}"
     )
     marked = caption(replace(result, counts="louder"), course("P000", 40.0), plain)
     catch = "×: catch trial answered correctly; +: catch trial answered incorrectly."

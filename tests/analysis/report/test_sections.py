@@ -434,6 +434,7 @@ def test_questions_have_their_own_scores_answers_and_figures() -> None:
     questions = (
         asked("end", "old", "distribution", GroupAnswers(None, "All", spread(9, 4.0))),
         asked("start", "new", "distribution", GroupAnswers(None, "All", spread(9, 5.0))),
+        asked("b", "size", "distribution", GroupAnswers(None, "All", spread(9, 6.0)), is_form=False),
         asked("end", "why", "texts", *both),
         asked("end", "tired", "distribution", GroupAnswers(None, "All", {"n": 0})),
     )
@@ -473,6 +474,26 @@ def test_questions_have_their_own_scores_answers_and_figures() -> None:
         "How tired?",
         "No answers are included yet.",
     ]
+
+
+@pytest.mark.parametrize(
+    ("codes", "blocks", "title"),
+    [
+        ("ABC", "AB", "Title load, after each block"),  # C has other questions
+        ("ABCL", "AB", "Title load, after each block"),
+        ("AB", "AB", "Title load"),
+        ("ABCD", "AB", "Title load"),
+        ("C", "", "Title load"),
+    ],
+)
+def test_a_form_is_said_to_follow_each_block_only_if_it_follows_all_main_blocks(
+    codes: str, blocks: str, title: str
+) -> None:
+    form = asked("load", "raw", "distribution", *(GroupAnswers(code, code, spread(9, 4.0)) for code in codes))
+    others = asked("C", "size", "distribution", is_form=False), asked("end", "age", "distribution")
+    levels = [SimpleNamespace(block="L")] if "L" in codes else []
+    made = results_of(*map(block, blocks), questions=(form, *others), levels=levels)
+    assert sections.place_title(form, made) == title
 
 
 @pytest.mark.parametrize(("summary", "shown"), [("settings", False), ("mean", True)])
@@ -577,6 +598,12 @@ def test_reversed_exclusions_of_a_merged_study_name_the_site(monkeypatch: pytest
         f"participant B-P1, session 1: spoke (fast_answers, 2026-03-02). {after}",
         f"participant B-P3, session 1: spoke (BL, 2026-03-02). {before}",
     ]
+
+
+def test_planned_rules_are_listed_even_if_nothing_was_excluded(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sections, "rule_sentences", lambda *_: ["A rule.", "Another one."])
+    lines = lines_of(sections.conduct(of_people(3), results_of()))
+    assert lines[lines.index("Exclusions") + 1 :] == ["There are no exclusions.", "A rule.", "Another one."]
 
 
 @pytest.mark.parametrize(("count", "verb"), [(1, "1 session was"), (2, "two sessions were")])
