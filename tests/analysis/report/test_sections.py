@@ -580,6 +580,13 @@ def test_limits_are_exceeded_only_by_counted_main_trials() -> None:
     assert sentence.count("(1 trial)") == 2
 
 
+@pytest.mark.parametrize(("count", "last"), [(20, "19"), (21, "and 1 more, listed in report.json")])
+def test_long_lists_end_with_the_number_of_the_others(count: int, last: str) -> None:
+    lines = sections._first_lines([str(number) for number in range(count)])
+    assert lines == [*(str(number) for number in range(20)), *([last] if count > 20 else [])]
+    assert lines[-1] == last
+
+
 def test_reversed_exclusions_of_a_merged_study_name_the_site(monkeypatch: pytest.MonkeyPatch) -> None:
     def reversal(participant: str, rule: str, at: str) -> Any:
         excluded = replace(LATE, participant=participant, rule_or_person=rule)
