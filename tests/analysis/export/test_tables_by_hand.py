@@ -23,7 +23,6 @@ from study_app.analysis.export import psychds_dataset, spss, table_files
 from study_app.analysis.export import tables as table_module
 from study_app.analysis.export.table_files import codebook_bytes, credit_lines, file_name
 from study_app.analysis.export.tables import ExportTable, exported_tables, sealed_interval_columns, wide_table
-from study_app.analysis.levels.columns import JUDGED
 from study_app.protocol.source.files import StudySource, _has_study_name
 from study_app.store.exclusions import Exclusion
 from study_app.store.files import SEALED, TRIALS_MISSING
@@ -556,7 +555,9 @@ def test_the_tables_of_levels_have_all_intervals_groups_and_results_once_the_key
 ) -> None:
     """One block has two intervals in a trial, the other three."""
     sealed = {*header(INTERVALS)} - {*header(unsealed_columns(INTERVALS))}
-    intervals = pd.DataFrame({name: [name] for name in (*header(INTERVALS), *header((*JUDGED, TRIALS_MISSING)))})
+    intervals = pd.DataFrame(
+        {name: [name] for name in (*header(INTERVALS), *header((*table_module.JUDGED, TRIALS_MISSING)))}
+    )
     levels: Any = [
         SimpleNamespace(id=name, design=SimpleNamespace(intervals=count)) for name, count in (("p", 3), ("q", 2))
     ]

@@ -552,7 +552,7 @@ def test_the_caption_of_answers_counts_participants_missing_answers_exclusions_a
     ]  # fmt: skip
     people = made.participants
     extra = [people.iloc[[place]].assign(participant=f"P{place}9") for place in (0, 1, 2)]
-    extra = [extra[0].assign(counted=False), *(one.assign(counted=False, excluded=True) for one in extra[1:])]
+    extra = [extra[0].assign(counted=False), *(row.assign(counted=False, excluded=True) for row in extra[1:])]
     doubts: Any = [SimpleNamespace(path=made.folder / f"{name}.csv", what="differs") for name in "dacbd"]
     shown = replace(made, participants=pd.concat([people.assign(pilot=True), *extra]), doubts=tuple(doubts))
     caption = answer_figures._caption(shown, block)

@@ -125,7 +125,7 @@ def test_the_rows_of_tests_have_the_values_of_their_test_and_family() -> None:
 
 
 @pytest.mark.parametrize(
-    ("p", "least", "primary", "words"),
+    ("p", "least", "primary", "expected"),
     [
         (0.05, 0.9, True, "shown"),
         (0.05, None, False, "suggested"),
@@ -136,9 +136,9 @@ def test_the_rows_of_tests_have_the_values_of_their_test_and_family() -> None:
     ],
 )
 def test_a_verdict_follows_from_p_and_the_smallest_p(
-    p: float | None, least: float | None, primary: bool, words: str
+    p: float | None, least: float | None, primary: bool, expected: str
 ) -> None:
-    assert verdict(p, least, 0.05, primary=primary) == words
+    assert verdict(p, least, 0.05, primary=primary) == expected
 
 
 def test_the_test_over_all_statements_has_its_sentence_and_row() -> None:
@@ -216,12 +216,12 @@ def test_mean_tests_have_the_spread_of_slopes_or_the_differences_from_the_first_
     assert notes[-1].startswith("Slopes are in points per 100 ms of delay.")
 
 
-def against(item: str, delay_ms: float, found: str, **changes: Any) -> Any:
+def against(item: str, delay_ms: float, verdict_: str, **changes: Any) -> Any:
     beyond = SimpleNamespace(count=3, n=11, interval=SimpleNamespace(low=0.06, high=0.61))
     held = {
         **{name: getattr(ranks(), name) for name in ("test", "n", "dropped", "statistic_name", "statistic", "p")},
         **{name: getattr(ranks(), name) for name in ("smallest_p", "method", "effect_name", "effect", "interval")},
-        "no_interval": "", "note": "", "bound": 0.5, "alpha": 0.025, "verdict": found, "p_bootstrap": 0.047,
+        "no_interval": "", "note": "", "bound": 0.5, "alpha": 0.025, "verdict": verdict_, "p_bootstrap": 0.047,
         "checks_agree": True, "beyond": beyond,
     }  # fmt: skip
     tested_delay: Any = SimpleNamespace(**{**held, **changes})
@@ -343,9 +343,9 @@ def test_the_shortest_delay_with_a_trend_is_corrected_over_the_statements() -> N
 def test_the_answer_on_noticed_delays_prefers_primary_statements_and_turns_falling_ones() -> None:
     decided = replace(DECIDED, primary=("warm",), rising=("warm",), falling=("calm",), noticed=None)
 
-    def answer(*found: Any, primary: tuple[str, ...] = ("warm",)) -> tuple[str, str]:
+    def answer(*lowest_trends: Any, primary: tuple[str, ...] = ("warm",)) -> tuple[str, str]:
         results: Any = SimpleNamespace(decided=replace(decided, primary=primary))
-        given = delay_findings._FirstNoticedDelay(block("delays", findings={"lowest": found}), results).answer()
+        given = delay_findings._FirstNoticedDelay(block("delays", findings={"lowest": lowest_trends}), results).answer()
         return given.verdict, given.text
 
     rest = (

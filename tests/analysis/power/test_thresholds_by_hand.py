@@ -106,9 +106,9 @@ def test_the_tables_of_precision_have_a_row_for_each_size_and_the_contrasts_of_b
 @pytest.mark.slow
 def test_a_contrast_has_the_errors_of_both_blocks_and_the_alpha_of_its_family() -> None:
     """Student's t(11) at 97.5 % is 2.201, and one of two hypotheses has a bound."""
-    found = {("late", 20): result_of(0.2, (0.3, 0.3)), ("prompt", 20): result_of(0.1, (0.3, 0.3))}
-    found |= {("late", 40): result_of(0.05, (0.3, 0.3))}  # of one block only
-    precisions = Precisions(protocol=two(), sizes=(12, 40), studies=1, asked=1, seed=1, found=found)
+    results = {("late", 20): result_of(0.2, (0.3, 0.3)), ("prompt", 20): result_of(0.1, (0.3, 0.3))}
+    results |= {("late", 40): result_of(0.05, (0.3, 0.3))}  # of one block only
+    precisions = Precisions(protocol=two(), sizes=(12, 40), studies=1, asked=1, seed=1, found=results)
     lines = threshold_markdown(precisions).splitlines()
     spread = math.hypot(math.log(1.2), 0.2 * math.sqrt(2), 0.1 * math.sqrt(2))
     half = spread * stdtrit(11, 0.975) / math.sqrt(12)

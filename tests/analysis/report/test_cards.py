@@ -174,12 +174,12 @@ def test_a_block_is_introduced_once_and_a_single_setting_has_a_card_of_its_own(m
     def given(question: str, of: str, verdict: str) -> Answer:
         return Answer(question=question, block=of, title=f"Block {of}", verdict=verdict, text=f"{verdict}.")
 
-    found = (
+    answers = (
         given("distinguished", "a", "shown"),
         given("noticed from", "b", "not shown"),
         given("unchanged up to", "b", "equivalent"),
     )
-    monkeypatch.setattr(pages, "answers", lambda _results: found)
+    monkeypatch.setattr(pages, "answers", lambda _results: answers)
     counts = {f"count_{level}": count for level, count in enumerate((1, 0, 2, 0, 3, 0, 4), start=1)}
     measures = tuple({"n": n, "median": 4.5, "q1": 2.0, **counts} for n in (10, 0, 20))
     single = {"settings": liquids(1), "names": ("Thin",)}
@@ -278,12 +278,12 @@ def test_questions_have_cards_by_place_with_scores_first_and_sample_last(monkeyp
         asked("track", "pick", is_form=False), asked("b", "pick", is_form=False), asked("none", "age", n=0),
         asked("c", "age", is_form=False),
     ]  # fmt: skip
-    one, two = (("", {"P1": 1.0}),), (("Thin", {"P1": 1.0}), ("Wax", {"P1": 2.0}))
+    single, pair = (("", {"P1": 1.0}),), (("Thin", {"P1": 1.0}), ("Wax", {"P1": 2.0}))
     numbers = {
-        "load": [Numbers(f"L{place}", None, True, one) for place in range(MOST_PANELS + 2)],
-        "sample": [Numbers("Age", None, False, two)],
-        "c": [Numbers("Old", None, False, two)],
-        "none": [Numbers("Gone", None, False, one)],
+        "load": [Numbers(f"L{place}", None, True, single) for place in range(MOST_PANELS + 2)],
+        "sample": [Numbers("Age", None, False, pair)],
+        "c": [Numbers("Old", None, False, pair)],
+        "none": [Numbers("Gone", None, False, single)],
     }
     results = results_of(
         questions=questions, levels=[SimpleNamespace(block="track")], scores=[SimpleNamespace(where="load")]

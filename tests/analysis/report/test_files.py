@@ -13,7 +13,6 @@ import pytest
 
 from study_app.analysis.data.motion import MovementQuartiles
 from study_app.analysis.data.study_tables import Study
-from study_app.analysis.html_page import heading, paragraph
 from study_app.analysis.page_layout import Picture
 from study_app.analysis.report import study_figures, write_report
 from study_app.analysis.results import BlockResult, Delivered, Failure, Failures
@@ -168,7 +167,7 @@ def test_the_page_has_its_sections_in_order_without_the_figures_of_the_first_pag
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     def section(name: str) -> Any:
-        return lambda *given: [heading(2, name), paragraph(",".join(map(shown, given)))]
+        return lambda *given: [write_report.heading(2, name), write_report.paragraph(",".join(map(shown, given)))]
 
     def shown(value: Any) -> str:
         if isinstance(value, list):
@@ -185,7 +184,9 @@ def test_the_page_has_its_sections_in_order_without_the_figures_of_the_first_pag
     monkeypatch.setattr(write_report, "cards", lambda *_: ())
     monkeypatch.setattr(write_report, "figures_shown", lambda *_: {"late"})
     monkeypatch.setattr(write_report, "presented_in", lambda _study: {})
-    monkeypatch.setattr(write_report, "first_page", lambda _results, limits, *_: paragraph(f"first {limits[0]}"))
+    monkeypatch.setattr(
+        write_report, "first_page", lambda _results, limits, *_: write_report.paragraph(f"first {limits[0]}")
+    )
     drawn = [Picture(block="b", name=name, caption="", files={}) for name in ("late", "early")]
     results: Any = SimpleNamespace(blocks=(block("a"), block("b")), contrasts=())
     texts = {"limits": ("few",), "methods": "We did."}
