@@ -10,8 +10,8 @@ import pytest
 
 from study_app.store import recordings
 from study_app.store.journals.journal_events import Recorded, RecordingLost
-from study_app.store.recorder import Recorder, lost_event
-from study_app.store.recordings import SamplesFile, read_facts, read_frames, read_samples
+from study_app.store.recorder import Recorder, lost_event, recorded_event, recording_files
+from study_app.store.recordings import SamplesFile, WrittenFile, read_facts, read_frames, read_samples
 from tests.platforms import files_up_to
 from tests.store.conftest import Make
 
@@ -240,3 +240,64 @@ def test_a_thread_that_cannot_be_started_loses_recordings_and_not_the_session(
     record(recorder, samples_of(20), trial=2)
     recorder.close()
     assert [type(kept) for kept in recorder.collect_results()] == [RecordingLost, Recorded]
+
+
+def test_the_journal_says_which_files_with_how_many_rows_and_hashes_belong_to_which_attempt(tmp_path: Path) -> None:
+    folder = tmp_path / "recordings"
+    samples = WrittenFile(folder / "a.parquet", 900, "aa", "bb")
+    frames = WrittenFile(folder / "a_frames.parquet", 54, "cc", "dd")
+    assert recorded_event((3, 2, 1), samples, frames, 7) == Recorded(
+        trial=3,
+        attempt=2,
+        interval=1,
+        recording="recordings/a.parquet",
+        recording_frames="recordings/a_frames.parquet",
+        samples_recorded=900,
+        samples_unrecorded=7,
+        frames_recorded=54,
+        sha256="aa",
+        frames_sha256="cc",
+        opened_sha256="bb",
+        opened_frames_sha256="dd",
+    )
+    assert lost_event((3, 2, 1), "no space") == RecordingLost(trial=3, attempt=2, interval=1, reason="no space")
+    for which, name in (
+        ((3, 1), "trial-003"),
+        ((3, 2), "trial-003_attempt-2"),
+        ((12, 1, 2), "trial-012_interval-2"),
+        ((1234, 3, 1), "trial-1234_attempt-3_interval-1"),
+    ):
+        assert recording_files(folder, *which) == (folder / f"{name}.parquet", folder / f"{name}_frames.parquet")
+
+
+def test_without_a_running_recording_samples_and_frames_are_dropped(recorder: Recorder, samples_of: Make) -> None:
+    recorder.append(samples_of(10))
+    recorder.frame(2_000, 1_000)
+    recorder.stop()
+    assert (recorder.thread, recorder.dropped, recorder.lost) == (None, 0, ())
+    assert recorder.end_without_waiting(), "there is nothing to wait for"
+    recorder.start(1, 1, 1000.0)
+    recorder.append(samples_of(10))
+    recorder.stop()
+    assert (recorder.thread, recorder.collect_results()) == (None, ()), "and it stays closed"
+
+
+def test_an_interval_of_an_attempt_is_told_in_its_facts_and_its_frames_begin_anew(
+    tmp_path: Path, recorder: Recorder, samples_of: Make
+) -> None:
+    for interval in (1, 2):
+        recorder.start(3, 2, 1000.0, interval)
+        recorder.append(samples_of(20 * interval))
+        recorder.append(samples_of(0))
+        recorder.frame(2_000, 2_000 - interval)
+    recorder.close()
+    first, second = recorder.collect_results()
+    assert isinstance(first, Recorded)
+    assert isinstance(second, Recorded)
+    assert [(kept.which, kept.samples_recorded, kept.frames_recorded) for kept in (first, second)] == [
+        ((3, 2, 1), 20, 1), ((3, 2, 2), 40, 1),
+    ]  # fmt: skip
+    for kept, interval in ((first, 1), (second, 2)):
+        assert read_facts(tmp_path / kept.recording).items() >= {"trial": 3, "attempt": 2, "interval": interval}.items()
+        assert read_frames(tmp_path / kept.recording_frames)["age_ns"].tolist() == [interval]
+    assert (recorder.lost, recorder.dropped) == ((), 0)
