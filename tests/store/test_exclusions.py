@@ -250,3 +250,47 @@ def test_exclusions_are_a_set_that_decisions_change(folder: Path) -> None:
         phases=[Phase.generate], suppress_health_check=list(HealthCheck),
     )  # fmt: skip
     run_state_machine_as_test(Decisions, settings=few)
+
+
+def test_what_is_not_there_is_told_with_what_is(folder: Path, tmp_path: Path) -> None:
+    for participant, session, trial, expected in (
+        ("P007", 2, None, "does not contain session 2 of participant P007; sessions of that participant: 1"),
+        ("P009", 1, None, "does not contain session 1 of participant P009; participants: P007, P008"),
+        ("P007", 1, 6, "session 1 of participant P007 does not contain trial 6; its trials are 1, 2, 3, 4, 5"),
+        ("P008", 1, 1, "session 1 of participant P008 does not contain trial 1; its trials are none"),
+    ):
+        with pytest.raises(StoreError) as refused:
+            exclude(folder, participant, session, trial=trial, by="AB", reason="slept")
+        assert str(refused.value).removeprefix(f"{folder} ") == expected
+    with pytest.raises(StoreError, match=r"of participant P001; participants: none$"):
+        exclude(tmp_path / "empty", "P001", 1, by="AB", reason="slept")
+    exclude(folder, "P007", 1, by="AB", reason="slept", now=NOW)
+    said = r"^participant P007, session 1, trial 2 has been excluded since .* \(slept\)$"
+    with pytest.raises(StoreError, match=said):
+        exclude(folder, "P007", 1, trial=2, by="CD", reason="it rang")
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"participant": 7}, {"rule_or_person": None}, {"reason": 1}, {"excluded_at": 2026}, {"session": "1"},
+        {"key_open": "false"}, {"more": 1}, None,
+    ],
+)  # fmt: skip
+def test_a_damaged_line_of_what_was_taken_back_is_named(folder: Path, changes: dict[str, object] | None) -> None:
+    for reason in ("slept", "it rang"):
+        exclude(folder, "P007", 1, by="AB", reason=reason, now=NOW)
+        include(folder, "P007", 1, by="CD", reason=f"é: {reason}", now=NOW)
+    assert [row.reason for row in reversals(folder)] == ["slept", "it rang"]
+    path = StudyFolder(folder).reversed_exclusions
+    assert "é: slept" in path.read_text(encoding="utf-8"), "people can read it"
+    first, second = path.read_bytes().splitlines()
+    record = json.loads(second)
+    if changes is None:
+        del record["exclusion"]
+    else:
+        record["exclusion"] |= changes
+    path.write_bytes(first + b"\n\n" + json.dumps(record).encode() + b"\n")
+    with pytest.raises(StoreError) as refused:
+        reversals(folder)
+    assert str(refused.value) == (f"{path}, line 3 is not a reversed exclusion: remove it, or restore it from a backup")
