@@ -10,11 +10,14 @@ from study_app.protocol.load import parse
 from study_app.protocol.presented.presentation import Presentation
 from study_app.protocol.trials.stimuli import Stimulated
 from study_app.store.session_progress.delivered import (
+    Delivered,
     beyond_limits,
     broken_interval_limits,
+    broken_limits,
     broken_trial_limits,
     delivered_error,
     delivered_values,
+    is_within_limits,
     judged_fields,
     late_device_text,
     late_device_ticks,
@@ -297,3 +300,35 @@ def test_a_sentence_names_both_delays() -> None:
         "the device answered after 3 ticks, but the servo assumes 1 tick"
     )
     assert late_device_text({"loop_delay_ticks": 1}) == ""
+
+
+def test_an_intervals_row_has_all_that_was_delivered_except_clipping() -> None:
+    delivery = Delivered(value_delivered=7.9, force_share=0.98, apparent_mass_kg=0.01, pace_mps=0.08, clipped=True)
+    row = {"value_delivered": 7.9, "force_share": 0.98, "apparent_mass_kg": 0.01, "pace_mps": 0.08}
+    assert delivery.columns == row
+
+
+def test_limits_are_named_as_in_the_study_once_and_only_if_it_states_them() -> None:
+    limits = {"frame_gap_ms": 250.0, "targets_percent": 50.0, "withheld_percent": 5.0}
+    broken = {"first_frame_gap_ms": 251.0, "worst_frame_gap_ms": 252.0, "targets_reached": 4, "targets": 10}
+    assert broken_limits(broken | {"withheld_share": 0.06}, limits) == (
+        "frame_gap_ms", "withheld_percent", "targets_percent",
+    )  # fmt: skip
+    assert broken_limits(broken, {}) == ()
+    assert broken_limits({"targets_reached": 4, "targets": 10}, {"frame_gap_ms": 9.0}) == ()
+    within = [is_within_limits(measured, limits) for measured in (broken, {"worst_frame_gap_ms": 250.0}, {"path": 1.0})]
+    assert within == [False, True, None]
+
+
+@pytest.mark.parametrize(("acted", "expected"), [(99, None), (100, 3)])
+def test_a_controller_that_acted_for_a_tenth_of_a_second_tells_of_a_late_device(
+    acted: int, expected: int | None
+) -> None:
+    """At 1000 ticks per second; the limiters of the first sample belong to no step of the hand."""
+    found = swing(lag=2.5, acted_s=0, force_n=20.0)
+    found["limiters"][1 : acted + 1] = LIMITER_ENERGY
+    assert late_device_ticks(found, 1000.0) == expected
+
+
+def test_no_delay_longer_than_eight_ticks_is_told() -> None:
+    assert [late_device_ticks(swing(lag=lag), 1000.0) for lag in (6.5, 7.5, 8.5)] == [7, 8, None]
