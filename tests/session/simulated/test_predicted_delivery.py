@@ -118,6 +118,32 @@ def test_a_trial_is_lost_where_every_attempt_has_an_undelivered_interval(
     assert (prediction.missing, prediction.asked) == (missing, 100)
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "missing", "asked", "out", "judged"),
+    [
+        # 1 - 0.8 · 0.8 · 0.6 = 0.616 of the presentations fail: 100 · 0.616, and 100 · 0.616³ with the default of three
+        (", attempts = 2", ", attempts = 1", 62, 100, 0, 0),
+        (", attempts = 2", "", 23, 100, 0, 0),
+        # of a trial without intervals, 1 of 5 motions with water and 2 with slime: 2 · 100 · 0.3
+        ('standard = "water"\ndesign = "abx"\n', "", 0, 0, 60, 200),
+    ],
+)
+def test_the_prediction_counts_trials_of_intervals_and_others_apart(
+    old: str, new: str, missing: int, asked: int, out: int, judged: int, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    def withheld_shares(_rig: object, scene: Scene, *_: object) -> list[float]:
+        failing = 1 if scene.liquids[0].density_kg_m3 == 998.2 else 2
+        return [0.251] * failing + [0.25] * (5 - failing)
+
+    monkeypatch.setattr(predicted_delivery_module, "_withheld_shares", withheld_shares)
+    text = study_of("slime", tmp_path).read_text("utf-8").replace('"abx"\nrep', '"3ifc"\nrep')
+    text = text.replace("repetitions = 4", "repetitions = 100").replace(old.replace("abx", "3ifc"), new)
+    prediction = predicted_delivery(parse(text.encode(), "study"), 1)
+    assert (prediction.missing, prediction.asked, prediction.out, prediction.judged, prediction.limit_percent) == (
+        missing, asked, out, judged, 25,
+    )  # fmt: skip
+
+
 def test_every_surface_says_that_no_trial_was_delivered(
     thick: Path, rehearsed: Path, told: list[str], tmp_path: Path
 ) -> None:
