@@ -19,7 +19,7 @@ from study_app.session.resume import begun_schedule
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.session.simulated.rehearsal import ConditionFeatures
 from study_app.store.blinded import allocation
-from study_app.store.blinded.allocation import allocate, allocation_of, claims, session_protocol
+from study_app.store.blinded.allocation import allocate, allocation_of, claims, session_protocol, simulated_groups
 from study_app.store.blinded.blinding import open_or_draw_key
 from study_app.store.files.folders import StudyFolder
 from study_app.store.journals import journal
@@ -38,6 +38,7 @@ from tests.protocol.groups.grouped import GROUPS, STUDY, grouped
 
 SOURCE = (STUDY + GROUPS).encode()
 GROUP_NAMES = ("first_thin", "first_thick")
+PREEXISTING = ('study.name = "grouped"\n', 'study.name = "grouped"\nstudy.group_assignment = "pre-existing"\n')
 
 
 def begun(folder: Path, participant: str, session: int = 1) -> SessionStore:
@@ -281,3 +282,47 @@ def test_a_rehearsal_allocates_from_its_seed_and_reproduces(tmp_path: Path) -> N
 
 def _felt() -> ConditionFeatures:
     return {(block, condition): (NO_FEATURES,) for block in ("thin", "thick") for condition in ("water", "honey")}
+
+
+def test_simulated_participants_come_into_pre_existing_groups_by_their_shares(tmp_path: Path) -> None:
+    """One to two: each comes into the group that is furthest below its share, the first one in a tie."""
+    shares = GROUPS.replace("[groups.first_thick]\n", "[groups.first_thick]\nshare = 2\n")
+    protocol, folder = grouped(PREEXISTING, groups=shares), StudyFolder(tmp_path / "s")
+    source = (STUDY.replace(*PREEXISTING) + shares).encode()
+    thin, thick = GROUP_NAMES
+    new = ("S1", "S2", "S3", "S4", "S5", "S6")
+    assert list(simulated_groups(folder, protocol, new, None).values()) == [thin, thick, thick, thin, thick, thick]
+    assert simulated_groups(folder, protocol, new[:2], thick) == {"S1": thick, "S2": thick}
+    for participant, group, row_of in (("P1", thin, None), ("P2", thin, None), ("P3", thin, "P2")):
+        studies.begun(folder.path, participant, protocol, source, group=group, row_of=row_of).close()
+    assert simulated_groups(folder, protocol, ("P1", *new), None) == {
+        # 2/1 against 0/2: four come into the second one, and then the first in a tie; P1 has a group, P3 only replaces
+        "P1": None, "S1": thick, "S2": thick, "S3": thick, "S4": thick, "S5": thin, "S6": thick,
+    }  # fmt: skip
+    with pytest.raises(StudyError, match="P1 is recorded in group first_thin, not first_thick"):
+        simulated_groups(folder, protocol, ("P1",), thick)
+    with pytest.raises(StudyError, match="does not have this group; permitted: first_thin, first_thick"):
+        simulated_groups(folder, protocol, ("S1",), "third")
+    with pytest.raises(StudyError, match="assigns participants to its groups at random; omit the group"):
+        simulated_groups(folder, grouped(), ("S1",), thin)
+    assert simulated_groups(StudyFolder(tmp_path / "t"), grouped(), ("S1", "S2"), None) == {"S1": None, "S2": None}
+
+
+def test_a_session_is_that_of_the_participants_group_which_must_be_known(tmp_path: Path) -> None:
+    groups = GROUPS.replace('sequence = ["hello", "thin", "thick", "end"]', 'sequences = [["hello", "thin"], ["end"]]')
+    groups = groups.replace('sequence = ["hello", "thick", "thin"]', 'sequences = [["hello"], ["thick"], ["thin"]]')
+    protocol, folder = grouped(PREEXISTING, groups=groups), StudyFolder(tmp_path / "s")
+    source = (STUDY.replace(*PREEXISTING) + groups).encode()
+    for participant, group in zip(("P1", "P2"), GROUP_NAMES, strict=True):
+        studies.begun(folder.path, participant, protocol, source, group=group).close()
+    assert [allocation.planned_sessions(folder, protocol, participant) for participant in ("P1", "P2")] == [2, 3]
+    steps = [session_protocol(folder, protocol, *which).steps for which in (("P1", 1), ("P1", 2), ("P2", 2), ("P2", 3))]
+    assert steps == [("hello", "thin"), ("end",), ("thick",), ("thin",)]
+    unknown = r"participant P9 does not have an entry in .*allocated: restore it from a backup$"
+    with pytest.raises(StoreError, match=unknown):
+        session_protocol(folder, protocol, "P9", 1)
+    with pytest.raises(StoreError, match=unknown):
+        allocation.planned_sessions(folder, protocol, "P9")
+    one = grouped(("format = 2\n", 'format = 2\nsequence = ["hello", "thin", "thick"]\n'), groups="")
+    assert allocation.planned_sessions(folder, one, "P9") == 1
+    assert session_protocol(folder, one, "P9", 1).steps == ("hello", "thin", "thick")
