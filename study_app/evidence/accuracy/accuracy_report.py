@@ -385,7 +385,7 @@ def accuracy_evidence(accuracy: Accuracy) -> Evidence:
             )
             for error in accuracy.acting
         ]
-        headings = ("estimator", "ticks of delay", "ns per tick", "error [%]", "smallest error [%]")
+        headings = ("estimator", "ticks of delay", "ns per tick", "error [%]", "best linear estimator [%]")
         parts.append(
             f"## The force on the hand, {accuracy.acting_liquid}\n\n{Table(headings, acting, left=1).markdown()}"
         )
