@@ -53,6 +53,7 @@ from study_app.store.journals.journal_events import Event, Recorded, SessionEnde
 from study_app.store.merged import folders_of
 from study_app.store.session_progress.progress import trial_results
 from study_app.store.sessions.open_session import Place, table_files
+from study_app.store.sessions.recovery import RESTORE, files_beyond_journal
 from study_app.store.tables.study_files import has_sealed_columns, refuse_earlier_columns, write_study_files
 
 RULE: Final = "catch"
@@ -271,10 +272,9 @@ def _open_files(place: Place, lines: list[Event], key: Key) -> list[str]:
     for path, content in after.items():
         current, sealed = read_if_there(path) or b"", before[path]
         if current not in (sealed, content) and not _is_table_behind(current, path, place, lines, key):
-            left.append(
-                f"{path} differs from the journal, so it was not changed: run liquid-study rebuild "
-                f"{as_argument(place.folder.path)}"
-            )
+            rebuild = f"run liquid-study rebuild {as_argument(place.folder.path)}"
+            remedy = RESTORE if any(files_beyond_journal(place, lines)) else rebuild
+            left.append(f"{path} differs from the journal, so it was not changed: {remedy}")
             continue
         if current != content:
             write_file(path, content)

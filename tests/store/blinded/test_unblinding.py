@@ -141,9 +141,27 @@ def test_a_table_of_a_session_that_goes_on_is_completed_and_a_changed_one_is_lef
     whole = behind.read_bytes()
     behind.write_bytes(whole[: whole.rindex(b",")])
     (left,) = unblind(tmp_path / "study", "AB", "done").left
-    assert left.startswith(f"{changed} differs from the journal, so it was not changed")
+    folder = store.folder.path
+    assert left == f"{changed} differs from the journal, so it was not changed: run liquid-study rebuild {folder}"
     assert changed.read_bytes() == by_hand
     assert len(behind.read_bytes().splitlines()) == len(whole.splitlines())
+
+
+def test_tables_that_say_more_than_a_cut_journal_are_left_with_the_remedy(
+    tmp_path: Path, start: Start, attend: Attend
+) -> None:
+    """`rebuild` would refuse them, since the journal lacks answers."""
+    with start() as store:
+        attend(store)
+    lines = store.folder.journal.read_bytes().splitlines(keepends=True)
+    store.folder.journal.write_bytes(b"".join(lines[: len(lines) // 2]))
+    tables = [store.folder.table("brackish", name) for name in ("responses", "trials")]
+    before = [path.read_bytes() for path in tables]
+    left = unblind(tmp_path / "study", "AB", "done").left
+    assert left == tuple(
+        f"{path} differs from the journal, so it was not changed: restore the journal from a backup" for path in tables
+    )
+    assert [path.read_bytes() for path in tables] == before
 
 
 def test_a_session_goes_on_as_it_began(tmp_path: Path, protocol: Protocol, start: Start, attend: Attend) -> None:
