@@ -189,6 +189,8 @@ def _fault(details: ErrorDetails, document: Mapping[str, Any], schema: Schema) -
         (key, expected), hints = _BOUNDS[kind], (node.get(REASON, "") for node in _nodes_at(document, path, schema))
         bound = int(context[key]) if float(context[key]).is_integer() else context[key]
         reason = next(filter(None, hints), "")
+        if key in {"ge", "gt"} and bound in (0, 1) and not re.search("; |, and ", reason):
+            reason = ""  # numbers begin there, so a reason for one end is for the other one
         if abs(bound) >= _NO_BOUND:
             return Fault(path, f"is {shown_value(value)}, which is too {'small' if bound < 0 else 'large'}", reason)
         sentence = f"is {shown_value(value)}, but must be {expected} {shown_value(bound)}"
