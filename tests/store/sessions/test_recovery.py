@@ -247,6 +247,6 @@ def test_sessions_in_a_copy_are_not_resumed(start: Start, again: Again) -> None:
     with start() as store:
         pass
     study = store.place.study_folder.path
-    (study / MANIFEST).write_text("{}", encoding="utf-8")
+    (study / MANIFEST).write_text("{}", encoding="utf-8", newline="\n")
     with pytest.raises(StoreError, match="is a merged study, which contains only copies"):
         again()
