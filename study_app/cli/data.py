@@ -13,6 +13,7 @@ from study_app.cli.options import (
     REASON,
     SESSION,
     Target,
+    WholeNumber,
     echo_files,
     exclude_each_other,
     exit_if,
@@ -160,7 +161,7 @@ def unblind(results: Path, by: str, reason: str) -> None:
 @takes_study
 @PARTICIPANT
 @SESSION
-@click.option("--trial", type=click.IntRange(1), help="Exclude only this trial; default: the whole session.")
+@click.option("--trial", type=WholeNumber(1), help="Exclude only this trial; default: the whole session.")
 @click.option("--rule", metavar="RULE", default="", help="The exclusion rule that applies to the session.")
 @BY
 @REASON
@@ -191,7 +192,7 @@ def _warn_if_unblinded(results: Path) -> None:
 @takes_study
 @PARTICIPANT
 @SESSION
-@click.option("--trial", type=click.IntRange(1), help="Include only this trial, if it was excluded individually.")
+@click.option("--trial", type=WholeNumber(1), help="Include only this trial, if it was excluded individually.")
 @click.option("--rule", metavar="RULE", help="Keep a session to which this exclusion rule applies (e.g. below_chance).")
 @BY
 @REASON

@@ -20,6 +20,7 @@ import click
 from study_app.cli.options import (
     ShowProgress,
     Target,
+    WholeNumber,
     echo_files,
     exclude_each_other,
     executor_for,
@@ -302,7 +303,7 @@ def _print_material_errors(to: Path | None, workers: Workers, *, solve: bool) ->
 @click.option(
     "--seed", help="Seed for the cases. Specify a seed to repeat a run; default: a new seed, which is printed."
 )
-@click.option("--cases", type=click.IntRange(1), metavar="N", help="Simulate only N cases from each group.")
+@click.option("--cases", type=WholeNumber(1), metavar="N", help="Simulate only N cases from each group.")
 @click.option("--only", metavar="TEXT", help='Simulate only groups whose names contain TEXT, such as "non-Newtonian".')
 @takes_workers
 def stability(
@@ -573,7 +574,7 @@ def _ending_by_signal() -> Iterator[tuple[threading.Event, list[int]]]:
 @click.argument("protocol", metavar="[FILE]", default="rek2024")
 @click.option("--hours", type=float, required=True, metavar="H", help="Duration in hours; 0.01 is 36 seconds.")
 @click.option("--virtual", is_flag=True, help="Run in virtual time, in which a day takes minutes.")
-@click.option("--seed", type=click.IntRange(0, 2**31 - 1), default=1, show_default=True, help="Seed for the faults.")
+@click.option("--seed", type=WholeNumber(0, 2**31 - 1), default=1, show_default=True, help="Seed for the faults.")
 @click.option(
     "--load",
     type=_LOAD,
@@ -634,15 +635,13 @@ def _at_intervals(show: Callable[[str], None]) -> Callable[[str], None]:
 @click.command("validate-report")
 @click.option(
     "--studies",
-    type=click.IntRange(1, 1_000_000),
+    type=WholeNumber(1, 1_000_000),
     default=1000,
     show_default=True,
     help="Initial number of studies per cell.",
 )
 @takes_workers
-@click.option(
-    "--seed", type=click.IntRange(0, 2**31 - 1), default=1, show_default=True, help="Seed for the simulation."
-)
+@click.option("--seed", type=WholeNumber(0, 2**31 - 1), default=1, show_default=True, help="Seed for the simulation.")
 @click.option("--to", type=Target(), metavar="DIR", help="Folder for rates.md and rates.csv.")
 def validate_report(studies: int, workers: Workers, seed: int, to: Path | None) -> None:
     """Measure how often the report's verdicts are wrong in simulated studies in which none, some or all effects exist.
@@ -683,7 +682,7 @@ def validate_report(studies: int, workers: Workers, seed: int, to: Path | None) 
 @click.argument("files", metavar="[FILE]...", nargs=-1)
 @click.option(
     "--studies",
-    type=click.IntRange(10, 1_000_000),
+    type=WholeNumber(10, 1_000_000),
     default=40,
     show_default=True,
     help="Number of studies with 20 participants for each protocol and seed.",
@@ -691,7 +690,7 @@ def validate_report(studies: int, workers: Workers, seed: int, to: Path | None) 
 @click.option(
     "--seed",
     "seeds",
-    type=click.IntRange(0, 2**31 - 1),
+    type=WholeNumber(0, 2**31 - 1),
     multiple=True,
     default=(1,),
     show_default=True,
@@ -728,11 +727,9 @@ def validate(files: tuple[str, ...], studies: int, seeds: tuple[int, ...], worke
 
 @click.command("delay-thresholds")
 @click.option(
-    "--people", type=click.IntRange(5, 1000), default=40, show_default=True, help="Number of simulated participants."
+    "--people", type=WholeNumber(5, 1000), default=40, show_default=True, help="Number of simulated participants."
 )
-@click.option(
-    "--seed", type=click.IntRange(0, 2**31 - 1), default=1, show_default=True, help="Seed for the simulation."
-)
+@click.option("--seed", type=WholeNumber(0, 2**31 - 1), default=1, show_default=True, help="Seed for the simulation.")
 @click.option("--to", type=Target(), metavar="DIR", help="Folder for the table and the figure.")
 def delay_thresholds(people: int, seed: int, to: Path | None) -> None:
     """Compare the delays that simulated participants rate as different (rek2024) and that they detect (delaydetect).

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from study_app.cli.options import SCENE_FILE, Target, echo_files, progress
+from study_app.cli.options import SCENE_FILE, Target, WholeNumber, echo_files, progress
 from study_app.haptics.model.device_dynamics import ASSUMED_TICKS, MOST_DELAY
 
 if TYPE_CHECKING:
@@ -70,7 +70,7 @@ def _parse_changes(changes: tuple[str, ...]) -> dict[str, str]:
 @click.option("--liquid", metavar="NAME", help="Describe only this liquid; default: every liquid in the file.")
 @click.option(
     "--delay",
-    type=click.IntRange(0, MOST_DELAY),
+    type=WholeNumber(0, MOST_DELAY),
     default=ASSUMED_TICKS,
     show_default=True,
     metavar="TICKS",

@@ -50,11 +50,25 @@ _SAMPLES: Final = {
 _LONGEST: Final = 150
 """Maximum number of characters of a command's description in the list of commands."""
 _Command = TypeVar("_Command", bound=Callable[..., Any])
+
+
+class WholeNumber(click.IntRange):
+    """A whole number; the message about any other value states the permitted range."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Return the number, or raise click.BadParameter."""
+        try:
+            return super().convert(value, param, ctx)
+        except click.BadParameter:
+            permitted = f"of at least {self.min}" if self.max is None else f"from {self.min} to {self.max}"
+            self.fail(f"{value} is not a whole number {permitted}", param, ctx)
+
+
 FILE = click.argument("protocol", metavar="FILE")
 SCENE_FILE = click.argument("scene", metavar="FILE")
 BY = click.option("--by", required=True, metavar="NAME", help="Name or initials of the person responsible.")
 PARTICIPANT = click.option("--participant", required=True, metavar="ID", help="ID of the participant, such as P007.")
-SESSION = click.option("--session", type=click.IntRange(1, 99), default=1, show_default=True, help="Session number.")
+SESSION = click.option("--session", type=WholeNumber(1, 99), default=1, show_default=True, help="Session number.")
 REASON = click.option("--reason", required=True, metavar="TEXT", help="Reason, which is recorded with the time.")
 EXIT_CANCELLED: Final = 130
 
@@ -250,7 +264,7 @@ def takes_workers(function: _Command) -> _Command:
         "--workers",
         "--jobs",
         "count",
-        type=click.IntRange(-1),
+        type=WholeNumber(-1),
         default=-1,
         metavar="N",
         callback=_check_worker_count,

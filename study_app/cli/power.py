@@ -9,7 +9,16 @@ import click
 from click.core import ParameterSource
 
 from study_app.analysis.planning import MOST_PARTICIPANTS, SIZES, STUDIES, THRESHOLD_STUDIES
-from study_app.cli.options import EXIT_CANCELLED, FILE, Target, echo_files, executor_for, progress, takes_workers
+from study_app.cli.options import (
+    EXIT_CANCELLED,
+    FILE,
+    Target,
+    WholeNumber,
+    echo_files,
+    executor_for,
+    progress,
+    takes_workers,
+)
 from study_app.workers.executors import Workers
 
 if TYPE_CHECKING:
@@ -50,14 +59,12 @@ def _parse_numbers(value: str, least: int, most: int, what: str) -> tuple[int, .
 )
 @click.option(
     "--studies",
-    type=click.IntRange(1, 1_000_000),
+    type=WholeNumber(1, 1_000_000),
     help=f"Number of simulated studies for each size; default: {STUDIES}, or {THRESHOLD_STUDIES} for thresholds.",
 )
 @takes_workers
 @click.option("--engine", type=click.Choice(["processes", "dask"]), hidden=True)
-@click.option(
-    "--seed", type=click.IntRange(0, 2**31 - 1), default=1, show_default=True, help="Seed for the simulation."
-)
+@click.option("--seed", type=WholeNumber(0, 2**31 - 1), default=1, show_default=True, help="Seed for the simulation.")
 @click.option("--to", type=Target(), metavar="DIR", help="Folder for the tables and figures.")
 def power(
     protocol: str,

@@ -14,6 +14,7 @@ from study_app.cli.options import (
     DeviceName,
     TakesDeviceOptions,
     Target,
+    WholeNumber,
     echo_files,
     keep_offered_workspace,
     study_at,
@@ -24,11 +25,11 @@ from study_app.devices import DEFAULT_DEVICE
 from study_app.haptics.model.device_dynamics import ASSUMED_TICKS, MOST_DELAY
 from study_app.number_text import counted
 
-SEED = click.IntRange(0, 2**31 - 1)
+SEED = WholeNumber(0, 2**31 - 1)
 _WINDOWED = click.option(
     "--windowed", is_flag=True, help="Show the participant's window as a normal window instead of full screen."
 )
-_SCREEN = click.option("--screen", type=click.IntRange(1), help="Number of the participant's screen.")
+_SCREEN = click.option("--screen", type=WholeNumber(1), help="Number of the participant's screen.")
 _OPERATOR = click.option("--operator", default="", metavar="INITIALS", help="Name or initials of the operator.")
 
 
@@ -43,7 +44,7 @@ _OPERATOR = click.option("--operator", default="", metavar="INITIALS", help="Nam
 )
 @click.option(
     "--delay-ticks",
-    type=click.IntRange(1, MOST_DELAY),
+    type=WholeNumber(1, MOST_DELAY),
     default=ASSUMED_TICKS,
     show_default=True,
     help="Force delay [ticks] to assume when checking levels; the pre-flight check uses the device's measured delay.",
@@ -147,7 +148,7 @@ def edit(protocol: str) -> None:
 
 @click.command()
 @FILE
-@click.option("--participants", type=click.IntRange(1, 9999), required=True, help="Number of participants.")
+@click.option("--participants", type=WholeNumber(1, 9999), required=True, help="Number of participants.")
 @click.option(
     "--from",
     "first",
@@ -202,7 +203,7 @@ def run(protocol: str, *, no_recordings: bool, results: Path | None, **chosen: A
 @click.command()
 @FILE
 @click.option(
-    "--participants", type=click.IntRange(1, 99_999), default=1, show_default=True, help="Number of participants."
+    "--participants", type=WholeNumber(1, 99_999), default=1, show_default=True, help="Number of participants."
 )
 @click.option("--seed", type=SEED, default=1, show_default=True, help="Seed for all random choices.")
 @click.option(

@@ -131,7 +131,7 @@ def test_a_title_in_any_script_is_a_title(text: str) -> None:
         ("levels = [0.02, 0.6]", "levels = [0.02, 0.6]\nstandards = [16]", "1", 0, "Duration"),
         ("levels = [0.02, 0.6]", "levels = [0.02, 0.6]\nstandards = [16]", "2", 2,
          "produces up to 25.6 N·s/m of damping at the hand, but the slope limit (1000 Hz, kalman, 2 ticks) is 20.6"),
-        ("", "", "5", 2, "5 is not in the range"),
+        ("", "", "5", 2, "5 is not a whole number from 1 to 4"),
         ("levels = [0.02, 0.6]", "levels = [0.6, 0.02]", "1", 2, "stimuli.damping.levels"),
     ],
 )  # fmt: skip

@@ -116,7 +116,7 @@ def test_engine_dask_and_its_variable_are_other_words_for_a_cluster(monkeypatch:
         (("--engine", "dask"), "--engine dask needs a cluster: specify --cluster tcp://HOST:8786"),
         (("--workers", "2", "--cluster", "tcp://lab1:8786"), "--workers and --cluster cannot be combined"),
         (("--workers", "0"), "0 workers cannot compute anything: specify 1 or more"),
-        (("--jobs", "-2"), "-2 is not in the range x>=-1"),
+        (("--jobs", "-2"), "-2 is not a whole number of at least -1"),
         (("--engine", "ray"), "'ray' is not one of 'processes', 'dask'"),
     ],
 )
