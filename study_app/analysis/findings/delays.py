@@ -379,12 +379,16 @@ class LowestDelay(Finding[tuple[LowestTrend, ...]]):
             words=4,
         )
         members = self.value[0].members
+        corrected = (
+            f"“Shortest” requires p ≤ alpha / {members} at every step, which controls the error rate across "
+            f"{all_of(members, 'statement')}; “uncorrected” requires p ≤ alpha, which controls it only within a single "
+            "statement"
+        )
         yield paragraph(
             "If there is a trend, the longest delay is dropped and the trend is tested again; this is repeated until "
-            f"no trend remains. “Shortest” requires p ≤ alpha / {members} at every step, which controls the error rate "
-            f"across {all_of(members, 'statement')}; “uncorrected” requires p ≤ alpha, which controls it only within a "
-            "single statement. The shortest delay is an upper bound: it tends to be too long rather than too short, "
-            "because with few participants only long delays show a trend.",
+            f"no trend remains. {corrected if members > 1 else 'Every step requires p ≤ alpha'}. The shortest delay is "
+            "an upper bound: it tends to be too long rather than too short, because with few participants only long "
+            "delays show a trend.",
             "soft",
         )
 

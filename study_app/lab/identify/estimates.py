@@ -50,7 +50,7 @@ class Estimates:
         """Return a parameter's value and interval as texts with five digits; integers have all digits."""
         value, (lower, upper) = self.values[parameter.name], self.intervals[parameter.name]
         whole_range = lower <= max(parameter.least, 1e-12) * (1 + 1e-9) and upper >= parameter.most
-        interval = "anything" if whole_range else f"{lower:.5g} … {upper:.5g}"
+        interval = "not determined" if whole_range else f"{lower:.5g} … {upper:.5g}"
         return (f"{value}" if parameter.whole else f"{value:.5g}"), interval
 
     def summary(self) -> str:

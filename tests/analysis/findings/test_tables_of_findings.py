@@ -338,6 +338,9 @@ def test_the_shortest_delay_with_a_trend_is_corrected_over_the_statements() -> N
         ["calm", "up to 90 ms", 0.04, 2, "b: stepping down within calm"],
         ["calm", "up to 40 ms", None, 2, "b: stepping down within calm"],
     ]
+    alone = replace(LOWEST[0], members=1)
+    finding = delay_findings.LowestDelay(block("delays", findings={"lowest": (alone,)}), RESULTS)
+    assert "no trend remains. Every step requires p ≤ alpha. The shortest delay" in lines_of(finding.section())[3]
 
 
 def test_the_answer_on_noticed_delays_prefers_primary_statements_and_turns_falling_ones() -> None:
