@@ -134,9 +134,10 @@ def _general_sentences(study: Study, results: Results) -> Iterator[str]:
         yield "These are pilot sessions, so do not report them as results of the study."
     if study.doubts:
         files = len({doubt.path for doubt in study.doubts})
+        verbs = "is missing or has" if files == 1 else "are missing or have"
         yield (
-            f"{capitalised(counted(files, 'file'))} {'has' if files == 1 else 'have'} changed since recording, so "
-            "numbers may be wrong. The command liquid-study verify RESULTS checks all files."
+            f"{capitalised(counted(files, 'file'))} {verbs} changed since recording, so numbers may be wrong. The "
+            "command liquid-study verify RESULTS checks all files."
         )
     if not decided.made:
         yield "No analysis was planned in the study file, so all results are exploratory."

@@ -47,7 +47,11 @@ def test_methods_distinguish_primary_and_exploratory_statements(tmp_path: Path) 
 
 
 @pytest.mark.parametrize(
-    ("names", "start"), [(("a.csv",), "1 file has "), (("a.csv", "b.csv", "a.csv", "c.json"), "Three files have ")]
+    ("names", "start"),
+    [
+        (("a.csv",), "1 file is missing or has "),
+        (("a.csv", "b.csv", "a.csv", "c.json"), "Three files are missing or have "),
+    ],
 )
 def test_limits_count_the_files_that_have_changed(names: tuple[str, ...], start: str) -> None:
     study = load_study(SAMPLE.path)
