@@ -268,8 +268,8 @@ def read_document(source: bytes, name: str) -> tuple[dict[str, Any], Places]:
         place = re.search(r"\(at line (\d+), column (\d+)\)", str(error))
         line, column = (int(place[1]), int(place[2])) if place else (text.count("\n") + 1, 1)
         if sentence == "Cannot overwrite a value":
-            key = text.splitlines()[line - 1][: column - 1].partition("=")[0].strip()
-            sentence = f"the key {key} occurs twice in this table"
+            key, equals, _ = text.splitlines()[line - 1].partition("=")
+            sentence = f"the key {key.strip()} occurs twice in this table" if equals else "a key occurs twice"
         broken = Problem(
             "file", f"invalid TOML at column {column}: {sentence}", line, hint="see toml.io for the notation"
         )

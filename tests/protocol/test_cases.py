@@ -81,6 +81,7 @@ def test_a_viscosity_that_a_constant_coefficient_ignores_is_named_with_both_forc
     [
         ('"small"', '"small', 5, "column"),
         ("scale = 10", "scale = 10\nscale = 11", 17, "column 11: the key scale occurs twice in this table"),
+        ("scale = 10", "scale = 10\nscale = [\n11]", 18, "column 4: a key occurs twice"),
         ("[liquids.other]", "[liquids.thick]", 26, "column"),
         ("scale = 10", "scale =", 16, "column 8: Invalid value"),
         ("Klein", "Kl\udce9in", 6, "UTF-8"),
