@@ -121,12 +121,12 @@ def _print_survey(file: str | None, to: Path | None) -> None:
     scenes = load_scenes(file or _REAL)
     with progress(lambda text: click.echo(f"{text} …", err=True)) as show:
         errors = survey_scenes(scenes, show)
-    if omitted := [name for name in scenes if name not in {surveyed.liquid for surveyed in errors}]:
-        click.echo(f"not compared, because references need a constant viscosity: {', '.join(omitted)}", err=True)
     if not errors:
         raise click.UsageError(
             f"{file} does not specify the viscosity of any liquid, so there is no physical reference"
         )
+    if omitted := [name for name in scenes if name not in {surveyed.liquid for surveyed in errors}]:
+        click.echo(f"not compared, because references need a constant viscosity: {', '.join(omitted)}", err=True)
     _present_evidence(survey_evidence(errors), to, with_text=False)
 
 

@@ -363,7 +363,7 @@ class Published(Table):
     percent: Annotated[float, within(0, 100, "a percentage of the answers")] | None = Field(
         default=None, description="Percentage of correct answers at this value; default: unknown."
     )
-    n: Annotated[int, within(1, 1_000_000, "studies have fewer participants")] | None = Field(
+    n: Annotated[int, within(1, 1_000_000, "studies have fewer participants", of_most=True)] | None = Field(
         default=None, description="Number of participants in the published study."
     )
     source: Brief = Field(default="", description="The publication that reports the value.")

@@ -1,4 +1,4 @@
-"""Executors of cases without processes or a cluster: versions, addresses, greetings and what an error is told as."""
+"""Executors of cases without processes or a cluster: versions, addresses, greetings and error messages."""
 
 import os
 from concurrent.futures import CancelledError

@@ -13,7 +13,7 @@ from typing import Any, Final, Literal, TypeAlias
 
 from study_app.designer.document.toml_edits import Edit, Rename, Set, Unset
 from study_app.designer.document.toml_text import Refused
-from study_app.haptics.model.ranges import REASON
+from study_app.haptics.model.ranges import OF_MOST, REASON
 from study_app.ids import MAX_FROM_TEXT, MAX_ID, free_id, id_of
 from study_app.number_text import counted, exact_text
 from study_app.protocol.checks import CHOICES, ITEM_REFERENCES
@@ -654,7 +654,7 @@ def _make_row(document: Mapping[str, Any], path: Path, nodes: tuple[_Node, ...],
         **common,
         choices=options,
         bounds=_bound_texts(first, limits),
-        reason=limits.get(REASON, ""),
+        reason=limits.get(REASON, limits.get(OF_MOST, "")),
     )
 
 

@@ -5,6 +5,7 @@ from typing import Annotated, Any, Final, TypeAlias
 from pydantic import BaseModel, ConfigDict, Field
 
 REASON: Final = "reason"
+OF_MOST: Final = "reason_of_most"
 """JSON Schema key of the reason for a number's range."""
 
 
@@ -20,13 +21,17 @@ def later(default: Any = None, **about: Any) -> Any:
     return Field(**usual, **about, exclude_if=lambda value: value == usual.get("default", {}))
 
 
-def within(least: float, most: float, why: str, usual: float | None = None, what: str | None = None) -> Any:
+def within(
+    least: float, most: float, why: str, usual: float | None = None, what: str | None = None, *, of_most: bool = False
+) -> Any:
     """Return the annotation of a number from ``least`` to ``most``, both included.
 
-    An editor starts with ``usual``; ``what`` describes the number.
+    ``why`` is the reason for both ends, or with ``of_most`` for the upper one. An editor starts with ``usual``;
+    ``what`` describes the number.
     """
     examples = None if usual is None else [usual]
-    return Field(ge=least, le=most, description=what, examples=examples, json_schema_extra={REASON: why})
+    reason: dict[str, Any] = {OF_MOST if of_most else REASON: why}
+    return Field(ge=least, le=most, description=what, examples=examples, json_schema_extra=reason)
 
 
 Coordinate: TypeAlias = Annotated[float, within(-1000, 1000, "a scene is at most 1 km wide")]

@@ -201,10 +201,13 @@ class ForceLink(Frozen):
     MOST_LOSS: ClassVar[float] = 0.5
 
     delay_s: Annotated[
-        float, within(0, MOST_DELAY_MS / 1000, "with a longer delay, a liquid pushes instead of resisting")
+        float,
+        within(0, MOST_DELAY_MS / 1000, "with a longer delay, a liquid pushes instead of resisting", of_most=True),
     ] = 0.0
-    jitter_s: Annotated[float, within(0, MOST_JITTER_MS / 1000, "jitter in networks is smaller")] = 0.0
-    loss: Annotated[float, within(0, MOST_LOSS, "with higher losses, most forces would repeat the previous one")] = 0.0
+    jitter_s: Annotated[float, within(0, MOST_JITTER_MS / 1000, "jitter in networks is smaller", of_most=True)] = 0.0
+    loss: Annotated[
+        float, within(0, MOST_LOSS, "with higher losses, most forces would repeat the previous one", of_most=True)
+    ] = 0.0
     seed: Annotated[int, within(0, 2**32 - 1, "32 bits")] = 0
 
     @property

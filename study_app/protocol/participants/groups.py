@@ -27,7 +27,7 @@ Sequences: TypeAlias = tuple[Annotated[Steps, Field(min_length=1)], ...]
 class Group(Table):
     """A group of participants; a group without its own sequence uses the study's sequence."""
 
-    share: Annotated[int, within(1, _MOST_SHARE, "shares are small whole numbers")] = Field(
+    share: Annotated[int, within(1, _MOST_SHARE, "shares are small whole numbers", of_most=True)] = Field(
         default=1,
         description=(
             "Number of participants from this group in each randomisation block; for a pre-existing group, its share "

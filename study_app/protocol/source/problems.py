@@ -11,7 +11,7 @@ from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from study_app.errors import Problem
-from study_app.haptics.model.ranges import REASON
+from study_app.haptics.model.ranges import OF_MOST, REASON
 from study_app.protocol.source.document import Path, Places, has
 
 Schema = Mapping[str, Any]
@@ -186,11 +186,11 @@ def _fault(details: ErrorDetails, document: Mapping[str, Any], schema: Schema) -
         expected = str(context["expected"]).replace("'", '"')
         return _unknown_value(path, value, f"must be {expected}, not {shown_value(value)}", expected)
     if kind in _BOUNDS:
-        (key, expected), hints = _BOUNDS[kind], (node.get(REASON, "") for node in _nodes_at(document, path, schema))
+        key, expected = _BOUNDS[kind]
+        names = (REASON, OF_MOST) if key in {"lt", "le"} else (REASON,)
+        hints = (node.get(name, "") for node in _nodes_at(document, path, schema) for name in names)
         bound = int(context[key]) if float(context[key]).is_integer() else context[key]
         reason = next(filter(None, hints), "")
-        if key in {"ge", "gt"} and bound in (0, 1) and not re.search("; |, and ", reason):
-            reason = ""  # numbers begin there, so a reason for one end is for the other one
         if abs(bound) >= _NO_BOUND:
             return Fault(path, f"is {shown_value(value)}, which is too {'small' if bound < 0 else 'large'}", reason)
         sentence = f"is {shown_value(value)}, but must be {expected} {shown_value(bound)}"

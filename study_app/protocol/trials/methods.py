@@ -188,7 +188,7 @@ class Method(Table):
         return 0
 
 
-Trials = Annotated[int, within(1, 1000, "no participant can complete more trials in one track")]
+Trials = Annotated[int, within(1, 1000, "no participant can complete more trials in one track", of_most=True)]
 
 
 class _Adaptive(Method):

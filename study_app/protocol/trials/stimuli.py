@@ -50,7 +50,7 @@ class Condition(Table):
         default=(), description=("Several liquids; where they overlap, the one listed last applies.")
     )
     delay_ms: Annotated[
-        float, within(0, MOST_DELAY_MS, "a picture that is more than 1 s late does not act as feedback")
+        float, within(0, MOST_DELAY_MS, "a picture that is more than 1 s late does not act as feedback", of_most=True)
     ] = Field(default=0, description="Delay of everything drawn in the tank [ms].")
     label: Id | None = Field(
         default=None, description="The item in analysis.names that names this condition correctly; default: none."
@@ -60,13 +60,14 @@ class Condition(Table):
         description="shown: the ball is always drawn; hidden: it is drawn only during the task's lead-in.",
     )
     force_delay_ms: Annotated[
-        float, within(0, ForceLink.MOST_DELAY_MS, "with a longer delay, the force pushes the hand")
+        float, within(0, ForceLink.MOST_DELAY_MS, "with a longer delay, the force pushes the hand", of_most=True)
     ] = later(default=0, description="Force delay [ms]; the picture is not delayed.")
-    force_jitter_ms: Annotated[float, within(0, ForceLink.MOST_JITTER_MS, "jitter in networks is smaller")] = later(
-        default=0, description="Maximum additional force delay, drawn at random at every tick [ms]."
-    )
+    force_jitter_ms: Annotated[
+        float, within(0, ForceLink.MOST_JITTER_MS, "jitter in networks is smaller", of_most=True)
+    ] = later(default=0, description="Maximum additional force delay, drawn at random at every tick [ms].")
     force_loss: Annotated[
-        float, within(0, ForceLink.MOST_LOSS, "with higher losses, most forces would repeat the previous one")
+        float,
+        within(0, ForceLink.MOST_LOSS, "with higher losses, most forces would repeat the previous one", of_most=True),
     ] = later(default=0, description="Proportion of ticks at which the force is lost and the previous force is held.")
     view: str = later(
         default="tank",

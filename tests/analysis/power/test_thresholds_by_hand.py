@@ -14,22 +14,14 @@ from study_app.analysis.planning.threshold_studies import PrecisionResult, Preci
 from study_app.analysis.statistics.mean_tests import equivalence_power
 from study_app.protocol.load import parse
 from study_app.protocol.model import Protocol
+from tests.analysis.test_contrasts import DELAYED
 from tests.protocol.groups.grouped import grouped
 
-TEXT = """
-format = 2
-study.name = "two"
-study.title.en = "Two parts"
-liquids.damper.drag = { law = "linear", damping_nspm = 8 }
-conditions.prompt_one = { liquid = "damper" }
-conditions.late_one = { liquid = "damper", delay_ms = 60 }
-tasks.stir.kind = "follow"
-stimuli.prompt = { vary = "damping_nspm", levels = [0.02, 0.6], condition = "prompt_one" }
-stimuli.late = { vary = "damping_nspm", levels = [0.02, 0.6], condition = "late_one" }
-blocks.prompt = { stimulus = "prompt", design = "2ifc", method = "m", task = "stir" }
-blocks.late = { stimulus = "late", design = "2ifc", method = "m", task = "stir" }
-methods.m = { kind = "questplus", trials = 20 }
-
+TEXT = (
+    DELAYED.partition("[analysis]")[0].replace(
+        'study.name = "delayed"', 'study.name = "two"\nstudy.title.en = "Two parts"'
+    )
+    + """
 [analysis]
 participants = 12
 precision = 0.3
@@ -38,6 +30,7 @@ contrasts = [
     { measure = "threshold", blocks = ["prompt", "late"] },
 ]
 """
+)
 
 
 def two(*edits: tuple[str, str]) -> Protocol:

@@ -6,7 +6,6 @@ from typing import Any
 
 import pytest
 
-from study_app.analysis.data.blocks import Item
 from study_app.analysis.figures.summary_figures import MOST_PANELS, Numbers
 from study_app.analysis.findings.finding import Answer
 from study_app.analysis.page_layout import Picture
@@ -15,21 +14,12 @@ from study_app.analysis.report.first_page import Card, Presented
 from study_app.analysis.results import BlockResult, ContrastResult, ContrastSide, GroupAnswers, QuestionResult
 from study_app.protocol.model import Contrast
 from tests.analysis.made_up import DECIDED, delays, liquids
+from tests.analysis.report.test_sections import block
 from tests.golden_values import page_lines
 
-ITEMS = tuple(Item(id=item, text=f"It is {item}.", short=item.capitalize()) for item in ("warm", "thick", "calm"))
 IN = {name: Presented(f"In {name}, oil.", {"": ("“oil”", f"{delay} ms of visual delay", "")}) for name, delay in (
     ("a", 30), ("b", 60), ("c", 90),
 )}  # fmt: skip
-
-
-def block(name: str, **changes: Any) -> BlockResult:
-    """Return the result of a block of the liquids Thin and Wax without any findings."""
-    made = BlockResult(
-        id=name, title=f"Block {name}", kind="liquids", revealed=True, n=3, settings=liquids(2), names=("Thin", "Wax"),
-        items=ITEMS, labels=(), measures=(),
-    )  # fmt: skip
-    return replace(made, **changes)
 
 
 def results_of(*blocks: BlockResult, **changes: Any) -> Any:

@@ -1,4 +1,4 @@
-"""What is told of a service by its list of devices, whatever it answers."""
+"""The description of a service by its list of devices, for each kind of answer."""
 
 import socket
 from collections.abc import Iterator

@@ -115,7 +115,7 @@ class TestMoving:
             assert servo.telemetry.latest().position_m[0] == pytest.approx(went_m, rel=0.05)
 
     def test_each_direction_of_the_cap_moves_the_pointer_and_a_gap_counts_as_50_ms(self):
-        """Half of what is beyond the dead zone is half the speed."""
+        """Half of the travel beyond the dead zone gives half the speed."""
         half = (350 - 20) // 2 + 20
         report = bytes([1, *(half).to_bytes(2, "little"), 0, 0, *(-350).to_bytes(2, "little", signed=True)])
         device, hid = opened(report, REST)
