@@ -10,12 +10,13 @@ Equivalence is tested as in all other analyses, with a correction over the hypot
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import chain
 from typing import Any, Final, NamedTuple
 
 import numpy as np
+import pandas as pd
 
 from study_app import number_text
+from study_app.analysis.data.blocks import Item, PlacedQuestion, PlacedScore
 from study_app.analysis.data.study_tables import Study, group_members
 from study_app.analysis.findings.finding import FOUND, HOLM, TESTS, BlockAnswers, verdict
 from study_app.analysis.html_page import bullets, ends_of, heading, paragraph, table_of
@@ -282,19 +283,57 @@ def _thresholds_in_two_blocks(
     ], per_u**2 * shared
 
 
-def _participant_form_values(study: Study, contrast: Contrast, form: str, block: str) -> Mapping[str, ParticipantValue]:
+def _question_or_score(study: Study, contrast: Contrast, place: str) -> PlacedQuestion | PlacedScore | None:
+    """Return the question or score that a contrast compares in a form or block; None if there is none."""
+    for question in study.others.questions:
+        if (question.where.id, question.id) == (place, contrast.measure):
+            return question
+    scores = (score for score in study.others.scores if (score.where.id, score.name) == (place, contrast.measure))
+    return next(scores, None)
+
+
+def _scale_ends(study: Study, contrast: Contrast) -> tuple[float, float] | None:
+    """Return the ends of the scale of a question or score; None for statements and for measures without a scale."""
+    if _statement(study, contrast) is not None:
+        return None
+    asked = _question_or_score(study, contrast, contrast.form or contrast.blocks[0])
+    return asked.bounds if isinstance(asked, PlacedScore) else None if asked is None else asked.scale_ends
+
+
+def _numbers_of(study: Study, asked: PlacedQuestion | PlacedScore) -> pd.DataFrame:
+    """Return the answers to a question, or the scores, with ``participant``, ``code``, ``after_block``, ``score``."""
+    rows = scored(study, asked) if isinstance(asked, PlacedScore) else study.answers_to(asked)
+    return rows.rename(columns={"value": "score"}).dropna(subset=["score"]).astype({"score": float})
+
+
+def _values_in_form(study: Study, contrast: Contrast, form: str, block: str) -> Mapping[str, ParticipantValue]:
     """Return each participant's answer or score in a form after a block, averaged over sessions."""
-    rows = [
-        study.answers_to(question).rename(columns={"value": "score"})
-        for question in study.others.questions
-        if (question.where.id, question.id) == (form, contrast.measure)
-    ] + [
-        scored(study, score)
-        for score in study.others.scores
-        if (score.where.id, score.name) == (form, contrast.measure)
-    ]
-    after = [table[(table["after_block"] == block) & table["score"].notna()] for table in rows]
-    means = {person: own["score"].mean() for table in after for person, own in table.groupby("participant")}
+    asked = _question_or_score(study, contrast, form)
+    if asked is None:
+        return {}
+    numbers = _numbers_of(study, asked)
+    return _participant_means(numbers[numbers["after_block"] == block])
+
+
+def _values_after_trials(
+    study: Study, contrast: Contrast, block: str, condition: str | None
+) -> Mapping[str, ParticipantValue]:
+    """Return each participant's answer or score after the trials of a block, averaged first within conditions.
+
+    Without a ``condition``, participants need an answer in every condition of the block.
+    """
+    asked = _question_or_score(study, contrast, block)
+    if asked is None:
+        return {}
+    codes = {setting.code for setting in asked.where.settings if condition in (None, setting.condition)}
+    numbers = _numbers_of(study, asked)
+    means = numbers[numbers["code"].isin(codes)].groupby(["participant", "code"], as_index=False)["score"].mean()
+    answered_codes = means.groupby("participant")["code"].transform("nunique")
+    return _participant_means(means[answered_codes == len(codes)])
+
+
+def _participant_means(numbers: pd.DataFrame) -> Mapping[str, ParticipantValue]:
+    means = numbers.groupby("participant")["score"].mean()
     return {str(person): ParticipantValue(value=float(mean)) for person, mean in means.items()}
 
 
@@ -308,9 +347,11 @@ def _participant_values(
 ) -> Mapping[str, ParticipantValue]:
     """Return each participant's value in a block: the mean over standards or, for statements, over conditions."""
     if contrast.form is not None:
-        return _participant_form_values(study, contrast, contrast.form, block)
+        return _values_in_form(study, contrast, contrast.form, block)
     if contrast.measure not in _STATISTICS:
-        block_answers = next(answered for answered in answers if answered.block.id == block)
+        block_answers = next((answered for answered in answers if answered.block.id == block), None)
+        if block_answers is None or contrast.measure not in block_answers.values:
+            return _values_after_trials(study, contrast, block, condition)
         codes = [setting.code for setting in block_answers.block.settings if condition in (None, setting.condition)]
         rows = block_answers.values[contrast.measure][
             :, sorted({block_answers.block.columns[code] for code in codes})
@@ -360,6 +401,7 @@ def _test_contrast(
     compared = _collect_samples(study, contrast, answers, levels)
     ratio, means = _is_ratio(contrast, levels), compared.means(strictest)
     names, within = _side_names(study, contrast), _within_names(study, contrast)
+    largest = None if _statement(study, contrast) is None else largest_difference(contrast)
     is_ordinal = contrast.measure not in _STATISTICS and not contrast.is_interaction
     standardised = _standardised_effects(compared, is_ordinal=is_ordinal)
     effect = ends = p_equal = p = p_bootstrap = p_skewed = statistic = error = None
@@ -368,8 +410,8 @@ def _test_contrast(
         mean, (low, high) = float(means.mean[0]), (float(end[0]) for end in means.interval(0.95))
         effect = math.exp(mean) if ratio else mean
         if contrast.bound is not None:
-            reach, largest = equality_limits(contrast, contrast.bound, ratio=ratio)
-            p_equal = float(p_equivalent(means, reach, compared.smallest, largest)[0])
+            bound = bound_as_tested(contrast.bound, ratio=ratio)
+            p_equal = float(p_equivalent(means, bound, compared.smallest, largest)[0])
         if means.error[0] > SAME:
             ps = p_differs(means, SIDES[contrast.expected])
             p, p_bootstrap, p_skewed = float(ps.t[0]), float(ps.bootstrap[0]), float(ps.skewed[0])
@@ -427,6 +469,8 @@ def _test_contrast(
         block_title=_block_titles(study, contrast)[0],
         standard_error=error,
         freedom=None if error is None or means is None else means.freedom,
+        largest=largest,
+        scale=_scale_ends(study, contrast),
     )
 
 
@@ -440,7 +484,8 @@ def _side_names(study: Study, contrast: Contrast) -> tuple[str, str]:
 
 def _block_titles(study: Study, contrast: Contrast) -> tuple[str, str]:
     """Return the titles of the first and the last block of a contrast."""
-    titles = {block.id: block.title for block in study.levels} | {block.id: block.title for block in study.blocks}
+    titles = {question.where.id: question.where.title for question in study.others.questions}
+    titles |= {level.id: level.title for level in study.levels} | {block.id: block.title for block in study.blocks}
     first, last = (titles.get(block, block) for block in (contrast.blocks[0], contrast.blocks[-1]))
     return first, last
 
@@ -454,20 +499,20 @@ def _within_names(study: Study, contrast: Contrast) -> tuple[str, str] | None:
 
 def _measure_name(study: Study, contrast: Contrast) -> str:
     """Return the measure with the short text of its statement or question; "" if it has none."""
-    if contrast.form is not None:
-        form, measure = contrast.form, contrast.measure
-        scores = (
-            f"{score.title} score" for score in study.others.scores if (score.where.id, score.name) == (form, measure)
-        )
-        questions = (
-            f"“{question.short}” ({question.where.title})"
-            for question in study.others.questions
-            if (question.where.id, question.id) == (form, measure)
-        )
-        return next(chain(scores, questions), "")
-    items = (item for block in study.blocks if block.id in contrast.blocks for item in block.items)
-    item = next((item for item in items if item.id == contrast.measure), None)
-    return "" if item is None else f"agreement with “{item.short}”"
+    if (statement := _statement(study, contrast)) is not None:
+        return f"agreement with “{statement.short}”"
+    asked = _question_or_score(study, contrast, contrast.form or contrast.blocks[0])
+    if isinstance(asked, PlacedScore):
+        return f"{asked.title} score"
+    if asked is None:
+        return ""
+    return f"“{asked.short}”" if contrast.form is None else f"“{asked.short}” ({asked.where.title})"
+
+
+def _statement(study: Study, contrast: Contrast) -> Item | None:
+    """Return the statement after trials whose agreement a contrast compares; None for other measures."""
+    blocks = [] if contrast.form is not None else [block for block in study.blocks if block.id in contrast.blocks]
+    return next((item for block in blocks for item in block.items if item.id == contrast.measure), None)
 
 
 def inclusion_words(contrasts: Iterable[Contrast]) -> str:
@@ -480,11 +525,14 @@ def inclusion_words(contrasts: Iterable[Contrast]) -> str:
     )
 
 
-def equality_limits(contrast: Contrast, bound: float, *, ratio: bool) -> tuple[float, float | None]:
-    """Return the bound on the scale of the test, and the largest possible difference (None: unlimited)."""
-    is_statement = contrast.measure not in _STATISTICS and contrast.form is None
-    largest = STEPS * (2 if contrast.is_interaction else 1) if is_statement else None
-    return abs(math.log(bound)) if ratio else bound, largest
+def bound_as_tested(bound: float, *, ratio: bool) -> float:
+    """Return an equivalence bound on the scale of the test."""
+    return abs(math.log(bound)) if ratio else bound
+
+
+def largest_difference(contrast: Contrast) -> float:
+    """Return the largest possible difference in agreement with a statement."""
+    return STEPS * (2 if contrast.is_interaction else 1)
 
 
 def _largest_possible_share(contrast: Contrast, compared: ContrastSamples, *, ratio: bool) -> float | None:
@@ -493,8 +541,7 @@ def _largest_possible_share(contrast: Contrast, compared: ContrastSamples, *, ra
         return None
     if contrast.groups is not None:
         return clopper_pearson(0, compared.smallest).high
-    reach, _ = equality_limits(contrast, contrast.bound, ratio=ratio)
-    return people_beyond(compared.values[0], reach).interval.high
+    return people_beyond(compared.values[0], bound_as_tested(contrast.bound, ratio=ratio)).interval.high
 
 
 def question(contrast: ContrastResult) -> str:
@@ -530,7 +577,7 @@ def answer(contrast: ContrastResult) -> str:
 
 def _lies_beyond(contrast: ContrastResult, bound: float) -> bool:
     """Return whether the whole 95 % interval (or the difference, if all are equal) lies beyond the bound."""
-    reach, _ = equality_limits(contrast.contrast, bound, ratio=contrast.ratio)
+    reach = bound_as_tested(bound, ratio=contrast.ratio)
     if contrast.ratio and contrast.effect is not None:
         ends = contrast.interval
         logarithms = None if ends is None else replace(ends, low=math.log(ends.low), high=math.log(ends.high))

@@ -291,7 +291,9 @@ class ContrastResult(Outcome):
     ``bayes_factor`` the ratio of the likelihoods with and without a difference. ``within_names`` are the names of the
     blocks or conditions of an interaction, ``cells`` the numbers of each group under each of them, group by group,
     ``measure_name`` is the measure in words, and ``block_title`` is that of the first block. ``standard_error`` is that
-    of the mean difference, of logarithms for a ratio, and ``freedom`` are the degrees of freedom of t.
+    of the mean difference, of logarithms for a ratio, and ``freedom`` are the degrees of freedom of t. ``largest`` is
+    the largest possible difference in agreement with a statement, ``scale`` the ends of the scale of another question
+    or score; None for other measures.
     """
 
     contrast: Contrast
@@ -318,6 +320,8 @@ class ContrastResult(Outcome):
     block_title: str = ""
     standard_error: float | None = None
     freedom: int | None = None
+    largest: float | None = None
+    scale: tuple[float, float] | None = None
 
     @property
     def comparison(self) -> str:

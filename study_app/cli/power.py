@@ -125,7 +125,9 @@ def power(
                 rehearse=lambda: condition_features(study, seed=seed, progress=show),
                 progress=show,
             ):
-                show(f"{estimate.studies} of {estimate.asked} studies for each size", estimate.studies / estimate.asked)
+                if estimate.asked:
+                    done = f"{estimate.studies} of {estimate.asked} studies for each size"
+                    show(done, estimate.studies / estimate.asked)
     except KeyboardInterrupt:
         cancelled = True
     if estimate is not None:

@@ -4,7 +4,7 @@ Each class is one table of the file (blocks, tasks and questionnaires have modul
 table alone; checks that need several tables are in ``checks``.
 """
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -398,8 +398,9 @@ class Contrast(Table):
 
     measure: Id = Field(
         default="threshold",
-        description='"threshold", "exponent", "d_prime" or "pse" for blocks with levels, or the ID of a statement; '
-        "if form is specified, the ID of one of its questions or scores.",
+        description='"threshold", "exponent", "d_prime" or "pse" for blocks with levels; for other blocks, the ID of a '
+        "statement, rating, slider, number or score of the questionnaire after each trial or, if form is specified, of "
+        "that questionnaire.",
     )
     form: Id | None = later(
         default=None, description="The questionnaire whose answers or score are compared; it must follow the blocks."
@@ -463,7 +464,7 @@ class Contrast(Table):
 
     @property
     def measure_words(self) -> str:
-        """The measure in words: "threshold", "agreement with “thick”"."""
+        """The measure in words: "threshold", "agreement with “thick”"; see also `Protocol.measure_words`."""
         if self.form is not None:
             return f"“{self.measure}” ({self.form})"
         words = {"d_prime": "sensitivity (d′)", "pse": "point of subjective equality"}
@@ -641,11 +642,17 @@ class Analysis(Table):
         return self
 
     def described(
-        self, named_by: Sequence[str], *, units: Mapping[str, str], statements: bool
+        self,
+        named_by: Sequence[str],
+        *,
+        units: Mapping[str, str],
+        statements: bool,
+        measure_words: Callable[[Contrast], str],
     ) -> Iterator[tuple[str, str]]:
         """Yield a row for each decision.
 
-        ``named_by`` states which item names each condition; ``units`` maps blocks to the unit of the varied parameter.
+        ``named_by`` states which item names each condition; ``units`` maps blocks to the unit of the varied parameter;
+        ``measure_words`` returns the measure of a hypothesis in words.
 
         Decisions about statements are omitted unless the study tests ``statements``.
         """
@@ -661,7 +668,8 @@ class Analysis(Table):
             width = f"{100 * self.precision:g} %"
             yield "Precision", f"half-width of the 95 % confidence interval for the group mean: {width}"
         yield from (("Proposes exclusion", rule.words) for rule in self.exclusions)
-        yield from (("Hypothesis", contrast.described()) for contrast in self.contrasts)
+        for contrast in self.contrasts:
+            yield "Hypothesis", contrast.described(measure=measure_words(contrast))
         yield from (("Published", value.described(units.get(value.block, ""))) for value in self.published)
 
     def _statement_decisions(self, named_by: Sequence[str]) -> Iterator[tuple[str, str]]:
@@ -737,6 +745,12 @@ class Protocol(Sessions, Table):
     def main_blocks(self) -> tuple[Block, ...]:
         """The blocks that are analysed, in the order of the session."""
         return tuple(block for block in self.blocks_in_order if block.phase == "main")
+
+    @property
+    def blocks_with_statements(self) -> tuple[Block, ...]:
+        """The main blocks with statements after each trial."""
+        asked_in = ((block, self.questionnaire_of(block.id)) for block in self.main_blocks if block.design is None)
+        return tuple(block for block, asked in asked_in if asked is not None and asked.statements)
 
     @property
     def blocks_in_order(self) -> tuple[Block, ...]:
@@ -828,6 +842,18 @@ class Protocol(Sessions, Table):
         if stimulus.level_kind == "value" and self.design_of(block).intervals == 1:
             return (None,)
         return block.standards or stimulus.standards or (self.present_value(stimulus),)
+
+    def compares_statement(self, contrast: Contrast) -> bool:
+        """Return whether a contrast compares agreement with a statement after each trial."""
+        questionnaires = () if contrast.form else filter(None, map(self.questionnaire_of, contrast.blocks))
+        return any(item.id == contrast.measure for asked in questionnaires for item in asked.statements)
+
+    def measure_words(self, contrast: Contrast) -> str:
+        """Return the measure of a contrast in words: "threshold", "agreement with “thick”", "“roughness”"."""
+        is_question = contrast.form is None and contrast.measure not in OF_LEVELS
+        if is_question and not self.compares_statement(contrast):
+            return f"“{contrast.measure}”"
+        return contrast.measure_words
 
     def measures_of(self, block: Block) -> tuple[str, ...]:
         """Return the measures of `OF_LEVELS` that the answers of a block with a design determine.

@@ -122,6 +122,11 @@ class Questionnaire(Table):
         """The items that are rated on the questionnaire's scale."""
         return tuple(item for item in self.items if isinstance(item, Statement))
 
+    @property
+    def numeric_measures(self) -> tuple[str, ...]:
+        """The IDs of the items whose answers are numbers, and the names of the scores."""
+        return (*(item.id for item in self.items if item.value_type != "text"), *self.scores)
+
     def item(self, item_id: str) -> Question:
         """Return the item with an ID; raise KeyError if there is none."""
         return self._items_by_id[item_id]

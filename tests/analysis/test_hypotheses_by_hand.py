@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from study_app.analysis import contrasts
-from study_app.analysis.contrasts import answer, equality_limits, question, t_test_name
+from study_app.analysis.contrasts import answer, bound_as_tested, largest_difference, question, t_test_name
 from study_app.analysis.levels.thresholds import ThresholdEstimate
 from study_app.analysis.results import ContrastResult, ContrastSide, LevelsResult
 from study_app.analysis.statistics.effect_sizes import EffectSize
@@ -237,14 +237,13 @@ def test_an_interaction_has_the_differences_of_each_group_and_its_values_under_e
 
 
 def test_a_statement_differs_by_at_most_6_points_and_an_interaction_by_12() -> None:
-    limits = {
-        (6, 1.5): (STATED, False), (12, 1.5): ({**STATED, "groups": ("old", "new")}, False),
-        (None, 1.5): ({"measure": "raw", "form": "load", "blocks": ("b", "c")}, False),
-        (None, math.log(1.5)): (BLOCKS, True),
-    }  # fmt: skip
-    for (largest, reach), (stated, ratio) in limits.items():
-        assert equality_limits(Contrast.model_validate(stated), 1.5, ratio=ratio) == (pytest.approx(reach), largest)
-    assert equality_limits(Contrast.model_validate(BLOCKS), 0.8, ratio=True)[0] == pytest.approx(math.log(1.25))
+    assert largest_difference(Contrast.model_validate(STATED)) == 6
+    assert largest_difference(Contrast.model_validate({**STATED, "groups": ("old", "new")})) == 12
+
+
+def test_the_bound_of_a_ratio_is_tested_as_a_logarithm() -> None:
+    assert bound_as_tested(1.5, ratio=False) == 1.5
+    assert [bound_as_tested(bound, ratio=True) for bound in (1.5, 1 / 1.5)] == pytest.approx([0.4054651081] * 2)
 
 
 @pytest.mark.parametrize(

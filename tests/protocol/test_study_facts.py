@@ -170,7 +170,12 @@ def test_each_decision_about_the_analysis_has_its_own_row() -> None:
             "contrasts": (BETWEEN,), "published": ({"block": "near", "measure": "pse", "value": 3},),
         }
     )  # fmt: skip
-    rows = list(decided.described(["oil by like_oil"], units={"near": "ms"}, statements=True))
+    of_measure = {"threshold": "just-noticeable difference"}
+
+    def described(decided: Analysis, named_by: list[str], **facts: Any) -> list[tuple[str, str]]:
+        return [*decided.described(named_by, measure_words=lambda contrast: of_measure[contrast.measure], **facts)]
+
+    rows = described(decided, ["oil by like_oil"], units={"near": "ms"}, statements=True)
     statements = [
         ("Equivalent", "mean answers within 1 point of those without delay"),
         ("Primary", "warm, cold"),
@@ -185,14 +190,14 @@ def test_each_decision_about_the_analysis_has_its_own_row() -> None:
         ("Interim analyses", "with 10, 30 participants; alpha spending: pocock"),
         ("Precision", "half-width of the 95 % confidence interval for the group mean: 15 %"),
         ("Proposes exclusion", "the median response time is below 0.3 s"),
-        ("Hypothesis", "threshold differs between near and far"),
+        ("Hypothesis", "just-noticeable difference differs between near and far"),
         ("Published", "near: PSE 3 ms"),
     ]
     assert rows == [("Significance level", "0.01"), *statements, *others]
-    assert list(decided.described([], units={}, statements=False)) == [
+    assert described(decided, [], units={}, statements=False) == [
         rows[0], *others[:-1], ("Published", "near: PSE 3"),
     ]  # fmt: skip
-    undecided = dict(Analysis().described([], units={}, statements=True))
+    undecided = dict(described(Analysis(), [], units={}, statements=True))
     assert undecided == {
         "Significance level": "0.05", "Equivalent": "not tested", "Primary": "all statements", "Recognition": "none",
         "Increase with delay": "none", "Decrease with delay": "none", "Detection": "not asked",

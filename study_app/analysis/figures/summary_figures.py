@@ -50,7 +50,7 @@ class Estimates(NamedTuple):
 class Numbers(NamedTuple):
     """The values of a score or a question: the name of each setting with each participant's value.
 
-    ``bounds`` are the ends of the answer scale, ``codes`` the codes of the settings.
+    ``bounds`` are the ends of the answer scale, ``codes`` and ``conditions`` those of the settings.
     """
 
     title: str
@@ -59,6 +59,7 @@ class Numbers(NamedTuple):
     by_setting: tuple[tuple[str, dict[str, float]], ...]
     id: str = ""
     codes: tuple[str, ...] = ()
+    conditions: tuple[str | None, ...] = ()
 
 
 def estimates_of(result: LevelsResult) -> Estimates | None:
@@ -268,6 +269,7 @@ def _numbers_at(study: Study, where: str) -> list[Numbers]:
                     is_score=bool(scores),
                     by_setting=tuple(by_setting),
                     codes=codes,
+                    conditions=tuple(setting.condition for setting in place.settings),
                 )
             )
     return numbers

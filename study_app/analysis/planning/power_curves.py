@@ -18,7 +18,7 @@ from matplotlib.ticker import MaxNLocator, PercentFormatter
 
 from study_app import __version__
 from study_app import figure_style as style
-from study_app.analysis.contrasts import equality_limits, inclusion_words
+from study_app.analysis.contrasts import inclusion_words, largest_difference
 from study_app.analysis.data.blocks import TRENDS
 from study_app.analysis.data.measures import Array
 from study_app.analysis.page_layout import SMALL, Style
@@ -34,7 +34,7 @@ from study_app.analysis.planning.simulated_studies import (
     contrast_sides,
     draw_opinions,
 )
-from study_app.analysis.planning.smallest_differences import form_differences, size_text, smallest_differences
+from study_app.analysis.planning.smallest_differences import question_differences, size_text, smallest_differences
 from study_app.analysis.results import min_sample_reason
 from study_app.analysis.statistics.equivalence import STEPS
 from study_app.analysis.wording import bound_text, listed, whole_percent
@@ -514,13 +514,13 @@ def _untested_contrasts(power: Powers) -> Iterator[str]:
         yield from smallest_differences(
             contrast, power.sizes, plan.decided.alphas[-1], len(plan.contrasts) + plan.untested, rows, "statement",
             description, "±{:.2f}".format, shares, contrast.bound, bounds=_count_bounds(plan),
-            largest=equality_limits(contrast, 1.0, ratio=False)[1], planned=plan.participants, unit=" points",
+            largest=largest_difference(contrast), planned=plan.participants, unit=" points",
             titles=titles,
         )  # fmt: skip
-    for contrast, of_groups in plan.of_forms:
+    for contrast, of_groups in plan.of_questions:
         members = len(plan.contrasts) + plan.untested
         alpha, planned = plan.decided.alphas[-1], plan.participants
-        yield from form_differences(contrast, power.sizes, alpha, members, of_groups, planned, titles)
+        yield from question_differences(contrast, power.sizes, alpha, members, of_groups, planned, titles)
 
 
 def _count_bounds(plan: Plan) -> int:

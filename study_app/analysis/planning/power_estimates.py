@@ -7,7 +7,12 @@ from typing import TYPE_CHECKING, TypeAlias
 
 from study_app.analysis.planning import MOST_PARTICIPANTS, SIZES, STUDIES, THRESHOLD_STUDIES
 from study_app.analysis.planning.power_curves import Powers, power_markdown, powers
-from study_app.analysis.planning.simulated_studies import ConditionFeatures, compares_statements, plan
+from study_app.analysis.planning.simulated_studies import (
+    ConditionFeatures,
+    compares_statements,
+    plan,
+    question_contrasts,
+)
 from study_app.analysis.planning.simulated_studies import sweep as sweep_statements
 from study_app.analysis.planning.threshold_studies import Precisions, plans, threshold_markdown
 from study_app.analysis.planning.threshold_studies import sweep as sweep_thresholds
@@ -41,7 +46,8 @@ def estimate_power(
 ) -> Iterator[PowerEstimate]:
     """Yield the estimate after every batch of simulated studies; the last one is complete.
 
-    ``rehearse`` returns the features of rehearsed trials of each condition, if the study compares statements.
+    ``rehearse`` returns the features of rehearsed trials of each condition, if the study compares statements. A study
+    that compares only answers that are not simulated has a single estimate, without simulated studies.
 
     Raises
     ------
@@ -54,6 +60,9 @@ def estimate_power(
         progress("simulating observers")
         for done, found in sweep_thresholds(thresholds, sizes, asked, seed, executor):
             yield Precisions(protocol=study, sizes=sizes, studies=done, asked=asked, seed=seed, found=found)
+        return
+    if question_contrasts(study) and not compares_statements(study):
+        yield Precisions(protocol=study, sizes=sizes, studies=0, asked=0, seed=seed, found={})
         return
     asked = studies or STUDIES
     progress("simulating all conditions")

@@ -10,12 +10,12 @@ from typing import Final
 from pydantic import TypeAdapter
 
 from study_app import __version__, number_text
-from study_app.analysis.contrasts import RATIOS, equality_limits, inclusion_words, t_test_name
+from study_app.analysis.contrasts import RATIOS, inclusion_words, largest_difference, t_test_name
 from study_app.analysis.data.blocks import SPENDINGS, TRENDS, Decided, decisions
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.html_page import bullets, heading, paragraph
 from study_app.analysis.levels.thresholds import FAMILIES, REMOVED
-from study_app.analysis.planning.simulated_studies import compares_statements
+from study_app.analysis.planning.simulated_studies import compares_statements, question_contrasts
 from study_app.analysis.results import min_sample
 from study_app.analysis.statistics.equivalence import fewest_participants
 from study_app.analysis.statistics.outcome import FEW
@@ -113,17 +113,19 @@ def _form_title(protocol: Protocol, form: str) -> str:
 
 def _measure_words(protocol: Protocol, contrast: Contrast, language: str) -> str:
     """Return a phrase on the measure with the short text of its statement or question; "" without such a text."""
-    if contrast.form is not None and contrast.measure in protocol.forms[contrast.form].scores:
-        return f"{contrast.measure} score of {_form_title(protocol, contrast.form)}"
     questionnaire = (
         protocol.questionnaire_of(contrast.blocks[0]) if contrast.form is None else protocol.forms[contrast.form]
     )
+    if questionnaire is not None and contrast.measure in questionnaire.scores:
+        of_form = "" if contrast.form is None else f" of {_form_title(protocol, contrast.form)}"
+        return f"{contrast.measure} score{of_form}"
     item = next((item for item in (questionnaire.items if questionnaire else ()) if item.id == contrast.measure), None)
     if item is None:
         return ""
     short = f"“{protocol.text(item.short, language)}”"
-    agreement = f"agreement with {short}"
-    return agreement if contrast.form is None else f"{short} in {_form_title(protocol, contrast.form)}"
+    if contrast.form is not None:
+        return f"{short} in {_form_title(protocol, contrast.form)}"
+    return f"agreement with {short}" if protocol.compares_statement(contrast) else short
 
 
 def hypotheses(protocol: Protocol, language: str) -> Iterator[str]:
@@ -165,12 +167,13 @@ def _equivalence_sentences(protocol: Protocol, contrast: Contrast) -> str:
     if contrast.bound is None or protocol.analysis is None:
         return ""
     bounds = sum(contrast.bound is not None for contrast in protocol.analysis.contrasts)
-    reach, largest = equality_limits(contrast, contrast.bound, ratio=contrast.measure in RATIOS)
+    largest = largest_difference(contrast) if protocol.compares_statement(contrast) else None
+    people = "participants in each group" if contrast.groups else "participants"
     alpha = decisions(protocol).alphas[-1] / bounds
     adjusted = "" if bounds == 1 else f", with Holm's adjustment for the {bounds} hypotheses that have a bound"
     return (
         f" We test equivalence with two one-sided t tests and a bootstrap{adjusted}. This requires at least "
-        f"{fewest_participants(alpha, reach, largest)} participants{' in each group' if contrast.groups else ''}."
+        f"{fewest_participants(alpha, contrast.bound, largest)} {people}."
     )
 
 
@@ -222,10 +225,11 @@ def _statement_lines(protocol: Protocol, block: Block, language: str) -> Iterato
             )
         return
     primary = [name for name in texts if not decided.primary or name in decided.primary]
-    yield (
-        f"Hypothesis, block {title}: agreement differs between {listed(block.conditions)} for "
-        f"{listed([f'“{texts[name]}” ({name})' for name in primary])}."
-    )
+    if primary:
+        yield (
+            f"Hypothesis, block {title}: agreement differs between {listed(block.conditions)} for "
+            f"{listed([f'“{texts[name]}” ({name})' for name in primary])}."
+        )
     labels = [
         f"“{condition.label}” for {name}" for name, condition in protocol.conditions.items() if condition.label in texts
     ]
@@ -274,19 +278,8 @@ def analyses(protocol: Protocol) -> Iterator[str]:
                 f"Block {title}: we report d′ for each participant, calculated from rates with the log-linear "
                 "correction."
             )
-    statement_blocks = [
-        block for block in protocol.main_blocks if block.design is None and block.questionnaire is not None
-    ]
-    if protocol.forms:
-        contrasts = () if protocol.analysis is None else protocol.analysis.contrasts
-        forms = listed([_form_title(protocol, form) for form in protocol.forms])
-        hypotheses = " except in the hypotheses above" * any(contrast.form is not None for contrast in contrasts)
-        yield (
-            f"We describe the answers to the questions in {forms} and do not test "
-            f"them{hypotheses}. We report the mean score of each form across participants with its 95 % confidence "
-            "interval (Student's t). If a form is not scored, we report the means of its ratings and numbers. We "
-            "count how often each option is chosen."
-        )
+    yield from _description_sentences(protocol)
+    statement_blocks = protocol.blocks_with_statements
     if not statement_blocks:
         return
     decided = decisions(protocol)
@@ -314,6 +307,30 @@ def analyses(protocol: Protocol) -> Iterator[str]:
         "method."
         if protocol.analysis is not None
         else "The protocol does not have an [analysis] table, so all results are exploratory."
+    )
+
+
+def _description_sentences(protocol: Protocol) -> Iterator[str]:
+    """Yield sentences on the description of answers to forms and to questions that are not statements."""
+    titles = [
+        _title(protocol, block.id)
+        for block in protocol.main_blocks
+        if block.design is None
+        and (asked := protocol.questionnaire_of(block.id)) is not None
+        and len(asked.statements) < len(asked.items)
+    ]
+    described = []
+    if protocol.forms:
+        described.append(f"the questions in {listed([_form_title(protocol, form) for form in protocol.forms])}")
+    if titles:
+        described.append(f"the questions other than statements in {listed([f'block {title}' for title in titles])}")
+    if not described:
+        return
+    hypotheses = " except in the hypotheses above" * bool(question_contrasts(protocol))
+    yield (
+        f"We describe the answers to {listed(described)} and do not test them{hypotheses}. We report the mean score of "
+        "each questionnaire across participants with its 95 % confidence interval (Student's t). If a questionnaire "
+        "is not scored, we report the means of its ratings and numbers. We count how often each option is chosen."
     )
 
 

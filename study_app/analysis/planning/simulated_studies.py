@@ -25,7 +25,7 @@ from study_app.analysis.statistics.mean_tests import means_of, p_differs, resamp
 from study_app.analysis.statistics.outcome import FEW, SIDES, doubled_ranks, false_discovery, holm, p_of_draws
 from study_app.errors import AnalysisError
 from study_app.protocol.blocks import Block, display_language
-from study_app.protocol.model import Contrast, Protocol
+from study_app.protocol.model import OF_LEVELS, Contrast, Protocol
 from study_app.protocol.participants import LAPSE_POINTS, SimulatedParticipants, compared_kinds
 from study_app.protocol.questions import POINTS, Question
 from study_app.protocol.simulated import OPINIONS, TrialFeatures, rater, simulate_ratings
@@ -67,8 +67,8 @@ class Plan:
 
     ``kinds`` are the kinds of participants whose power is computed, by name, the main kind first; ``participants`` is
     their planned number. Contrasts of statements ``between`` groups come with the share of participants in each of the
-    two groups; so do contrasts ``of_forms``, with None within participants. Of the others, ``untested_bounds`` have an
-    equivalence bound.
+    two groups; so do contrasts ``of_questions``, with None within participants. Of the others, ``untested_bounds`` have
+    an equivalence bound.
     """
 
     name: str
@@ -82,7 +82,7 @@ class Plan:
     untested: int = 0
     between: tuple[tuple[Contrast, tuple[float, float]], ...] = ()
     untested_bounds: int = 0
-    of_forms: tuple[tuple[Contrast, tuple[float, float] | None], ...] = ()
+    of_questions: tuple[tuple[Contrast, tuple[float, float] | None], ...] = ()
 
     @property
     def unknown(self) -> tuple[str, ...]:
@@ -102,9 +102,10 @@ def plan(protocol: Protocol, features: ConditionFeatures) -> Plan:
     table = None if protocol.analysis is None else protocol.analysis.model_dump(mode="json")
     contrasts = () if protocol.analysis is None else protocol.analysis.contrasts
     items = {block.id: {item.id for item in _statements(protocol, block)} for block in blocks}
-    of_trials = [contrast for contrast in contrasts if contrast.form is None]
     stated = [
-        contrast for contrast in of_trials if all(contrast.measure in items.get(block, ()) for block in contrast.blocks)
+        contrast
+        for contrast in contrasts
+        if contrast.form is None and all(contrast.measure in items.get(block, ()) for block in contrast.blocks)
     ]
     within = tuple(contrast for contrast in stated if contrast.groups is None)
     return Plan(
@@ -121,9 +122,7 @@ def plan(protocol: Protocol, features: ConditionFeatures) -> Plan:
             (contrast, shares) for contrast in stated if (shares := group_shares(protocol, contrast)) is not None
         ),
         untested_bounds=sum(contrast.bound is not None for contrast in contrasts if contrast not in within),
-        of_forms=tuple(
-            (contrast, group_shares(protocol, contrast)) for contrast in contrasts if contrast.form is not None
-        ),
+        of_questions=tuple((contrast, group_shares(protocol, contrast)) for contrast in question_contrasts(protocol)),
     )
 
 
@@ -134,6 +133,15 @@ def group_shares(protocol: Protocol, contrast: Contrast) -> tuple[float, float] 
     whole = sum(group.share for group in protocol.groups.values())
     first, second = (protocol.groups[name].share / whole for name in contrast.groups)
     return first, second
+
+
+def question_contrasts(protocol: Protocol) -> tuple[Contrast, ...]:
+    """Return the contrasts of answers and scores, except of statements after trials; the others are simulated."""
+    return tuple(
+        contrast
+        for contrast in (() if protocol.analysis is None else protocol.analysis.contrasts)
+        if contrast.measure not in OF_LEVELS and not protocol.compares_statement(contrast)
+    )
 
 
 def compares_statements(protocol: Protocol) -> bool:

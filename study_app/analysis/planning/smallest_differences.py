@@ -18,7 +18,7 @@ MOST_SD: Final = 3.0
 """The largest detectable difference [SD] that is reported; sample sizes that need a larger one are too few. [choice]"""
 
 
-def form_differences(
+def question_differences(
     contrast: Contrast,
     sizes: Sequence[int],
     alpha: float,
@@ -27,13 +27,13 @@ def form_differences(
     planned: int | None,
     titles: Mapping[str, str],
 ) -> Iterator[str]:
-    """Yield the table of a contrast of a form, in standard deviations because answers to forms are not simulated.
+    """Yield the table of a contrast of answers or scores that are not simulated, in standard deviations.
 
     For the parameters see `smallest_differences`.
     """
     values_noun = "answers or scores" if contrast.within is None else "within-participant differences"
     description = (
-        "Answers to this form are not simulated. Differences are expressed in standard deviations (SD) of the "
+        "Answers to this question are not simulated. Differences are expressed in standard deviations (SD) of the "
         f"{values_noun}; you can obtain the SD from pilot sessions or published data."
     )
     rows = [(contrast.measure, "1", 1.0)]
@@ -49,6 +49,7 @@ def form_differences(
         shares,
         planned=planned,
         titles=titles,
+        measure="" if contrast.form is not None else f"“{contrast.measure}”",
     )
 
 
@@ -77,6 +78,7 @@ def smallest_differences(
     assumed: tuple[str, float] | None = None,
     unit: str = "",
     titles: Mapping[str, str],
+    measure: str = "",
 ) -> Iterator[str]:
     """Yield a Markdown table of the smallest difference in a contrast that 80 % of studies detect.
 
@@ -86,7 +88,8 @@ def smallest_differences(
     within participants. ``bound`` is the equivalence bound on the scale of the standard deviation, and ``bounds`` the
     number of hypotheses with a bound; ``largest`` is the largest difference of a participant that the scale permits,
     None without a limit. A verdict on ``planned`` participants precedes the table. ``assumed`` is a measure that can
-    fall to 0, with its simulated mean; ``unit`` follows the difference in the verdict; ``titles`` are block titles.
+    fall to 0, with its simulated mean; ``unit`` follows the difference in the verdict; ``titles`` are block titles;
+    ``measure`` is the measure in words, if the contrast cannot tell.
     """
 
     def with_titles(names: tuple[str, str] | None) -> tuple[str, str] | None:
@@ -112,7 +115,7 @@ def smallest_differences(
     sides, strictest = "two-sided" if contrast.expected is None else "one-sided", alpha / members
     corrected = "" if members == 1 else f" ({alpha:.2g} divided by {members} hypotheses)"
     groups_note = "" if shares is None else f" {_group_sizes(*shares)}"
-    hypothesis = contrast.described(with_titles(contrast.compared), with_titles(contrast.within))
+    hypothesis = contrast.described(with_titles(contrast.compared), with_titles(contrast.within), measure)
     yield from ("", f"## Contrast: {hypothesis}", "")
     test_note = f"{sides}, α = {strictest:.2g}{corrected}"
     equivalence_note = (

@@ -17,8 +17,8 @@ from study_app import __version__
 from study_app.analysis.data.blocks import decisions
 from study_app.analysis.data.measures import Array
 from study_app.analysis.planning.power_curves import OF_BLOCK, OF_STUDIES, interval
-from study_app.analysis.planning.simulated_studies import group_shares
-from study_app.analysis.planning.smallest_differences import form_differences, size_text, smallest_differences
+from study_app.analysis.planning.simulated_studies import group_shares, question_contrasts
+from study_app.analysis.planning.smallest_differences import question_differences, size_text, smallest_differences
 from study_app.analysis.statistics.outcome import student_interval
 from study_app.analysis.statistics.thresholds import FEWEST, group_mean
 from study_app.analysis.wording import whole_percent
@@ -324,13 +324,14 @@ def threshold_markdown(precisions: Precisions) -> str:
     """Return a table for each block, with its assumptions."""
     study, precision = precisions.protocol.study, precisions.precision
     language = display_language({"study": {"languages": study.languages}})
-    lines = [
-        f"# {PRECISION} for {text_in(study.title, language)} ({study.name} {study.version})",
-        "",
-        f"**SIMULATED.** Each row summarises {precisions.studies} studies (seed {precisions.seed}, liquid-study "
-        f"{__version__}). True values differ between people by a factor of {BETWEEN_PEOPLE:g} (one standard "
-        "deviation). Estimates are computed as in the report.",
-    ]
+    lines = [f"# {PRECISION} for {text_in(study.title, language)} ({study.name} {study.version})"]
+    if precisions.found:
+        lines += [
+            "",
+            f"**SIMULATED.** Each row summarises {precisions.studies} studies (seed {precisions.seed}, liquid-study "
+            f"{__version__}). True values differ between people by a factor of {BETWEEN_PEOPLE:g} (one standard "
+            "deviation). Estimates are computed as in the report.",
+        ]
     if precisions.studies < precisions.asked:
         lines += ["", f"**Preliminary: {precisions.studies} of {precisions.asked} studies were simulated.**"]
     participants = None if precisions.protocol.analysis is None else precisions.protocol.analysis.participants
@@ -403,10 +404,11 @@ def _contrast_tables(precisions: Precisions) -> Iterator[str]:
         return
     planned, titles = plans(precisions.protocol, ()), _titles_by_block(precisions.protocol)
     alpha, members = decisions(precisions.protocol).alphas[-1], len(decided.contrasts)
+    of_questions = question_contrasts(precisions.protocol)
     for contrast in decided.contrasts:
-        if contrast.form is not None:
+        if contrast in of_questions:
             shares = group_shares(precisions.protocol, contrast)
-            yield from form_differences(
+            yield from question_differences(
                 contrast, precisions.sizes, alpha, members, shares, decided.participants, titles
             )
             continue

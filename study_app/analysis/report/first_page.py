@@ -190,16 +190,14 @@ def cards(
     ``numbers`` is the result of `numbers_of`, ``presented`` that of `presented_in`.
     """
     return (
-        *_hypothesis_cards(results, numbers, presented),
+        *_hypothesis_cards(results, presented),
         *_statement_cards(results, presented),
         *_level_cards(results, presented),
         *_question_cards(results, numbers, presented),
     )
 
 
-def _hypothesis_cards(
-    results: Results, numbers: Mapping[str, Sequence[Numbers]], presented: Mapping[str, Presented]
-) -> Iterator[Card]:
+def _hypothesis_cards(results: Results, presented: Mapping[str, Presented]) -> Iterator[Card]:
     introduced: set[str] = set()
     for place, contrast in enumerate(results.contrasts, start=1):
         blocks = contrast.contrast.blocks
@@ -212,7 +210,7 @@ def _hypothesis_cards(
             question=f"{lead}: {_question_words(contrast, presented)}",
             verdict=contrast.verdict,
             sentences=(
-                f"{answer(contrast)}{_scale_words(contrast, results, numbers)}",
+                f"{answer(contrast)}{_scale_words(contrast, results)}",
                 *_cell_words(contrast),
                 *filter(None, [" ".join(introductions)]),
             ),
@@ -239,7 +237,7 @@ def _question_words(contrast: ContrastResult, presented: Mapping[str, Presented]
     return question(replace(contrast, compared=(first, second)))
 
 
-def _scale_words(contrast: ContrastResult, results: Results, numbers: Mapping[str, Sequence[Numbers]]) -> str:
+def _scale_words(contrast: ContrastResult, results: Results) -> str:
     """Return a sentence on the unit or scale of the compared values, with a leading space; "" if there is none."""
     hypothesis = contrast.contrast
     levels = [level for level in results.levels if level.block in hypothesis.blocks]
@@ -254,10 +252,7 @@ def _scale_words(contrast: ContrastResult, results: Results, numbers: Mapping[st
         return f" Values are in {level.unit}." if level.unit else ""
     if level is not None and hypothesis.measure == "d_prime":
         return " At chance, d′ is 0."
-    bounds = [scale.bounds for scale in numbers.get(hypothesis.form or "", ()) if scale.id == hypothesis.measure]
-    if bounds and bounds[0] is not None:
-        return " The scale ranges from {:g} to {:g}.".format(*bounds[0])
-    return ""
+    return "" if contrast.scale is None else " The scale ranges from {:g} to {:g}.".format(*contrast.scale)
 
 
 def _cell_words(contrast: ContrastResult) -> Iterator[str]:
@@ -399,21 +394,23 @@ def _question_cards(
 
 
 def _is_in_hypotheses(numbers: Numbers, where: str, results: Results) -> bool:
-    """Return whether hypotheses show the values of a form after all blocks and for all its participants."""
+    """Return whether hypotheses show the values of a form after all blocks, or in all conditions, of all people."""
     shown = [
         contrast
         for contrast in results.contrasts
-        if (contrast.contrast.form, contrast.contrast.measure) == (where, numbers.id)
+        if contrast.contrast.measure == numbers.id
+        and where in ((contrast.contrast.form,) if contrast.contrast.form else contrast.contrast.blocks)
         and any(side.values for side in contrast.sides)
     ]
-    blocks = {block for contrast in shown for block in contrast.contrast.blocks}
+    settings = {name for contrast in shown for name in contrast.contrast.conditions or contrast.contrast.blocks}
     people = {
         person
         for contrast in shown
         for person in (*contrast.left_out, *(person for side in contrast.sides for person in side.values))
     }
     participants = {person for _, values in numbers.by_setting for person in values}
-    return bool(shown) and blocks >= {*numbers.codes} and people >= participants
+    has_all_settings = settings >= {*numbers.conditions} or (where in settings and len(numbers.conditions) == 1)
+    return bool(shown) and has_all_settings and people >= participants
 
 
 def _number_words(numbers: Numbers, presented: Mapping[str, Presented] = _NOT_PRESENTED) -> str:

@@ -9,7 +9,7 @@ from typing import Any, Final, NamedTuple
 
 import pandas as pd
 
-from study_app.analysis.contrasts import answer, equality_limits, question
+from study_app.analysis.contrasts import answer, question
 from study_app.analysis.data.measures import LEVELS, number_or_none
 from study_app.analysis.data.motion import (
     OF_REACHES,
@@ -159,9 +159,10 @@ def _general_sentences(study: Study, results: Results) -> Iterator[str]:
             "Participants were not assigned to groups at random, so a difference between groups may have other causes."
         )
     if results.questions and not (results.blocks or results.levels):
+        lead = "Apart from the hypotheses, the answers" if hypotheses else "The answers"
         yield (
-            "The answers to these questions are summarised but not tested. The intervals are not corrected for the "
-            "number of questions, so if there are many questions, some differences are to be expected by chance."
+            f"{lead} to these questions are summarised but not tested. The intervals are not corrected for the number "
+            "of questions, so if there are many questions, some differences are to be expected by chance."
         )
     if study.contents > len(study.versions):
         yield (
@@ -222,7 +223,7 @@ def _low_power_sentences(results: Results) -> Iterator[str]:
             _, smallest = detectable_difference(*groups, alpha=alpha, expected=result.contrast.expected)
         lead = f"Hypothesis{f' {place}' if len(results.contrasts) > 1 else ''}"
         people, power = counted(result.n, "participant"), f"{100 * WANTED:.0f} % power"
-        largest = equality_limits(result.contrast, 1.0, ratio=False)[1] or math.inf
+        largest = result.largest or math.inf
         beyond = f"a difference of {MOST_SD:g} SD" if smallest > MOST_SD else "the largest difference on the scale"
         smallest *= sd
         if smallest > min(MOST_SD * sd, largest):

@@ -504,11 +504,7 @@ def _comparable_items(study: Study) -> Iterator[Compared]:
         if "design" in block:
             measures = _measures_of_design(study, name)
         else:
-            question_entries = entries(document, f"questionnaires.{block.get('questionnaire')}.items.*")
-            items = (
-                (item, path) for path, item in question_entries if isinstance(item, Mapping) and "kind" not in item
-            )
-            measures = tuple((str(item.get("id")), title_of(document, path)) for item, path in items)
+            measures = tuple(_measures_of_questions(study, str(block.get("questionnaire"))))
         if not measures:
             continue
         yield Compared(key="blocks", block=name, name=name, label=title, measures=measures)
@@ -517,6 +513,18 @@ def _comparable_items(study: Study) -> Iterator[Compared]:
             for condition in listed if isinstance(listed, tuple | list) else ():
                 label = f"{distinct_title(document, (key, str(condition)))} in {title}"
                 yield Compared(key=key, block=name, name=str(condition), label=label, measures=measures)
+
+
+def _measures_of_questions(study: Study, questionnaire: str) -> Iterator[tuple[str, str]]:
+    """Yield the numeric questions and the scores of a questionnaire, as ID and label."""
+    document = study.document
+    for path, item in entries(document, f"questionnaires.{questionnaire}.items.*"):
+        if isinstance(item, Mapping):
+            kind = questions.KINDS.get(str(item.get("kind", questions.STATEMENT)))
+            if kind is not None and kind.value_type != "text":
+                yield str(item.get("id")), title_of(document, path)
+    for path, _ in entries(document, f"questionnaires.{questionnaire}.scores.*"):
+        yield str(path[-1]), f"{capitalised(str(path[-1]))} score"
 
 
 def _form_measures(study: Study) -> dict[str, tuple[tuple[str, str], ...]]:

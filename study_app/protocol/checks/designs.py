@@ -12,7 +12,7 @@ from typing import Any, Final
 from study_app.errors import StudyError
 from study_app.haptics.model.overrides import number_names, override_value
 from study_app.protocol.blocks import Block
-from study_app.protocol.model import OF_LEVELS, RULES, Contrast, Protocol, Published
+from study_app.protocol.model import RULES, Contrast, Protocol, Published
 from study_app.protocol.orders.block_orders import order_of
 from study_app.protocol.orders.tracks import tracks_of
 from study_app.protocol.quantities import can_vary
@@ -190,6 +190,7 @@ def _check_published(protocol: Protocol, published: Published, place: Path) -> I
 def _check_contrast(protocol: Protocol, contrast: Contrast, place: Path) -> Iterator[Fault]:
     """Check that the blocks of a contrast have its measure and its conditions, and that its bound can be reached."""
     yield from _check_bound(protocol, contrast, place)
+    yield from _check_scales(protocol, contrast, place)
     for name in contrast.blocks:
         block, questionnaire = protocol.blocks[name], protocol.questionnaire_of(name)
         if block.phase != "main":
@@ -198,15 +199,14 @@ def _check_contrast(protocol: Protocol, contrast: Contrast, place: Path) -> Iter
         if contrast.form is not None:
             yield from _check_form(protocol, contrast, contrast.form, name, place)
             continue
-        items = [item.id for item in questionnaire.statements] if questionnaire is not None else []
-        known = items if block.design is None else protocol.measures_of(block)
+        measures = () if questionnaire is None else questionnaire.numeric_measures
+        known = measures if block.design is None else protocol.measures_of(block)
         kinds = {} if questionnaire is None else {item.id: item.kind_id for item in questionnaire.items}
         if contrast.measure not in known and contrast.measure in kinds:
             yield Fault(
                 (*place, "measure"),
-                f"{contrast.measure} is a {kinds[contrast.measure]}, but a hypothesis about answers after trials needs "
-                "a statement",
-                "choose a statement, or test the exported answers yourself",
+                f"{contrast.measure} is a {kinds[contrast.measure]}, but hypotheses compare numbers",
+                "choose a statement, rating, slider, number or score",
             )
         elif contrast.measure not in known:
             yield unknown_name(
@@ -233,9 +233,23 @@ def _check_bound(protocol: Protocol, contrast: Contrast, place: Path) -> Iterato
         ratio = f"{1 / bound:.3g}" if bound < 1 else "1.25"
         yield Fault(path, f"is {bound:g}, but the bound of a ratio must be greater than 1", f"for example {ratio}")
     largest = (POINTS - 1) * (2 if contrast.is_interaction else 1)
-    if contrast.form is None and contrast.measure not in OF_LEVELS and bound > largest:
+    if protocol.compares_statement(contrast) and bound > largest:
         message = f"is {bound:g}, but differences on seven points are at most {largest}"
         yield Fault(path, message, "choose the largest difference that you consider negligible")
+
+
+def _check_scales(protocol: Protocol, contrast: Contrast, place: Path) -> Iterator[Fault]:
+    """Check that two blocks measure the answer to a question after trials on the same scale."""
+    questionnaires = () if contrast.form else filter(None, map(protocol.questionnaire_of, contrast.blocks))
+    scales = {
+        (item.kind_id, item.bounds(asked.context(protocol.scales, protocol.study.languages[0])))
+        for asked in questionnaires
+        for item in asked.items
+        if item.id == contrast.measure
+    }
+    if len(scales) > 1:
+        message = f"the two blocks measure {contrast.measure} on different scales"
+        yield Fault((*place, "measure"), message, "use the same questionnaire in both blocks")
 
 
 def _check_form(protocol: Protocol, contrast: Contrast, form: str, block: str, place: Path) -> Iterator[Fault]:
@@ -243,7 +257,7 @@ def _check_form(protocol: Protocol, contrast: Contrast, form: str, block: str, p
     if block not in protocol.blocks_followed_by(form):
         yield Fault((*place, "form"), f"{form} does not always follow {block}", f"add it after {block} in the sequence")
     questionnaire = protocol.questionnaires[form]
-    known = [*(item.id for item in questionnaire.items if item.value_type != "text"), *questionnaire.scores]
+    known = questionnaire.numeric_measures
     if contrast.measure not in known:
         message = f'"{form}" does not have a numeric question or score {contrast.measure}'
         yield unknown_name((*place, "measure"), message, contrast.measure, known)

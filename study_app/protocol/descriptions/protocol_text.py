@@ -57,9 +57,15 @@ def describe(protocol: Protocol, delay_ticks: int = ASSUMED_TICKS, without_force
         recognised = [
             f"{name} by {condition.label}" for name, condition in protocol.conditions.items() if condition.label
         ]
-        statements = any(block.design is None and block.questionnaire is not None for block in protocol.main_blocks)
         units = {block.id: protocol.stimulus_of(block).unit for block in protocol.main_blocks if block.stimulus}
-        decision_rows = list(protocol.analysis.described(recognised, units=units, statements=statements))
+        decision_rows = list(
+            protocol.analysis.described(
+                recognised,
+                units=units,
+                statements=bool(protocol.blocks_with_statements),
+                measure_words=protocol.measure_words,
+            )
+        )
     people = protocol.simulated_participants
     sections = (
         _head_lines(protocol, language),

@@ -243,7 +243,8 @@ def test_scores_and_numeric_answers_have_their_scale_and_the_order_of_the_hypoth
     of_l1, of_l2 = ("Name L1", {"P000": 3.0}), ("Name L2", {"P001": 6.5})
     age = Numbers("Age", (1, 7), False, (("", {"P000": 3.0, "P001": 6.5}),), "age", ())
     numbers = numbers_of(made)
-    assert numbers == {"load": [Numbers("Raw", (0.0, 100.0), True, (of_l1, of_l2), "raw", ("L1", "L2"))], "end": [age]}
+    raw = Numbers("Raw", (0.0, 100.0), True, (of_l1, of_l2), "raw", ("L1", "L2"), ("cL1", "cL2"))
+    assert numbers == {"load": [raw], "end": [age]}
     reverse: Any = (SimpleNamespace(within=("cL2", "cL1")),)
     (score_of_hypothesis,) = numbers_of(replace(made, contrasts=reverse))["load"]
     assert (score_of_hypothesis.by_setting, score_of_hypothesis.codes) == ((of_l2, of_l1), ("L2", "L1"))

@@ -81,7 +81,7 @@ def test_each_hypothesis_has_its_number_figure_and_the_blocks_that_no_earlier_on
     monkeypatch.setattr(pages, "answer", lambda contrast: f"{contrast.verdict}!")
     monkeypatch.setattr(pages, "_scale_words", lambda contrast, *_: f" In {contrast.contrast.blocks[0]}.")
     monkeypatch.setattr(pages, "_cell_words", lambda contrast: [f"Cells {contrast.contrast.blocks[1]}."])
-    cards = list(pages._hypothesis_cards(results_of(contrasts=contrasts), {}, IN))
+    cards = list(pages._hypothesis_cards(results_of(contrasts=contrasts), IN))
     assert [(card.question, card.verdict, card.sentences, card.block, card.figures) for card in cards] == [
         ("Hypothesis 1: suggested?", "suggested", ("suggested! In a.", "Cells b.", "In a, oil. In b, oil."), "a",
          ("hypothesis-1",)),
@@ -89,7 +89,7 @@ def test_each_hypothesis_has_its_number_figure_and_the_blocks_that_no_earlier_on
          ("hypothesis-2",)),
         ("Hypothesis 3: shown?", "shown", ("shown! In c.", "Cells x."), "c", ("hypothesis-3",)),
     ]  # fmt: skip
-    cards = list(pages._hypothesis_cards(results_of(contrasts=contrasts[:1]), {}, {}))
+    cards = list(pages._hypothesis_cards(results_of(contrasts=contrasts[:1]), {}))
     assert [(card.question, card.sentences) for card in cards] == [
         ("Hypothesis: suggested?", ("suggested! In a.", "Cells b."))
     ]
@@ -118,34 +118,32 @@ def test_a_hypothesis_says_which_delays_set_its_sides_apart(
 
 
 @pytest.mark.parametrize(
-    ("stated", "kind", "sentence"),
+    ("stated", "kind", "scale", "sentence"),
     [
-        (THRESHOLD, "value", " Values are in N·s/m."),
-        ({"measure": "pse", "blocks": ("a", "b")}, "difference", " Values are in N·s/m."),
-        ({"measure": "d_prime", "blocks": ("a", "b")}, "weber", " At chance, d′ is 0."),
-        ({"measure": "exponent", "blocks": ("a", "b")}, "weber", ""),
-        ({"measure": "threshold", "blocks": ("x", "y")}, "value", ""),
-        ({"measure": "raw", "form": "load", "blocks": ("x", "y")}, "value", " The scale ranges from 0 to 100."),
-        ({"measure": "sure", "form": "load", "blocks": ("x", "y")}, "value", " The scale ranges from 2 to 9."),
-        ({"measure": "age", "form": "load", "blocks": ("x", "y")}, "value", ""),
-        ({"measure": "raw", "form": "end", "blocks": ("x", "y")}, "value", " The scale ranges from -5 to 5."),
+        (THRESHOLD, "value", None, " Values are in N·s/m."),
+        ({"measure": "pse", "blocks": ("a", "b")}, "difference", None, " Values are in N·s/m."),
+        ({"measure": "d_prime", "blocks": ("a", "b")}, "weber", None, " At chance, d′ is 0."),
+        ({"measure": "exponent", "blocks": ("a", "b")}, "weber", None, ""),
+        ({"measure": "threshold", "blocks": ("x", "y")}, "value", None, ""),
+        (
+            {"measure": "raw", "form": "load", "blocks": ("x", "y")},
+            "value",
+            (0, 100),
+            " The scale ranges from 0 to 100.",
+        ),
+        ({"measure": "age", "form": "load", "blocks": ("x", "y")}, "value", None, ""),
+        ({"measure": "raw", "blocks": ("x", "y")}, "value", (-5.0, 5.5), " The scale ranges from -5 to 5.5."),
     ],
 )
 def test_the_unit_or_scale_of_a_hypothesis_is_that_of_its_measure(
-    stated: dict[str, Any], kind: str, sentence: str
+    stated: dict[str, Any], kind: str, scale: tuple[float, float] | None, sentence: str
 ) -> None:
     levels = [
         SimpleNamespace(block=name, level_kind=of_kind, unit=unit, guess_rate=0.5, counts="correct")
         for name, of_kind, unit in (("z", "value", "mm"), ("b", kind, "N·s/m"), ("a", kind, "N·s/m"))
     ]
-    scales: dict[str, list[Numbers]] = {
-        "load": [
-            Numbers("Raw", (0.0, 100.0), True, (), "raw"), Numbers("Sure", (2.0, 9.0), False, (), "sure"),
-            Numbers("Age", None, False, (), "age"),
-        ],
-        "end": [Numbers("Raw", (-5.0, 5.0), True, (), "raw")],
-    }  # fmt: skip
-    assert pages._scale_words(hypothesis(**stated), results_of(levels=levels), scales) == sentence
+    tested = replace(hypothesis(**stated), scale=scale)
+    assert pages._scale_words(tested, results_of(levels=levels)) == sentence
 
 
 def test_each_group_has_its_own_means_of_an_interaction() -> None:
@@ -302,10 +300,10 @@ def test_values_of_a_form_are_shown_by_a_hypothesis_with_all_participants(
 ) -> None:
     """P3 has a value after one block only, so the hypothesis names P3 or does not know of this participant."""
     values = {"P1": 1.0, "P2": 2.0}
-    contrast = SimpleNamespace(form=form, measure=measure, blocks=("a", "b"))
+    contrast = SimpleNamespace(form=form, measure=measure, blocks=("a", "b"), conditions=None)
     given = SimpleNamespace(contrast=contrast, left_out=left_out, sides=[SimpleNamespace(values=values)] * 2)
     by_setting = (("After a", {**values, "P3": 3.0}), ("After b", values))
-    raw = Numbers("Raw", (0.0, 100.0), True, by_setting, "raw", ("a", "b"))
+    raw = Numbers("Raw", (0.0, 100.0), True, by_setting, "raw", ("a", "b"), ("a", "b"))
     assert pages._is_in_hypotheses(raw, "load", results_of(contrasts=[given])) is is_shown
 
 

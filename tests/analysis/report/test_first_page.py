@@ -215,9 +215,9 @@ def test_what_weber_fractions_mean_is_said_of_thresholds_and_their_criterion_if_
         SimpleNamespace(block=block, level_kind="weber", guess_rate=rate, counts="correct")
         for block, rate in zip("ab", rates, strict=True)
     ]
-    contrast: Any = SimpleNamespace(contrast=SimpleNamespace(blocks=("a", "b"), measure=measure, form=None))
+    contrast: Any = SimpleNamespace(contrast=SimpleNamespace(blocks=("a", "b"), measure=measure), scale=None)
     results: Any = SimpleNamespace(levels=levels)
-    assert pages._scale_words(contrast, results, {}) == said
+    assert pages._scale_words(contrast, results) == said
 
 
 _ASKED_AFTER = {"a": {"P1": 40.0, "P2": 50.0}, "b": {"P1": 20.0, "P2": 40.0}, "c": {"P1": 10.0, "P2": 20.0}}
@@ -226,12 +226,12 @@ _ASKED_AFTER = {"a": {"P1": 40.0, "P2": 50.0}, "b": {"P1": 20.0, "P2": 40.0}, "c
 @pytest.mark.parametrize(("blocks", "people", "n"), [("ab", 2, 0), ("abc", 2, 1), ("ab", 1, 1)])
 def test_a_form_has_a_card_only_if_it_says_more_than_a_hypothesis(blocks: str, people: int, n: int) -> None:
     held = [dict(list(_ASKED_AFTER[block].items())[:people]) for block in "ab"]
-    of_form = SimpleNamespace(form="load", measure="raw", blocks=("a", "b"))
+    of_form = SimpleNamespace(form="load", measure="raw", blocks=("a", "b"), conditions=None)
     tested = SimpleNamespace(contrast=of_form, left_out={}, sides=[SimpleNamespace(values=values) for values in held])
     asked = SimpleNamespace(where="load", title="Load", is_form=True, item="i", n=2, measure="quartiles", groups=())
     results: Any = SimpleNamespace(questions=[asked], levels=[], blocks=[], scores=[asked], contrasts=[tested])
     by_setting = tuple((f"After {block}", _ASKED_AFTER[block]) for block in blocks)
-    raw = Numbers("raw", (0.0, 100.0), True, by_setting, "raw", tuple(blocks))
+    raw = Numbers("raw", (0.0, 100.0), True, by_setting, "raw", tuple(blocks), tuple(blocks))
     presented = {block: Presented("", {"": of}) for block, of in zip("ab", _OF_DELAYS, strict=True)}
     made = list(pages._question_cards(results, {"load": [raw]}, presented))
     assert len(made) == n

@@ -304,7 +304,7 @@ def hypotheses() -> Iterator[str]:
     def hypothesis(measure: str, sides: tuple[Any, ...], **changes: Any) -> Any:
         contrast = SimpleNamespace(measure=measure, groups=None, expected=None, is_interaction=False, blocks=("b",))
         given = {"p_adjusted": 0.3, "verdict": "inconclusive", "members": 2, "n": 12, "sd": 1.5, "ratio": False}
-        given["standard_error"] = None
+        given |= {"standard_error": None, "largest": 6.0}
         of_contrast = {name: changes.pop(name) for name in ("groups", "expected") if name in changes}
         return SimpleNamespace(
             contrast=SimpleNamespace(**(vars(contrast) | of_contrast)), sides=sides, **(given | changes)
@@ -318,10 +318,8 @@ def hypotheses() -> Iterator[str]:
         [hypothesis("d_prime", groups, verdict="equivalent")],
         [hypothesis("item", (side("a", 0, 1, 3, 5.0), side("b", 0, 1, 3, 5.0)), sd=40.0)],
     ):
-        with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(sections, "equality_limits", lambda *_values, **_kinds: (None, 6.0))
-            yield from sections._low_power_sentences(results(LIQUIDS, contrasts=rows))
-            yield from sections._chance_level_sentences(results(LIQUIDS, contrasts=rows))
+        yield from sections._low_power_sentences(results(LIQUIDS, contrasts=rows))
+        yield from sections._chance_level_sentences(results(LIQUIDS, contrasts=rows))
     trials = LIQUIDS.trials.assign(worst_gap_ms=[31.0, 5.0, 40.0, *[3.0] * 6], lateness_p99_ms=[9.0, *[1.0] * 8])
     kept = {"worst_gap_ms": 20.0, "lateness_ms": 2.0}
     yield sections._violated_limits_sentence(replace(LIQUIDS, trials=trials), kept)

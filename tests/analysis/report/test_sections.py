@@ -24,6 +24,7 @@ from study_app.analysis.results import (
     QuestionResult,
     ScoreResult,
 )
+from study_app.protocol.model import OF_LEVELS
 from study_app.store.exclusions import Exclusion
 from tests.analysis.made_up import DECIDED, delays, everybody, liquids, study
 from tests.golden_values import page_lines
@@ -115,10 +116,10 @@ def test_the_limits_are_those_of_each_block_and_each_task(monkeypatch: pytest.Mo
 def hypothesis(**changes: Any) -> Any:
     """Return a hypothesis that was not tested."""
     stated = {"groups": None, "is_interaction": False, "measure": "warm", "blocks": ("b",), "expected": None}
-    stated |= {"form": None}
     contrast = SimpleNamespace(**{name: changes.pop(name, value) for name, value in stated.items()})
     held = {"p_adjusted": None, "verdict": "not tested", "sides": (), "members": 1, "n": 12, "sd": None}
-    return SimpleNamespace(contrast=contrast, **{**held, "ratio": False, "standard_error": None, **changes})
+    held |= {"largest": None if contrast.measure in OF_LEVELS else 6.0, "ratio": False, "standard_error": None}
+    return SimpleNamespace(contrast=contrast, **{**held, **changes})
 
 
 PAIRED, BETWEEN = {}, {"groups": ("old", "new")}
@@ -142,6 +143,12 @@ LATE = Exclusion(
         ([], {}, {"questions": [1]}, []),
         ([], {}, {"questions": [1], "blocks": (), "levels": [1]}, []),
         ([], {}, {"questions": [1], "blocks": ()}, ["The answers to these questions are summarised but not tested."]),
+        (
+            [PAIRED],
+            {},
+            {"questions": [1], "blocks": ()},
+            ["Apart from the hypotheses, the answers to these questions are summarised but not tested."],
+        ),
         ([], {"hashes": "aab"}, {}, ["The study file was changed between sessions without a new version number, so 2"]),
         ([], {"hashes": "aab", "versions": "112"}, {}, []),
         ([], {"hashes": "abc", "versions": "112"}, {}, ["The study file was changed between sessions without a new"]),

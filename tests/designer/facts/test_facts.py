@@ -191,3 +191,16 @@ def test_the_form_of_an_unreadable_file_says_in_which_line_the_problem_is() -> N
     assert sentence.startswith("Line 3: ")
     assert sentence[len("Line 3: ")].isupper()
     assert (made.path, made.kind, made.unreadable) == (("study",), "Correct the text in the File tab", True)
+
+
+def test_hypotheses_compare_every_number_that_is_asked_after_trials() -> None:
+    text = (PROTOCOLS.parent / "tests" / "protocol" / "studies" / "mixed.toml").read_text(encoding="utf-8")
+    text += '[questionnaires.after.scores.both]\nitems = ["thickness", "pleasant"]\n[analysis]\ncontrasts = []\n'
+    rows = {row.path: row for row in form_of(Study(text), ("analysis",)).rows}
+    thin, thick = rows["analysis", "contrasts"].facts.items
+    assert [(item.key, item.name, item.block) for item in (thin, thick)] == [
+        ("conditions", "thin", "stir"), ("conditions", "thick", "stir"),
+    ]  # fmt: skip
+    assert thin.measures == thick.measures == (
+        ("feels_liquid", "Liquid"), ("thickness", "Thickness"), ("pleasant", "Pleasant"), ("both", "Both score"),
+    )  # fmt: skip
