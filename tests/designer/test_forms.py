@@ -337,6 +337,33 @@ def test_each_trial_design_has_its_own_picture(designer: Any) -> None:
     assert len({bytes(picture.constBits()) for picture in pictures.values()}) == len(pictures)
 
 
+def test_the_picture_of_a_design_fills_the_comparisons_and_ends_with_the_sign_of_its_reply(designer: Any) -> None:
+    designer.controller.begin_study("template:two-liquids-abx", "toldapart")
+    (block,) = (name for name, facts in designer.study.document["blocks"].items() if "design" in facts)
+    designer.go_to("blocks", block)
+    designs, ratio = designer.field("blocks", block, "design").list, 3
+    side, gap = 14 * ratio, 4 * ratio
+    letters = {designs.theme.accent: "C", designs.theme.surface: "S"}
+    signs = {}
+    for kind, intervals in {
+        "abx": "CSS", "2ifc": "SC", "3ifc": "SSC", "4ifc": "SSSC", "oddity": "CCS", "samedifferent": "CS",
+    }.items():  # fmt: skip
+        icon = next(designs.itemIcon(at) for at in range(designs.count()) if designs.itemText(at).split(" ")[0] == kind)
+        image = icon.pixmap(designs.iconSize(), ratio).toImage()
+        lefts = range(0, image.width() - side + 1, side + gap)
+        outlined = [image.pixelColor(left + ratio, side // 2).name().upper() == designs.theme.accent for left in lefts]
+        assert outlined == [at < len(intervals) for at in range(len(lefts))], kind
+        middles = [image.pixelColor(left + side // 2, side // 2) for left in lefts[: len(intervals)]]
+        assert "".join(letters[colour.name().upper()] for colour in middles) == intervals, kind
+        for left in lefts[: len(intervals)]:  # a pixel's width of the outline is smoothed
+            edge = [(left, side // 2), (left + side, side // 2), (left + side // 2, 0), (left + side // 2, side - 1)]
+            assert max(image.pixelColor(*point).alpha() for point in edge) < 64, kind
+        reply = image.copy(lefts[len(intervals)], 0, 2 * side, side)
+        signs[kind] = bytes(reply.constBits())
+    assert signs["2ifc"] == signs["3ifc"] == signs["4ifc"] == signs["abx"]
+    assert len({signs[kind] for kind in ("abx", "oddity", "samedifferent")}) == 3
+
+
 def test_help_of_two_lines_does_not_move_the_form(designer: Any) -> None:
     designer.open("kitchen", "study")
     form, heights = designer.place.form, set()
