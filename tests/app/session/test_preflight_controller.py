@@ -154,6 +154,30 @@ def test_the_most_expensive_scene_and_the_largest_errors_of_the_velocity_count(m
     assert not appraisal.read_answers()
 
 
+@pytest.mark.parametrize(
+    ("scenes", "has_delivery", "is_over"), [(1, False, False), (0, True, False), (1, True, False), (0, False, True)]
+)
+def test_an_appraisal_is_over_without_open_questions_or_without_its_process(
+    monkeypatch: Any, scenes: int, has_delivery: bool, is_over: bool
+) -> None:
+    monkeypatch.setattr(preflight_controller, "start_appraisal_worker", Answering)
+    protocol = load("demo")
+    questions = preflight_controller.study_scenes(protocol)[:scenes]
+    appraisal = Appraisal(questions, UNKNOWN, DeliveryQuestion(protocol, 2) if has_delivery else None)
+    assert appraisal.is_over is is_over
+    appraisal.close()
+    assert appraisal.is_over
+
+
+def test_the_row_of_the_force_error_is_hidden_if_its_process_ends_without_an_answer(
+    asked: Preflight, qtbot: Any
+) -> None:
+    (name,) = (row for row in asked.window.runs.findChildren(QLabel) if row.text() == "Expected force error")
+    assert not name.isHidden()
+    asked.appraisal.close()
+    qtbot.waitUntil(name.isHidden)
+
+
 def test_a_device_that_is_lost_meanwhile_is_told_once(asked: Preflight, machine: Any, qtbot: Any) -> None:
     told: list[object] = []
     asked.failed.connect(told.append)
