@@ -5,11 +5,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QPoint, QRect, Qt
 from PySide6.QtWidgets import QLabel, QScrollArea, QWidget
 
 from study_app.devices.descriptor import NONE, NOT_AVAILABLE, Backend
 from study_app.gui.preflight.window import (
+    BAR,
+    LEFT,
+    NAME,
     ComputerWindow,
     PreflightWindow,
     _compiled_check,
@@ -22,6 +25,7 @@ from study_app.gui.widgets.cards import Bar
 from study_app.protocol.load import load
 from study_app.protocol.orders.schedule import build_schedule
 from study_app.session.preflight import Check, Masking
+from tests.gui.walk import settle
 from tests.gui.windows import SCALED, WELL, checked, preflight
 from tests.journal_lines import event_from
 
@@ -124,6 +128,26 @@ def test_a_row_states_a_check_and_stays_until_a_check_changes(window):
     window.show_view(replace(checked(WELL), checks=CHECKS[1:]))
     assert [row.check for row in window.rows] == list(CHECKS[1:])
     assert [*map(window.checks.column.indexOf, (*window.rows, *rows))] == [0, 1, -1, -1, -1]
+
+
+def test_rows_are_aligned_with_and_without_advice_or_a_bar(window):
+    wrapped = replace(CHECKS[0], name="Priority", about="of a screen that is described at length " * 20, share=None)
+    window.show_view(replace(checked(WELL), checks=(*CHECKS, wrapped)))
+    settle(window)
+    spaces_below = []
+    for row in window.rows:
+        check = row.check
+        places = {part.text(): QRect(part.mapTo(row, QPoint()), part.size()) for part in row.findChildren(QLabel)}
+        name, value, about = places[check.name], places[check.value], places[check.about]
+        assert (name.left(), row.width() - value.left() - value.width()) == (LEFT, 24), check.name
+        assert (name.width(), about.left()) == (NAME, LEFT + NAME + 14), check.name
+        if check.advice:
+            assert places[check.advice].left() == LEFT, check.name
+        for bar in row.findChildren(Bar):
+            assert (bar.mapTo(row, QPoint()).x(), bar.width()) == (about.left(), BAR)
+        spaces_below.append(row.height() - max(place.top() + place.height() for place in places.values()))
+    assert spaces_below[1:] == [14, 14, 4]
+    assert about.top() == 4
 
 
 def test_a_row_about_the_session_is_hidden_while_it_is_not_known(window):
