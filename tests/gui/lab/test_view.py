@@ -110,3 +110,39 @@ def test_escape_and_leaving_give_the_pointer_back(place: Any, still: LabView) ->
     assert place.tank.pointer.is_held
     place.hide()
     assert not place.tank.pointer.is_held
+
+
+def test_a_hidden_tank_and_an_inactive_window_release_the_pointer(place: Any, still: LabView, qtbot: Any) -> None:
+    tank, other = place.tank, QWidget()
+    qtbot.addWidget(other)
+    place.show_view(still)
+    qtbot.waitUntil(place.isActiveWindow)
+
+    def capture() -> None:
+        QTest.keyClick(tank, Qt.Key.Key_Enter)
+        assert tank.pointer.is_held
+        assert tank.cursor().shape() == Qt.CursorShape.BlankCursor
+
+    capture()
+    tank.hide()
+    assert not tank.pointer.is_held
+    assert tank.cursor().shape() == Qt.CursorShape.ArrowCursor
+    tank.show()
+    capture()
+    other.show()
+    other.activateWindow()
+    qtbot.waitUntil(lambda: not place.isActiveWindow())
+    assert not tank.pointer.is_held
+
+
+def test_the_right_button_is_reported_and_keeps_the_pointer(place: Any, still: LabView) -> None:
+    bits = heard(place, "press")
+    place.show_view(still)
+    QTest.mousePress(place.tank, Qt.MouseButton.RightButton)
+    assert not place.tank.pointer.is_held, "only the left button captures the pointer"
+    QTest.mousePress(place.tank, Qt.MouseButton.LeftButton)
+    QTest.mousePress(place.tank, Qt.MouseButton.RightButton)
+    assert bits == [(2,)]
+    assert place.tank.pointer.is_held
+    place.tank.hide()
+    assert bits == [(2,), (0,)]
