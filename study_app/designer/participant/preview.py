@@ -103,7 +103,8 @@ class _LivePage(Coloured, QGraphicsView):
 
     The page has its own keyboard focus, independent of the designer's, so that it looks as in a session; it receives
     keys while this view has the focus. Signals: ``happened`` (a session event of the page), ``left`` (Esc was
-    pressed), ``frame_due`` (for each frame of a visible tank), ``shown`` (the view became visible).
+    pressed), ``frame_due`` (for each frame of a visible tank), ``shown`` (the view became visible and needs
+    the current page).
     """
 
     happened = Signal(object)
@@ -342,7 +343,6 @@ class _LivePage(Coloured, QGraphicsView):
         if self._proxy is not None:
             self._proxy.show()
             self._scene.setFocusItem(self._proxy)
-        self._run_or_stop_frames()
         self.shown.emit()
 
     def hideEvent(self, event: QHideEvent) -> None:

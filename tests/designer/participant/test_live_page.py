@@ -18,6 +18,7 @@ from PySide6.QtWidgets import QApplication
 from study_app.designer.document.steps import ChangeLanguage, DuplicateElement, SetText, SetValue
 from study_app.designer.document.study import read_study
 from study_app.designer.document.toml_edits import Set, Unset
+from study_app.designer.participant.playable import SIZES
 from study_app.gui.key_presses import ignores_clicks
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.protocol.wording.languages import words
@@ -188,6 +189,25 @@ def test_nothing_moves_while_the_page_is_hidden(qtbot: Any, designer: Any, live:
     designer.go_to("pages", "thanks")
     designer.place.pane.show_tab("participant")
     assert isinstance(live.page_window.page, TextPage)
+
+
+def test_frames_are_due_while_a_tank_is_visible_and_again_when_it_is_shown_again(designer: Any, live: Any) -> None:
+    runs = []
+    for path, tab in (
+        (("liquids", "thick"), "participant"),
+        (("liquids", "thick"), "file"),
+        (("liquids", "thick"), "participant"),
+        (("pages", "thanks"), "participant"),
+    ):
+        designer.place.pane.show_tab(tab)
+        designer.go_to(*path)
+        QApplication.processEvents()
+        runs.append(live._frames.isActive())
+    assert runs == [True, False, True, False]
+    designer.go_to("liquids", "thick")
+    designer.place.pane.show_tab("file")
+    designer.controller.preview.offer_screens(SIZES[1:])  # as if the participant's screen had been changed in Settings
+    assert not live._frames.isActive()
 
 
 @pytest.mark.variants(4)
