@@ -2,6 +2,7 @@
 
 import json
 import os
+import platform
 import shutil
 import time
 from collections.abc import Callable
@@ -30,7 +31,7 @@ from study_app.store.integrity.checksums import (
     renew_checksums,
     replace_checksums,
 )
-from study_app.store.integrity.folder_lock import remove_abandoned_claims
+from study_app.store.integrity.folder_lock import lock_folder, remove_abandoned_claims
 from study_app.store.recorder import Recorder
 from study_app.store.session_progress.delivered import broken_limits, delay_error_ms, is_within_limits
 from study_app.store.sessions import begin
@@ -39,6 +40,7 @@ from study_app.store.tables.study_files import study_folders
 from study_app.store.versions import drafts, study_runs, study_settings, study_versions
 from study_app.user_folder import data_folder
 from tests.platforms import needs_links
+from tests.store.recorded_disk import Disk
 
 AT = "2026-03-02T09:30:00.000+01:00"
 COLUMNS = "participant,session,trial,rule_or_person,reason,excluded_at,key_open\n"
@@ -417,6 +419,30 @@ def test_claims_are_removed_once_no_program_can_be_making_them(tmp_path: Path) -
         os.utime(folder, (now - ages_s[name],) * 2)
     remove_abandoned_claims(tmp_path)
     assert {name for name, folder in folders.items() if folder.exists()} == {"new", "later"}
+
+
+def test_marked_claims_are_removed_at_any_age_unless_their_program_runs(tmp_path: Path) -> None:
+    ended = json.dumps({"pid": os.getpid(), "host": platform.node(), "began": 0.0})
+    folders = {name: atomic.temporary_path(tmp_path / name) for name in ("ended", "running", "old and running")}
+    for name, folder in folders.items():
+        folder.mkdir()
+        if name == "ended":
+            (folder / ".open-0a1b2c3d.json").write_text(ended, encoding="utf-8")
+        else:
+            lock_folder(folder)
+    os.utime(folders["old and running"], (time.time() - 3600.0 * 48,) * 2)
+    remove_abandoned_claims(tmp_path)
+    assert {name for name, folder in folders.items() if folder.exists()} == {"running", "old and running"}
+
+
+def test_a_claim_that_cannot_be_removed_is_left_and_the_others_are_removed(tmp_path: Path) -> None:
+    folders = [atomic.temporary_path(tmp_path / name) for name in ("ses-01", "ses-02", "ses-03")]
+    for folder in folders:
+        folder.mkdir()
+        os.utime(folder, (time.time() - 3600.0 * 48,) * 2)
+    with Disk(tmp_path, "input/output error", at=1).used():
+        remove_abandoned_claims(tmp_path)
+    assert [folder.exists() for folder in folders] == [False, True, False]
 
 
 def test_plug_ins_are_named_by_package_and_version(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

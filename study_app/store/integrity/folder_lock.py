@@ -182,14 +182,15 @@ def take_over_folder(path: Path) -> FolderLock | None:
 def remove_abandoned_claims(participant: Path) -> None:
     """Remove the temporary folders of programs that ended while they claimed or released a participant's session.
 
-    Without a marker the owner is unknown; then only folders older than any such operation are removed.
+    Without a marker the owner is unknown; then only folders older than any such operation are removed. A folder that
+    cannot be removed is left.
     """
     for folder in temporary_files(participant):
-        with contextlib.suppress(OSError):  # it was begun or removed in the meantime
+        with contextlib.suppress(OSError):  # for example, it was begun or removed in the meantime
             is_old = time.time() - folder.stat().st_mtime > _MAX_CLAIM_S
             # is_open comes last, because a marker may appear between the checks.
             if folder.is_dir() and (is_old or markers(folder)) and not is_open(folder):
-                shutil.rmtree(folder, ignore_errors=True)
+                shutil.rmtree(folder)
 
 
 def _locked_error(marker: Path, holder: dict[str, Any]) -> StoreError:
