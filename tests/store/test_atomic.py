@@ -62,6 +62,18 @@ def test_a_clock_that_is_ahead_removes_no_temporary_file_that_is_being_written(
     assert names_in(tmp_path) == [new.name]
 
 
+def test_old_temporary_files_are_removed_without_waiting_for_the_disk(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    flushed: list[int] = []
+    monkeypatch.setattr(os, "fsync", flushed.append)
+    old = temporary_path(tmp_path / "table")
+    old.write_text("half", encoding="utf-8", newline="\n")
+    os.utime(old, (time.time() - 2 * OLD_S,) * 2)
+    remove_old_temporary_files(tmp_path)
+    assert (names_in(tmp_path), flushed) == ([], [])
+
+
 def test_lines_are_appended_after_a_torn_one_without_losing_either(tmp_path: Path) -> None:
     path = tmp_path / "reveals.jsonl"
     append_line(path, b"1\n")
