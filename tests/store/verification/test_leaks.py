@@ -10,7 +10,7 @@ from study_app.protocol.model import Protocol
 from study_app.store import receipt
 from study_app.store.files import StudyFolder
 from study_app.store.journals import journal_events
-from study_app.store.verification.leaks import certain_telltales, find_leaks, presented_numbers, telltales
+from study_app.store.verification.leaks import Telltales, certain_telltales, find_leaks, presented_numbers, telltales
 from tests.journal_lines import event_of
 from tests.protocol.trials.level_studies import study as levels_study
 from tests.store.conftest import Attend, Make, Start, Tables
@@ -130,6 +130,46 @@ def test_numbers_of_fewer_than_five_digits_are_not_certain_whatever_their_sign()
     words = certain_telltales({"liquids": {"pond": pond}, "conditions": {}}, {}).words
     assert {"pond", "1013.7", "1013700", "-1.23456", "-0.00123456"} < words
     assert not {"-1", "-1.0", "-1000", "-0.001", "0.25", "250", "1.234", "1234"} & words
+
+
+SEARCHED = {
+    "list.json": ('["calm", ["tardy", [["mildew"]]]]', [("", "tardy"), ("", "mildew")]),
+    "tables.json": ('{"liquids": {"mildew": {"tardy": 2}}}', [(", liquids", "mildew"), (", liquids, mildew", "tardy")]),
+    "rows.json": (
+        '{"rows": [{"note": "tardy", "item": "mildew"}, {"code": ["mildew"]}]}',
+        [(", rows, note", "tardy"), (", rows, code", "mildew")],
+    ),
+    "numbers.json": (
+        '[{"delay": 137, "rate": 0.137, "of": 1370}, [137.0], "137 ms"]',
+        [(", delay", "137"), ("", "137")],
+    ),
+    "absent.json": (
+        '{"a": null, "b": [true, null, false], "mildew": "None, True and False"}',
+        [("", "mildew"), (", mildew", "None"), (", mildew", "True"), (", mildew", "False")],
+    ),
+    "ignored.json": (
+        '{"t_s": 137, "items": [{"id": "mildew"}], "trials": [{"onset_s": 137, "late_s": 137}]}',
+        [(", trials, late_s", "137")],
+    ),
+    "lines.jsonl": (
+        '{"value": ["tardy"]}\nhalf {"mildew\n{"item": "mildew"}\n[137]\n',
+        [(", line 1, value", "tardy"), (", line 2", "mildew"), (", line 4", "137")],
+    ),
+    "cells.csv": (
+        "code,item,mildew\ntardy\n,mildew,137,tardy\n",
+        [(", row 1, mildew", "mildew"), (", row 2, code", "tardy"), (", row 3, mildew", "137"), (", row 3, ", "tardy")],
+    ),
+}
+"""Files with revealing words, and the places at which they are leaks."""
+
+
+@pytest.mark.parametrize("name", SEARCHED)
+def test_names_and_values_at_any_depth_are_searched_except_statements_and_times(tmp_path: Path, name: str) -> None:
+    content, places = SEARCHED[name]
+    (tmp_path / name).write_text(content, encoding="utf-8", newline="\n")
+    words = Telltales(["mildew", "tardy", "137", "None", "True", "False"])
+    expected = [(name + place, word) for place, word in places]
+    assert [(leak.place, leak.word) for leak in find_leaks(tmp_path, words)] == expected
 
 
 def test_the_words_to_look_for_are_the_conditions(protocol: Protocol) -> None:
