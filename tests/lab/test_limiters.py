@@ -27,3 +27,13 @@ def test_a_limiter_acts_only_now_and_is_counted_for_ten_seconds() -> None:
     assert states() == {"Slew, 1.5 N per tick": (2, True), "Force, 8 N": (2, False)}
     add(11.5, 0)
     assert states() == {"Slew, 1.5 N per tick": (1, False)}
+    add(14.999, layout.LIMITER_NORM)
+    assert states() == {"Slew, 1.5 N per tick": (1, False), "Force, 8 N": (1, True)}
+    add(15.0)
+    assert states()["Slew, 1.5 N per tick"] == (1, False), "no samples"
+    add(15.0, 0)
+    assert states() == {"Force, 8 N": (1, True)}, "10 s after the slew"
+    add(15.148, 0)
+    assert states() == {"Force, 8 N": (1, True)}
+    add(15.149, 0)
+    assert states() == {"Force, 8 N": (1, False)}, "150 ms after the force"
