@@ -8,6 +8,7 @@ from scipy.stats import mannwhitneyu, norm
 
 from study_app.psychophysics.detection import (
     PROPORTIONS,
+    abx,
     d_prime_at,
     different_rate,
     proportion_correct,
@@ -121,6 +122,32 @@ def test_same_different_of_an_unbiased_independent_observer():
         assert more.d_prime > 0.5
     assert same_different(20, 20, 0, 20, "differencing").d_prime < 8
     assert same_different(20, 20, 0, 0, "differencing") is None
+
+
+def abx_share(model, d_prime):
+    """Return P(correct) of ABX by Macmillan & Creelman 2005, chapter 9."""
+    of_standards, of_x = d_prime / math.sqrt(2), d_prime / {"independent": 2.0, "differencing": math.sqrt(6)}[model]
+    return norm.cdf(of_standards) * norm.cdf(of_x) + norm.cdf(-of_standards) * norm.cdf(-of_x)
+
+
+@pytest.mark.parametrize(("model", "other"), [("independent", "differencing"), ("differencing", "independent")])
+def test_abx_has_the_d_prime_of_its_model_and_that_of_the_other(model, other):
+    for correct, share in ((17, 17.5 / 21), (13, 13.5 / 21)):  # of 20, log-linear
+        sensitivity = abx(correct, 20, model)
+        assert abx_share(model, sensitivity.d_prime) == pytest.approx(share, abs=1e-7)
+        assert abx_share(other, sensitivity.other) == pytest.approx(share, abs=1e-7)
+        assert (sensitivity.model, sensitivity.criterion, sensitivity.variance) == (model, None, None)
+    below = abx(3, 20, model)  # as far below one half as 17 of 20 are above it
+    above = abx(17, 20, model)
+    assert (below.d_prime, below.other) == pytest.approx((-above.d_prime, -above.other))
+    assert abx(0, 0, model) is None
+
+
+@pytest.mark.parametrize(("model", "other"), [("independent", "differencing"), ("differencing", "independent")])
+def test_same_different_has_the_d_prime_of_the_other_model(model, other):
+    sensitivity, of_other = same_different(12, 20, 3, 20, model), same_different(12, 20, 3, 20, other)
+    assert (sensitivity.model, sensitivity.other) == (model, of_other.d_prime)
+    assert abs(sensitivity.other - sensitivity.d_prime) > 0.1
 
 
 def test_ratings_have_the_area_of_mann_and_whitney():
