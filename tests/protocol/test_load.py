@@ -35,22 +35,27 @@ def test_a_name_is_looked_up_in_the_working_folder_first(tmp_path: Path, monkeyp
 
 
 @pytest.mark.parametrize(
-    ("name", "words"),
+    ("name", "message", "hint"),
     [
-        ("rek2042", 'did you mean "rek2024"?'),
-        ("elsewhere", "known: delaydetect, "),
-        ("folder/rek2024.toml", "no such file"),
-        ("rek2024.toml", "no such file"),
-        (".", "is a folder"),
-        pytest.param("/dev/null", "is a pipe or a device", marks=needs_posix),
+        ("rek2042", "there is no protocol with this name", 'did you mean "rek2024"?'),
+        ("elsewhere", "there is no protocol with this name", "known: delaydetect, "),
+        ("folder/rek2024.toml", "there is no such file", "specify a file, or one of these names: delaydetect, "),
+        ("rek2024.toml", "there is no such file", "specify a file, or one of these names: delaydetect, "),
+        (".", "is a folder, not a protocol file", "specify one of the .toml files in it"),
+        pytest.param(
+            "/dev/null", "is a pipe or a device, not a protocol file", "specify a .toml file", marks=needs_posix
+        ),
     ],
 )
-def test_a_protocol_that_is_not_there(name: str, words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_a_missing_protocol_is_refused_with_a_hint(
+    name: str, message: str, hint: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(ProtocolError) as caught:
         load(name)
-    assert words in str(caught.value)
-    assert str(caught.value).startswith(f"{name}: 1 problem")
+    assert str(caught.value).startswith(f"{name}: 1 problem\n  file: {message} ({hint}")
+    (problem,) = caught.value.problems
+    assert (problem.place, problem.message, problem.hint[: len(hint)]) == ("file", message, hint)
 
 
 def test_a_file_that_cannot_be_read_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
@@ -61,8 +66,11 @@ def test_a_file_that_cannot_be_read_is_named(tmp_path: Path, monkeypatch: pytest
         raise PermissionError(13, "Permission denied")
 
     monkeypatch.setattr(Path, "read_bytes", refuse)
-    with pytest.raises(ProtocolError, match="Permission denied"):
+    with pytest.raises(ProtocolError) as caught:
         load(path)
+    assert caught.value.problems == (
+        Problem("file", "cannot be read: Permission denied", hint="check its permissions"),
+    )
 
 
 def test_a_scene_is_one_liquid_of_a_protocol():
@@ -232,7 +240,7 @@ def test_a_file_that_is_larger_than_any_study_is_refused_at_once(tmp_path: Path,
     file = tmp_path / "large.toml"
     file.write_bytes(content)
     begun_s = time.perf_counter()
-    with pytest.raises(ProtocolError, match=r"is 1\.\d MB in size, but a study file may be at most 1 MB"):
+    with pytest.raises(ProtocolError, match=r"file: is 1\.\d MB in size, but a study file may be at most 1 MB"):
         load(str(file))
     with pytest.raises(ProtocolError, match="check that it is a study file"):
         parse(content, "large")
