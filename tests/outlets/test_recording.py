@@ -26,6 +26,7 @@ pytestmark = pytest.mark.slow
 Rows = list[tuple[list[Any], float]]
 OFFSETS = [(100.0 + 5 * number, 0.25 + 2e-6 * 5 * number) for number in range(20)]
 LAST = 2**24
+OF_LINE = "ms of a straight line"
 
 
 @pytest.fixture(scope="module")
@@ -52,8 +53,8 @@ def without(first: int, last: int) -> Callable[[Rows], Rows]:
     return lambda rows: rows[:first] + rows[last:]
 
 
-def late(rows: Rows) -> Rows:
-    return rows[:50] + [(row, stamp_s + 0.004) for row, stamp_s in rows[50:]]
+def late(delay_s: float) -> Callable[[Rows], Rows]:
+    return lambda rows: rows[:50] + [(row, stamp_s + delay_s) for row, stamp_s in rows[50:]]
 
 
 def added(place: int) -> Callable[[Rows], Rows]:
@@ -64,7 +65,9 @@ def added(place: int) -> Callable[[Rows], Rows]:
     ("markers", "samples", "said", "code"),
     [
         (list, list, "300 recorded, 0 lost, 0 late\n", 0),
-        (list, late, "300 recorded, 0 lost, 1 late, at most 5 ms between two ticks\n", 0),
+        (list, late(0.004), "300 recorded, 0 lost, 1 late, at most 5 ms between two ticks\n", 0),
+        (list, late(0.0006), "300 recorded, 0 lost, 1 late, at most 1.6 ms between two ticks\n", 0),
+        (list, late(0.0004), "300 recorded, 0 lost, 0 late\n", 0),
         (list, without(90, 110), "20 samples lost in 1 gap; the first after 0.089 s\n", 3),
         (without(12, 13), list, "own.xdf does not contain 1 marker recorded in the journal; the first: {", 3),
         (
@@ -116,6 +119,40 @@ def test_a_reset_clock_is_told(streamed: Any, tmp_path: Path) -> None:
     done = CliRunner().invoke(commands, ["verify", str(study), "--xdf", str(file)])
     assert "1 reset; drift +2 ppm over 95 s" in done.output
     assert "drift +2 ppm" in done.output.split("drift +2 ppm", 1)[1]
+
+
+@pytest.mark.parametrize(
+    ("times_s", "offsets_s", "drift"),
+    [
+        ((), (), "0 offsets measured, too few to estimate the drift"),
+        ((7,), (0.25,), "1 offset measured, too few to estimate the drift"),
+        ((7, 9), (0.25, 0.26), "0 resets"),
+        ((7, 7, 7), (0.25, 0.26, 0.28), "0 resets"),
+        # the middle offset is 3 ms below the line through the others, so 2 ms below the least-squares line
+        (
+            (100, 110, 120),
+            (0.25, 0.2472, 0.2504),
+            f"0 resets; drift +20 ppm over 20 s, with offsets within 2 {OF_LINE}",
+        ),
+        ((4, 4.5, 5), (0.25, 0.29, 0.27), f"0 resets; drift +2e+04 ppm over 1 s, with offsets within 20 {OF_LINE}"),
+        ((0, 10, 20), (3, 3.98, 4.9), f"0 resets; drift +9.5e+04 ppm over 20 s, with offsets within 20 {OF_LINE}"),
+        # the offset jumps at 30 s and 50 s, and the time steps back from 80 s to 60 s
+        (
+            (0, 10, 20, *(30, 40), *(50, 65, 80), *(60, 75)),
+            (1, 0.99974, 1.00008, *(9, 9.1), *(7, 7.00051, 6.99982), *(6.9, 6.8)),
+            f"3 resets; drift +4 ppm over 20 s, with offsets within 0.2 {OF_LINE}; "
+            f"drift -6 ppm over 30 s, with offsets within 0.4 {OF_LINE}",
+        ),
+    ],
+)
+def test_the_drift_of_a_clock_is_fitted_to_three_offsets_or_more(
+    streamed: Any, tmp_path: Path, times_s: tuple[float, ...], offsets_s: tuple[float, ...], drift: str
+) -> None:
+    study, (_, (samples_xml, samples)) = streamed
+    offsets = tuple(zip(times_s, offsets_s, strict=True))
+    file = write_xdf(tmp_path / "own.xdf", [(samples_xml, samples, offsets)])
+    done = CliRunner().invoke(commands, ["verify", str(study), "--xdf", str(file)], catch_exceptions=False)
+    assert f"clock of 'liquid-study samples': {drift}\n" in done.output
 
 
 @pytest.mark.parametrize(
