@@ -117,8 +117,7 @@ def presentations(
     session and trial; missing answers are NaN.
     """
     chosen = answers[(answers["item"] == item) & answers["response"].notna()]
-    order = [name for name in ("session", "trial") if name in chosen]
-    chosen = chosen.sort_values(order, kind="stable") if order else chosen
+    chosen = chosen.sort_values(["session", "trial"], kind="stable")
     rows = {participant: row for row, participant in enumerate(participants)}
     people = np.array([rows[str(participant)] for participant in chosen["participant"]], dtype=np.int64)
     places = np.array([columns[str(code)] for code in chosen["code"]], dtype=np.int64)
@@ -127,7 +126,7 @@ def presentations(
     shape = (len(participants), settings, int(number.max()) + 1 if len(number) else 1)
     values, sessions = np.full(shape, np.nan), np.full(shape, np.nan)
     values[people, places, number] = chosen["response"].to_numpy(dtype=float)
-    sessions[people, places, number] = chosen["session"].to_numpy(dtype=float) if "session" in chosen else 1.0
+    sessions[people, places, number] = chosen["session"].to_numpy(dtype=float)
     return values, sessions
 
 

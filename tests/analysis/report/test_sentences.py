@@ -304,7 +304,7 @@ def test_common_methods_name_adjustment_alpha_and_missing_answers() -> None:
 
 def test_answers_are_placed_by_person_setting_and_time() -> None:
     rows = [
-        ("P2", 2, 9, "L1", "x", 3.0), ("P2", 1, 7, "L1", "x", 5.0), ("P1", 1, 4, "L2", "x", 6.0),
+        ("P2", 2, 5, "L1", "x", 3.0), ("P2", 1, 7, "L1", "x", 5.0), ("P1", 1, 4, "L2", "x", 6.0),
         ("P1", 1, 2, "L3", "x", 1.0), ("P1", 1, 3, "L1", "y", 7.0), ("P1", 1, 1, "L1", "x", None),
     ]  # fmt: skip
     answers = pd.DataFrame(rows, columns=["participant", "session", "trial", "code", "item", "response"])
