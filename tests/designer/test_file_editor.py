@@ -32,7 +32,24 @@ def test_the_selected_element_is_shown_and_its_lines_are_marked(card: FileCard) 
     assert editor.textCursor().blockNumber() == 3
     assert [editor._is_selected(line) for line in range(5)] == [False, False, False, True, True]
     card.show_file(FileText("b.toml", "x", (), ()), scroll=True, read_only=True)
-    assert (card.name.whole, editor.raw_text(), editor.isReadOnly()) == ("b.toml", "x", True)
+    assert (card.name.whole, editor.toPlainText(), editor.isReadOnly()) == ("b.toml", "x", True)
+
+
+def test_a_hidden_editor_shows_the_last_file_and_its_selected_element_once_it_is_visible(card: FileCard) -> None:
+    editor = card.editor
+    lines = [f"# {number}" for number in range(100)]
+    card.hide()
+    card.show_file(FileText("a.toml", "\n".join(lines), ((60, 61),)), scroll=True, read_only=False)
+    lines[0] = "# changed"
+    card.show_file(FileText("a.toml", "\n".join(lines), ((50, 52),)), scroll=False, read_only=False)
+    assert editor.toPlainText().split("\n") == LINES
+    card.show()
+    assert editor.toPlainText().split("\n") == lines
+    assert (editor.textCursor().blockNumber(), editor.verticalScrollBar().value()) == (50, 47)
+    card.show_file(FileText("a.toml", "\n".join(lines), ((20, 22),)), scroll=False, read_only=False)
+    assert editor.textCursor().blockNumber() == 50
+    card.show_file(FileText("a.toml", "\n".join(lines), ((70, 71),)), scroll=True, read_only=False)
+    assert (editor.textCursor().blockNumber(), editor.verticalScrollBar().value()) == (70, 67)
 
 
 def test_a_change_elsewhere_moves_neither_cursor_nor_is_it_typed_text(card: FileCard, qtbot: Any) -> None:
@@ -43,7 +60,7 @@ def test_a_change_elsewhere_moves_neither_cursor_nor_is_it_typed_text(card: File
     for text in ('name = "\U0001f600b\u00a0c"', 'name = "\U0001f600xc"', "name = 3\nversion = 4", 'name = "a"'):
         lines = [LINES[0], text, *LINES[2:]]
         card.show_file(FileText("a.toml", "\n".join(lines), ((0, 1),), ()), scroll=True, read_only=False)
-        assert editor.raw_text().split("\n") == "\n".join(lines).split("\n")
+        assert editor.document().toRawText().split("\u2029") == "\n".join(lines).split("\n")
         assert editor.textCursor().block().text() == "scale = 1"
     editor.apply_theme(DARK)
     qtbot.wait(10)
