@@ -18,6 +18,7 @@ from study_app.app.failures import BUG
 from study_app.app.session import playing
 from study_app.app.session.bridge import SessionBridge
 from study_app.designer.document.document import template
+from study_app.designer.header import playing_notice
 from study_app.designer.participant.playable import StepPosition
 from study_app.errors import DeviceLost, StoreError
 from study_app.gui.operator.window import OperatorWindow
@@ -230,6 +231,30 @@ def test_a_pilot_that_is_stopped_before_its_window_is_shown_has_not_begun(
     assert not player.pages
     assert strip.notice is None
     assert not list(folders.iterdir())
+
+
+def test_the_stop_button_of_the_notice_ends_the_preparation_or_the_session(
+    qtbot: Any, designer: Any, folders: Path
+) -> None:
+    designer.open()
+    pilots, header, stops = designer.playing, designer.place.header, list[str]()
+    pilots.play()
+    assert len(list(folders.iterdir())) == 1
+    assert not header.play.play.isEnabled()
+    qtbot.mouseClick(header.strip.buttons["stop"], Qt.MouseButton.LeftButton)
+    assert (pilots.pilot, header.strip.notice) == (None, None)
+    qtbot.waitUntil(header.play.play.isEnabled)
+    assert not list(folders.iterdir())
+    data = folders / "pilot"
+    data.mkdir()
+    session = SimpleNamespace(stop=lambda: stops.append("session"))
+    pilots.pilot = playing._Pilot(SimpleNamespace(words="Thin"), "scripted", data, session=session)
+    header.strip.show_notice(playing_notice("Thin", "Mouse"))
+    qtbot.mouseClick(header.strip.buttons["stop"], Qt.MouseButton.LeftButton)
+    assert (stops, data.exists(), header.strip.isVisible()) == (["session"], True, True)
+    pilots.pilot.session = None  # as after a bug in the preparation
+    qtbot.mouseClick(header.strip.buttons["stop"], Qt.MouseButton.LeftButton)
+    assert (stops, data.exists(), header.strip.isVisible()) == (["session"], False, False)
 
 
 def test_another_device_is_asked_for_and_a_fault_ahead_is_named(
