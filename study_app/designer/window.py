@@ -792,7 +792,6 @@ class DesignerPlace(Place):
         self.entered.emit()
 
     def leave(self) -> None:
-        self.flush()
         self.left.emit()
 
     def focusNextPrevChild(self, forward: bool) -> bool:

@@ -346,11 +346,27 @@ def test_a_text_that_is_being_typed_is_in_the_draft_when_the_designer_is_left(de
     designer.open("kitchen", "study")
     line = designer.field("study", "version").line
     designer.fill(line, "3.7", keys="")
-    designer.saving.leave()
+    designer.window.go("home")
     draft = draft_of(designer.file)
     assert draft is not None
     assert draft.text == designer.text
     assert designer.value("study", "version") == "3.7"
+
+
+def test_a_return_to_the_designer_shows_what_other_programs_wrote_meanwhile(designer: Any) -> None:
+    designer.open("kitchen", "study")
+    designer.window.go("home")
+    designer.change(('version = "1.0"', 'version = "1.7"'))
+    designer.file.with_name("bath.toml").write_text(DEMO, encoding="utf-8", newline="\n")
+    designer.window.go("designer")
+    assert designer.field("study", "version").line.text() == "1.7"
+    studies = designer.place.header.study
+    assert "bath" in {studies.itemData(number) for number in range(studies.count())}
+    designer.editing.handle_request(SetValue(REPETITIONS, 3))
+    designer.window.go("home")
+    designer.change(('version = "1.7"', 'version = "1.8"'))
+    designer.window.go("designer")
+    assert designer.place.banner.sentence.text().startswith("Another program has changed this file, and you have")
 
 
 @pytest.mark.parametrize("found", [4.0, 5.0])
