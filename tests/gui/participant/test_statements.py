@@ -157,6 +157,19 @@ def test_all_is_mirrored_but_the_order_of_the_scale_and_the_keys_that_go_along_i
     assert values(there) == [2]
 
 
+@pytest.mark.parametrize(
+    ("size", "words", "text_scale", "parts"),
+    [(FULL, 20, 1.0, [7]), (SMALL, 20, 1.0, [4, 3]), (SMALL, 40, 1.0, [1] * 7), (FULL, 60, 2.0, [1] * 7)],
+)
+def test_statements_are_divided_evenly_and_one_to_a_page_where_no_more_fit(
+    opening: Opening, size: tuple[int, int], words: int, text_scale: float, parts: list[int]
+) -> None:
+    statements = tuple(f"Statement {number}: {'thick ' * words}" for number in range(1, 8))
+    seen = opening(questionnaire(statements), size, text_scale=text_scale)
+    assert [len(part) for part in seen.page.parts] == parts
+    assert [field.view.number for part in seen.page.parts for field in part] == list(range(1, 8))
+
+
 @pytest.mark.parametrize("size", [SMALL, FULL, (1920, 1080)])
 def test_two_hundred_statements_stay_legible_and_quick(opening: Opening, size: tuple[int, int]) -> None:
     seen = opening(questionnaire(tuple(f"Statement {number}" for number in range(1, 201))), size)
