@@ -4,16 +4,24 @@ from typing import Any
 
 import numpy as np
 import pytest
+from pyqtgraph import InfiniteLine
+from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QLabel
 
 from study_app.gui.operator.plots import ForceCard, HiddenForceCard, LatenessCard, PositionCard, Tiles
 from study_app.gui.operator.servo_health import ServoHealth, Tile
+from study_app.gui.theme.theme import DARK, LIGHT
 from study_app.gui.widgets.cards import Chip, MaskedPanel
 from study_app.gui.widgets.live_plots import LatenessPlot, TracePlot, tick_step
 from tests.gui.operator.session import new_session, ticks
 from tests.gui.windows import shown
 
 TIMES_S = np.array([-9.0, -4.0, -1.0])
+
+
+def grid_lines(plot: TracePlot) -> list[InfiniteLine]:
+    lines = (item for item in plot.scene().items() if isinstance(item, InfiniteLine))
+    return sorted(lines, key=InfiniteLine.value)
 
 
 def test_each_tile_shows_and_speaks_its_number_and_what_its_verdict_means(qtbot: Any) -> None:
@@ -50,6 +58,7 @@ def test_a_trace_is_drawn_over_time_with_its_name_at_its_end_and_a_range_that_gr
         assert [curve.xData.tolist() for curve in plot.curves] == [TIMES_S.tolist()] * 3
         assert plot.ticks == {"bottom": seconds, "left": [(int(text.replace("−", "-")), text) for text in texts]}
         assert all(plot.axes[side]._tickLevels == [plot.ticks[side]] for side in plot.ticks)
+        assert [line.value() for line in grid_lines(plot)] == [value for value, _ in plot.ticks["left"]]
         names = dict(zip(("x right", "y up", "z near"), newest, strict=True))
         assert {end.toPlainText(): end.pos().y() for end in plot.ends} == names
     plot.show_traces(TIMES_S, np.zeros((3, 3)))
@@ -58,6 +67,16 @@ def test_a_trace_is_drawn_over_time_with_its_name_at_its_end_and_a_range_that_gr
     assert heights[1] == pytest.approx(0, abs=0.01)
     steps = {(50.0, 3): 20, (60.0, 3): 20, (61.0, 3): 50, (9.0, 1): 10, (0.8, 8): 0.1}
     assert [tick_step(*reach_and_count) for reach_and_count in steps] == pytest.approx([*steps.values()])
+
+
+def test_grid_lines_are_horizontal_behind_the_curves_and_in_the_colour_of_the_theme(qtbot: Any) -> None:
+    plot = shown(qtbot, TracePlot(10.0, 50.0), (420, 300))
+    for theme in (LIGHT, DARK):
+        plot.apply_theme(theme)
+        plot.show_ticks("bottom", [(-7.0, "−7 s")])
+        assert [(line.value(), line.angle) for line in grid_lines(plot)] == [(20 * row, 0) for row in range(-3, 4)]
+        assert {line.pen.color().name() for line in grid_lines(plot)} == {QColor(theme.grid).name()}
+        assert all(line.zValue() < curve.zValue() for line in grid_lines(plot) for curve in plot.curves)
 
 
 def test_a_histogram_has_bars_by_decades_a_percentile_and_the_limit(qtbot: Any) -> None:
