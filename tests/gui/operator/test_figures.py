@@ -1,6 +1,7 @@
 """Figures of the tiles and points of the plots after each batch of samples, compared with a reviewed text."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -8,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from study_app.gui.operator.servo_health import Forces, ServoHealth
+from study_app.gui.operator.servo_health import ForceFigures, Forces, ServoHealth
 from study_app.gui.settings.view import FrameTimes
 from study_app.gui.widgets.live_plots import lateness_histogram
 from study_app.haptics.model.layout import (
@@ -133,6 +134,39 @@ def frame_times() -> Iterator[str]:
 @pytest.mark.parametrize("of", [healths, forces, frame_times], ids=lambda of: of.__name__)
 def test_figures_are_the_reviewed_ones(of: Any) -> None:
     check_kept(Path(__file__).with_name(f"figures_of_{of.__name__}.txt"), of())
+
+
+def test_rest_changes_only_the_force_of_now() -> None:
+    forces = Forces(8.0)
+    forces.add_samples(samples(3, scene=0, device_force_n=(0.0, 4.0, 0.0), limiters=LIMITER_NORM, permitted_n=1.0))
+    assert forces.figures() == ForceFigures(share=0.5, most=0.0, limiters=())
+    forces.add_samples(
+        samples(5, scene=2, device_force_n=(0.0, 0.0, -6.0), limiters=LIMITER_NORM, permitted_n=4.0, withheld_n=1.0)
+    )
+    counted = ForceFigures(share=0.75, most=0.75, limiters=(("force", 5),), withheld=0.25)
+    assert forces.figures() == counted
+    forces.add_samples(samples(7, scene=0, device_force_n=(2.0, 0.0, 0.0), limiters=LIMITER_SLEW, withheld_n=9.0))
+    assert forces.figures() == replace(counted, share=0.25)
+    forces.add_samples(samples(0))
+    assert forces.figures() == replace(counted, share=0.25)
+
+
+def test_a_batch_of_two_scenes_counts_the_newest_alone() -> None:
+    forces = Forces(8.0)
+    batch = samples(9, scene=np.array([1] * 4 + [0] + [2] * 3 + [0]), permitted_n=np.arange(1.0, 10.0))
+    batch.device_force_n[:, 0] = (7.0, 7.5, 6.0, 5.0, 1.0, 2.0, 4.0, 3.0, 0.8)
+    batch.limiters = [LIMITER_NORM] * 4 + [LIMITER_SLOPE] + [LIMITER_SLEW, LIMITER_SLEW | LIMITER_NORM, 0, 0]
+    batch.withheld_n = (9.0, 9.0, 9.0, 9.0, 9.0, 0.6, 0.7, 0.8, 9.0)
+    forces.add_samples(batch)
+    assert forces.figures() == ForceFigures(
+        share=0.1, most=0.5, limiters=(("slew", 2), ("force", 1)), withheld=pytest.approx(2.1 / 21)
+    )
+    forces.add_samples(samples(2, scene=2, device_force_n=(1.0, 0.0, 0.0), limiters=LIMITER_SLEW, permitted_n=4.5))
+    assert forces.figures() == ForceFigures(
+        share=0.125, most=0.5, limiters=(("slew", 4), ("force", 1)), withheld=pytest.approx(2.1 / 30)
+    )
+    forces.add_samples(samples(3, scene=3, device_force_n=(0.0, 3.0, 0.0), permitted_n=4.0, withheld_n=0.5))
+    assert forces.figures() == ForceFigures(share=0.375, most=0.375, limiters=(), withheld=0.125)
 
 
 def test_a_peak_of_one_tick_is_not_missed_however_it_came_in() -> None:
