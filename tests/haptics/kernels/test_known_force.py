@@ -219,7 +219,17 @@ def test_after_a_fault_the_inertial_force_goes_on_smoothed():
     hand.tick((1e-6 * 200**2, 0.0, 0.0))
     assert hand.model.state[0].kalman.on_ewma == 1
     assert hand.model.liquid_states[0].inertia_n[0][0] == pytest.approx(before_n, rel=0.25)
-    assert hand.model.liquid_states[0].inertia_share == hand.model.liquids[0].inertia_share[4] < 1
+    share = hand.model.liquids[0].inertia_share[4]
+    assert hand.model.liquid_states[0].inertia_share == share < 1
+    k = 200
+    while hand.model.state[0].kalman.on_ewma and k < 2000:
+        k += 1
+        hand.tick((1e-6 * k**2, 0.0, 0.0))
+    assert k == 200 + 1000, "1 s after the fault the filter is used again"
+    for ticks in range(1, 150):
+        returned = min(ticks / 100, 1.0)  # within 0.1 s
+        assert hand.model.liquid_states[0].inertia_share == pytest.approx(share + returned * (1 - share))
+        hand.tick((1e-6 * (k + ticks) ** 2, 0.0, 0.0))
 
 
 @pytest.mark.parametrize(("amplitude_m", "is_limited"), [(0.025, False), (0.06, True)])
