@@ -261,6 +261,42 @@ def test_refused_position_does_not_enter_the_noise():
     assert measurements.noise(samples).position_um == pytest.approx([1.0] * 3, rel=0.1)
 
 
+def accelerated(ticks, every):
+    """Return samples of a handle of 0.2 kg that 0.6 N accelerate by 3 m/s² along y, with a position every few ticks."""
+    from study_app.haptics.model.layout import SAMPLE, records
+
+    samples = records(SAMPLE, ticks)
+    samples.time_ns = 7_000_000_000 + 1_000_000 * np.arange(ticks)
+    samples.fresh = np.arange(ticks) % every == 0
+    samples.position_m[:, 1] = 0.01 + 0.5 * 3.0 * (1e-3 * np.arange(ticks)) ** 2
+    samples.device_force_n[:, 1] = 0.6
+    return samples
+
+
+@pytest.mark.parametrize(("ticks", "every", "last"), [(301, 20, 300), (310, 20, 300), (330, 33, 297)])
+def test_a_segment_is_used_from_its_first_to_its_last_new_position(ticks, every, last):
+    grid_s = measurements._prepare_segment(accelerated(ticks, every), 1, 1e-3).grid_s
+    assert grid_s == pytest.approx(1e-3 * np.arange(len(grid_s)))
+    assert last <= len(grid_s) <= last + 1, "the last point itself depends on the rounding of its time"
+
+
+def test_a_constant_acceleration_has_the_mass_and_the_speeds_of_its_motion():
+    prepared = measurements._prepare_segment(accelerated(301, 1), 1, 1e-3)
+    acceleration_mps2, speed_mps, friction, _, constant = prepared.terms.T
+    middle_s = prepared.grid_s[40:-40]  # 20 ms on either side to smooth the motion, and 20 to smooth its friction
+    assert prepared.force_n(0.0) / acceleration_mps2 == pytest.approx(np.full(len(middle_s), 0.2))
+    assert speed_mps == pytest.approx(3.0 * middle_s)
+    assert friction == pytest.approx(np.ones(len(middle_s)), abs=1e-9)
+    assert set(constant) == {1.0}
+
+
+def test_a_force_acts_from_half_a_tick_after_it_was_sent_and_later_by_its_delay():
+    samples = accelerated(301, 1)
+    samples.device_force_n[:, 1] = 5.0 * 1e-3 * np.arange(301)  # 5 N/s
+    prepared = measurements._prepare_segment(samples, 1, 1e-3)
+    assert prepared.force_n(0.004) == pytest.approx(5.0 * (prepared.grid_s[40:-40] - 0.004 - 0.0005))
+
+
 def test_gain_is_the_slope_of_readings_over_forces():
     sent_n = (0.0, 1.0, 2.0, 3.0)
     shown_g = [1e3 * (0.1 + 0.8 * it) / measurements.GRAVITY_MPS2 for it in sent_n]
