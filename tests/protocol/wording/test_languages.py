@@ -111,6 +111,17 @@ def test_every_sentence_is_one_of_a_shipped_study() -> None:
     assert [sentence for sentence in SENTENCES if sentence not in said] == []
 
 
+@pytest.mark.parametrize(("table", "key"), [("pages", "body"), ("questionnaires", "intro"), ("tasks", "instruction")])
+def test_sentences_about_force_are_replaced_in_each_table_and_language(table: str, key: str) -> None:
+    study = load("demo")
+    written = {"en": "Stir.\n\nPress the space bar when\nit feels familiar. It feels new.", "nl": "U voelt iets."}
+    entries = {name: entry.model_copy(update={key: written}) for name, entry in getattr(study, table).items()}
+    displayed = getattr(without_force(study.model_copy(update={table: entries})), table)
+    replaced = {"en": "Stir.\n\nPress the space bar when it is familiar. It feels new.", "nl": "U voelt iets."}
+    assert displayed == {name: entry.model_copy(update={key: replaced}) for name, entry in entries.items()}
+    assert displayed
+
+
 def test_a_study_of_ones_own_is_shown_as_it_is_written() -> None:
     study = load("demo")
     asked = {"intro": "What did you feel?"}
