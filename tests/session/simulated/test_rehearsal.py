@@ -17,16 +17,19 @@ from hypothesis import strategies as st
 
 from study_app.errors import SessionError, StoreError
 from study_app.haptics.runtime.servo import Servo
-from study_app.protocol.orders.schedule import stream
-from study_app.protocol.simulated import OBSERVER, Comparison, Observer
-from study_app.session.pages import TextPage
+from study_app.protocol.load import load
+from study_app.protocol.orders.schedule import build_schedule, stream
+from study_app.protocol.questions import RatingView
+from study_app.protocol.simulated import NO_FEATURES, OBSERVER, Comparison, Observer, TrialFeatures
+from study_app.session.pages import QuestionnairePage, TextPage
 from study_app.session.simulated import rehearsal
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.session.simulated.observers import RATE_HZ, SensedTrial, answer_choices, exploration, reading_s
-from study_app.session.simulated.participant import AdjustingObserver
+from study_app.session.simulated.participant import AdjustingObserver, SimulatedParticipant
 from study_app.session.simulated.rehearsal import RehearsedSession, condition_features, finish_session
 from study_app.session.simulated.rehearsal_worker import RehearsalOrder, carry_out
 from study_app.session.tasks import TankView, TaskView
+from study_app.session.transitions.events import Chosen, Submitted
 from study_app.store.files.folders import StudyFolder
 from study_app.store.journals import journal
 from study_app.store.journals.journal import Journal
@@ -200,6 +203,66 @@ def test_a_page_is_read_word_by_word_and_some_answers_are_changed_from_a_neighbo
         assert [(one.item, one.value, one.after_s) for one in chosen] == [
             ("thick", value, pytest.approx(0.8 + draw * (2.6 - 0.8))) for value in values
         ]
+
+
+class Respondent(SimulatedParticipant):
+    """A participant whose page changes in the wait with number ``leaves_in``, and who keeps the posted events."""
+
+    def __init__(self, leaves_in: int | None) -> None:
+        study = load("demo")
+        super().__init__(study, build_schedule(study, "P001", 1))
+        self.events: list[Any] = []
+        self._leaves_in = leaves_in
+        self._waits_s: list[float] = []
+
+    def _seconds(self) -> float:
+        return sum(self._waits_s)
+
+    def _wait(self, seconds: float) -> None:
+        self._waits_s.append(seconds)
+        if len(self._waits_s) == self._leaves_in:
+            self.page = TextPage(id="pause", kind="break", title="Pause", paragraphs=(), button="Go on")
+
+    def _post(self, event: Any) -> None:
+        self.events.append(event)
+
+    def _perceived_features(self, trial: int | None) -> TrialFeatures:
+        assert trial is None
+        return NO_FEATURES
+
+    def _sensed_magnitudes(self, block: Any) -> dict[int, Any]:
+        raise AssertionError(block)
+
+
+@pytest.mark.parametrize(("leaves_in", "answered"), [(1, []), (2, ["thick"]), (3, ["thick", "warm"]), (None, None)])
+def test_a_page_is_answered_question_by_question_until_it_changes(
+    leaves_in: int | None, answered: list[str] | None
+) -> None:
+    labels = ("Not at all", "Somewhat", "Rather", "Very")
+    items = tuple(
+        RatingView(name, number, f"How {name} was it?", True, labels=labels)
+        for number, name in enumerate(("thick", "warm", "slow"), 1)
+    )
+    page = QuestionnairePage(
+        trial=None,
+        title="Your answers",
+        intro="",
+        items=items,
+        labels=(),
+        cannot_judge=None,
+        progress=None,
+        form="start",
+    )
+    respondent = Respondent(leaves_in)
+    respondent.page = page
+    respondent._fill_in(page)
+    shown, events = respondent.events[:3], respondent.events[3:]
+    assert [(event.at_s, event.item) for event in shown] == [(0, "thick"), (0, "warm"), (0, "slow")]
+    chosen = [event for event in events if isinstance(event, Chosen)]
+    assert [event.item for event in chosen] == (["thick", "warm", "slow"] if answered is None else answered)
+    assert all(1 <= event.value <= 4 for event in chosen)
+    submitted = events[len(chosen) :]
+    assert submitted == ([] if answered is not None else [Submitted(chosen[-1].at_s + 1.0)])
 
 
 def test_each_participant_of_a_rehearsal_has_all_sessions_until_one_ends_early(
