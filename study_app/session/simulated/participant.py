@@ -132,7 +132,7 @@ class SimulatedParticipant(ABC):
         return sum(earlier) / len(earlier) if earlier else sensed
 
     def _fill_in(self, page: QuestionnairePage | DesignPage) -> None:
-        """Answer every question of a page and confirm."""
+        """Answer every question of a page and confirm, until another page is shown."""
         answers: dict[str, Value] = {}
         seen = self._notice_questions(page, answers, ())
         for choice in self._answers_to(page):
@@ -144,7 +144,8 @@ class SimulatedParticipant(ABC):
             seen += self._notice_questions(page, answers, seen)
         if not isinstance(page, ChoicePage):  # on a choice page the answer continues the session
             self._wait(1.0)
-        self._post(Submitted(self._seconds()))
+        if page is self.page:
+            self._post(Submitted(self._seconds()))
 
     def _answers_to(self, page: QuestionnairePage | DesignPage) -> list[Choice]:
         """Return the choices that answer a page, according to the percept."""
