@@ -12,13 +12,16 @@ from hypothesis import strategies as st
 
 from study_app.errors import StoreError
 from study_app.store.workstation import (
+    ASIDE,
     DEFAULTS,
     LEAST_X_HEIGHT_DEG,
     STATEMENT_X_HEIGHT_PX,
     DeviceBench,
     DisplayOffset,
     MachineSettings,
+    device_without_force,
     keep_workspace,
+    load_or_default,
     load_settings,
     recent_protocols,
     remember_protocol,
@@ -67,6 +70,42 @@ def test_a_path_that_is_not_utf_8_is_refused_in_one_line_and_the_settings_stay(f
     with pytest.raises(StoreError, match=r"^'/x/donn.udce9es' is not UTF-8 text, .*: rename the folder$"):
         save_settings(ALL.model_copy(update={name: os.fsdecode(b"/x/donn\xe9es")}))
     assert load_settings() == ALL
+
+
+@pytest.mark.parametrize(
+    ("content", "reason"),
+    [
+        *(
+            (content, "it does not contain a table of settings")
+            for content in ('["falcon", "dark"]', "[]", "620.5", '"falcon"', "null", "true")
+        ),
+        ("{", "it is not JSON (Expecting property name enclosed in double quotes: line 1 column 2 (char 1))"),
+    ],
+)
+def test_a_file_without_a_table_of_settings_is_refused_by_name_and_the_defaults_are_used(folder, content, reason):
+    folder.mkdir()
+    file = folder / "machine.json"
+    file.write_text(content, encoding="utf-8", newline="\n")
+    message = (
+        f"this machine's settings in {file} cannot be used: {reason}. Correct or delete the file, or set "
+        "LIQUID_STUDY_CONFIG to another folder"
+    )
+    with pytest.raises(StoreError) as refused:
+        load_settings()
+    assert str(refused.value) == message
+    assert load_or_default() == (DEFAULTS, message)
+    assert device_without_force() == ""
+    save_settings(ALL)
+    assert load_or_default() == (ALL, "")
+    assert (folder / ASIDE).read_text("utf-8") == content
+
+
+def test_a_device_that_renders_no_force_is_named_once_it_is_chosen():
+    assert (DEFAULTS.device, device_without_force()) == ("mouse", "")
+    names = {"spacemouse": "SpaceMouse", "falcon": "", "mouse": "Mouse", "spacemouse:left": "SpaceMouse"}
+    for device, name in names.items():
+        save_settings(ALL.model_copy(update={"device": device}))
+        assert device_without_force() == name
 
 
 def test_recent_protocols_are_those_that_still_exist_newest_first(tmp_path):
