@@ -21,6 +21,7 @@ from study_app.protocol.load import load
 from study_app.protocol.orders.schedule import build_schedule, stream
 from study_app.protocol.questions import RatingView
 from study_app.protocol.simulated import NO_FEATURES, OBSERVER, Comparison, Observer, TrialFeatures
+from study_app.protocol.source.files import shipped_file
 from study_app.session.pages import QuestionnairePage, TextPage
 from study_app.session.simulated import rehearsal
 from study_app.session.simulated.answers_only import rehearse_answers
@@ -37,6 +38,7 @@ from study_app.store.journals.journal_events import Responses, SessionResumed
 from study_app.store.session_progress.missing_trials import MissingTrial, MissingTrials
 from study_app.store.sessions.open_session import SessionStore
 from study_app.store.tables.study_files import write_description
+from study_app.store.verification.whole_study import verify_study
 from study_app.store.withdrawals import withdraw
 from tests.compiled import needs_servo
 from tests.journal_lines import event_of, raw
@@ -352,6 +354,55 @@ def test_no_session_is_begun_after_a_finished_one_or_a_withdrawal(tmp_path: Path
     for participant in ("P001", "P002"):
         finish_session("demo", participant, seed=1, device="scripted", results=study, progress=lines.append)
     assert (list(files.files()), lines) == ([], [])
+
+
+def test_a_session_that_was_killed_between_its_last_line_and_its_proofs_is_rebuilt_once(tmp_path: Path) -> None:
+    results = rehearse_answers("demo", participants=2, seed=4, results=tmp_path / "demo", features=made_up("demo"))
+    study = StudyFolder(results)
+    session = study.session("P001", 1)
+    tables = {path: path.read_bytes() for path in session.path.glob("*_data.csv")}
+    sums, own, other = session.checksums.read_text("utf-8"), *study.fingerprints.read_text("utf-8").splitlines(True)
+    assert (len(tables), own.endswith("  data/sub-P001/ses-01\n")) == (2, True)
+    lines = list[str]()
+    for progress in (None, lines.append):
+        for path in (*tables, session.checksums):
+            path.unlink()
+        study.fingerprints.write_text(other, encoding="utf-8", newline="\n")
+        finish_session("demo", "P001", seed=1, device="scripted", results=results, progress=progress)
+        assert {path: path.read_bytes() for path in tables} == tables
+        assert {*sums.splitlines()} <= {*session.checksums.read_text("utf-8").splitlines()}
+    assert verify_study(results).errors == ()
+    finish_session("demo", "P001", seed=1, device="scripted", results=results, progress=lines.append)
+    assert lines == ["P001: rebuilt the tables and checksums of the finished session"]
+
+
+def test_a_session_is_begun_if_it_never_was_and_resumed_after_an_interruption(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    results = rehearse_answers("demo", participants=2, seed=4, results=tmp_path / "demo", features=made_up("demo"))
+    study = StudyFolder(results)
+    study.fingerprints.unlink()
+    interrupted, never_begun = (study.session(participant, 1) for participant in ("P001", "P002"))
+    for session, line_count in ((interrupted, -1), (never_begun, 0)):
+        journal_lines = session.journal.read_bytes().splitlines(keepends=True)
+        session.journal.write_bytes(b"".join(journal_lines[:line_count]))
+        for path in (session.checksums, *session.path.glob("*_data.csv")):
+            path.unlink()
+    never_begun.receipt.unlink()  # it records the end
+    source, calls = shipped_file("demo"), list[Any]()
+    monkeypatch.setattr(rehearsal, "open_session", lambda *args, **named: ("begun", *args, named))
+    monkeypatch.setattr(rehearsal, "reopen_session", lambda *args, **named: ("resumed", *args, named))
+    monkeypatch.setattr(rehearsal, "_run_to_end", lambda *args: calls.append(args))
+    for participant in ("P001", "P002", "P003"):
+        finish_session(source, participant, seed=5, device="mouse", results=results, progress=print)
+    named = {"seed": 5, "device": "mouse", "results": results}
+    assert calls == [
+        ("P001", ("resumed", interrupted.path, {"protocol": source}), print),
+        *(
+            (participant, ("begun", load("demo"), source.read_bytes(), participant, named), print)
+            for participant in ("P002", "P003")
+        ),
+    ]
 
 
 def test_a_signal_that_was_ignored_before_a_rehearsal_stays_ignored() -> None:
