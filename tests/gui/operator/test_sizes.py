@@ -140,3 +140,61 @@ def test_the_shape_of_the_window_does_not_tell_whether_the_force_is_hidden(qtbot
         places.append(here)
         window.may_close = True
     assert places[0] == places[1]
+
+
+COLUMNS: dict[int, dict[str, Any]] = {
+    # by the width of the window [px]: left edges and widths [px], the plots in a row, and the width of an icon [px]
+    1066: {"rail": (9, 72), "middle": (90, 608), "bar": (9, 689), "plots": 1, "icon": 0},
+    1067: {"rail": (9, 72), "middle": (90, 609), "bar": (9, 690), "plots": 1, "icon": 28},
+    1097: {"rail": (9, 72), "middle": (90, 639), "bar": (9, 720), "plots": 1, "icon": 28},
+    1098: {"rail": (9, 72), "middle": (90, 640), "bar": (9, 721), "plots": 2, "icon": 28},
+    1319: {"rail": (9, 72), "middle": (90, 861), "bar": (9, 942), "plots": 2, "icon": 28},
+    1320: {"rail": (18, 248), "middle": (280, 658), "bar": (280, 658), "plots": 2, "icon": 0},
+    1351: {"rail": (18, 248), "middle": (280, 689), "bar": (280, 689), "plots": 2, "icon": 0},
+    1352: {"rail": (18, 248), "middle": (280, 690), "bar": (280, 690), "plots": 2, "icon": 28},
+    1499: {"rail": (18, 248), "middle": (280, 837), "bar": (280, 837), "plots": 2, "icon": 28},
+    1500: {"rail": (21, 318), "middle": (357, 754), "bar": (357, 754), "plots": 2, "icon": 28},
+}
+
+
+def test_each_width_of_the_window_has_its_columns_plots_and_icons(window: OperatorWindow, told: Any) -> None:
+    window.show_view(told.view())
+    settle(window, (1066, 768))
+    buttons = {button: button.sizeHint().width() for button in (window.buttons.pause, window.buttons.end)}
+    parts = {"rail": window.rail, "middle": window.arrangement.middle_area, "bar": window.buttons}
+    for width in (*COLUMNS, 1066):
+        settle(window, (width, 768))
+        places = {name: place_of(part, window) for name, part in parts.items()}
+        side, lateness, force = (
+            place_of(part, window) for part in (window.arrangement.side_area, window.lateness, window.force)
+        )
+        (icon,) = {button.sizeHint().width() - text_width for button, text_width in buttons.items()}
+        plots = 2 if force.y() == lateness.y() else 1
+        columns = {name: (place.x(), place.width()) for name, place in places.items()}
+        assert columns | {"plots": plots, "icon": icon} == COLUMNS[width], width
+        assert len({place_of(tile, window).y() for tile in window.tiles.cards}) == (1 if plots == 2 else 2), width
+        assert (side.width(), width - side.x() - 350) == (350, places["rail"].x()), width
+        assert window.buttons.hint.isVisible() == (width >= 1500)
+        assert window.header.bar.isVisible() == window.header.trials.isVisible() == (width >= 1320)
+        assert window.arrangement.now.isVisible() == (width < 1320)
+
+
+@pytest.mark.parametrize(
+    ("height", "stop_px", "notes", "rows"),
+    [(870, 250, 3, 5), (869, 236, 2, 3), (750, 236, 2, 3), (749, 236, 1, 2), (705, 236, 1, 2), (704, 236, 0, 2)],
+)
+def test_each_height_of_the_window_has_its_stop_notes_and_rows_of_the_device(
+    window: OperatorWindow, told: Any, height: int, stop_px: int, notes: int, rows: int
+) -> None:
+    for text in ("First", "Second", "Third", "Fourth"):
+        told.tell("note", 5.0, kind="note", text=text)
+    view = told.view()
+    values = ["real-time", "1000 Hz", "0", "8 N", "falcon"]
+    device = replace(view.device, rows=tuple((f"Property {number}", value) for number, value in enumerate(values)))
+    window.show_view(replace(view, device=device))
+    settle(window, (1366, height))
+    assert (window.stop.width(), window.stop.height()) == (350, stop_px)
+    shown_notes = [line.text.whole for line in window.notes.lines if line.isVisible()]
+    assert shown_notes == ["Fourth", "Third", "Second"][:notes]
+    assert window.notes.hint.isVisible() == (notes == 3)
+    assert [value.whole for _, value in window.device.rows if value.isVisible()] == values[:rows]
