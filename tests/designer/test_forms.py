@@ -520,6 +520,84 @@ def test_a_hypothesis_shows_what_it_compares_and_names_what_is_not_in_the_study(
     assert (line.bound.isHidden(), line.bound.typed_text()) == (False, "0.75")
 
 
+RELATIONS: list[tuple[dict[str, Any], dict[str, dict[str, Any]]]] = [
+    # a hypothesis, and what each relation that is chosen makes of it
+    (
+        {},
+        {
+            "is different from": {},
+            "is higher than": {"expected": "higher"},
+            "is lower than": {"expected": "lower"},
+            "is equal to": {"bound": 0.5},
+        },
+    ),
+    (
+        {"bound": 0.4},
+        {
+            "is different from": {},
+            "is higher than": {"expected": "higher"},
+            "is lower than": {"expected": "lower"},
+            "is equal to": {"bound": 0.4},
+        },
+    ),
+    (
+        {"expected": "lower"},
+        {
+            "is different from": {},
+            "is higher than": {"expected": "higher"},
+            "is lower than": {"expected": "lower"},
+            "is equal to": {"bound": 0.5},
+        },
+    ),
+    (
+        {"expected": "higher", "bound": 0.7},
+        {
+            "is different from": {},
+            "is higher than": {"expected": "higher", "bound": 0.7},
+            "is lower than": {"expected": "lower", "bound": 0.7},
+            "is equal to": {"bound": 0.7},
+        },
+    ),
+]
+
+
+@pytest.mark.parametrize("is_known", [True, False], ids=["compared", "not in the study"])
+@pytest.mark.parametrize(("stated", "chosen"), RELATIONS)
+def test_a_chosen_relation_keeps_a_bound_that_fits_it(
+    qtbot: Any, stated: dict[str, Any], chosen: dict[str, dict[str, Any]], is_known: bool
+) -> None:
+    """A bound without a direction states an equality, which can be replaced by a difference in one step."""
+    thin, thick = (
+        Compared(key="conditions", block="liquids", name=name, label=name, measures=(("harder", "Harder"),))
+        for name in ("thin", "thick")
+    )
+    line, tables = Hypothesis("Hypothesis 1"), list[dict[str, Any]]()
+    qtbot.addWidget(line)
+    line.changed.connect(tables.append)
+    compared = {"measure": "harder", "blocks": ("liquids",), "conditions": ("thin", "thick")}
+    for relation, expected in chosen.items():
+        line.show_value(compared | stated, (thin, thick) if is_known else ())
+        line.relation.setCurrentText(relation)
+        line.relation.activated.emit(line.relation.currentIndex())
+        table = {key: tuple(value) if isinstance(value, list) else value for key, value in tables[-1].items()}
+        assert table == compared | expected, relation
+        line.show_value(table, (thin, thick) if is_known else ())
+        assert line.relation.currentText() == relation
+
+
+@pytest.mark.parametrize(
+    ("measure", "bound"), {"threshold": 1.25, "pse": 1.25, "d_prime": 0.5, "exponent": 0.5}.items()
+)
+def test_a_new_equality_of_thresholds_is_bounded_by_a_ratio(qtbot: Any, measure: str, bound: float) -> None:
+    line, tables = Hypothesis("Hypothesis 1"), list[dict[str, Any]]()
+    qtbot.addWidget(line)
+    line.changed.connect(tables.append)
+    line.show_value({"measure": measure, "blocks": ("thin", "thick"), "expected": "lower"}, ())
+    line.relation.setCurrentText("is equal to")
+    line.relation.activated.emit(line.relation.currentIndex())
+    assert tables == [{"measure": measure, "blocks": ("thin", "thick"), "bound": bound}]
+
+
 def test_each_point_of_a_list_is_typed_kept_and_removed_by_itself(designer: Any) -> None:
     path = ("tasks", "reach", "targets_mm")
     designer.open()

@@ -647,11 +647,15 @@ class Hypothesis(QWidget):
         )
 
     def _kept_bound(self, relation: Any, measure: str) -> Any:
-        """Return the current bound, the default bound of a new equality, or None."""
+        """Return the current bound, the default bound of a new equality, or None.
+
+        A hypothesis with a bound and without a direction states an equality, so that a difference has no bound.
+        """
         before = self.value.get("bound")
         if relation == "equal" and before is None:
             return DEFAULT_RATIO if measure in {"threshold", "pse"} else DEFAULT_BOUND
-        return before if relation == "equal" or _relation(self.value) != "equal" else None
+        keeps_direction = relation is not None and _relation(self.value) != "equal"
+        return before if relation == "equal" or keeps_direction else None
 
     def _submit_bound(self, text: str) -> None:
         bound = number_of(text)
