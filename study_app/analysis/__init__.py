@@ -5,7 +5,7 @@
 ``planning`` simulates studies that do not exist yet.
 
 Reading order: wording, worker_messages; statistics; data; results; page_layout, questions; html_page; levels; export,
-figures; findings; contrasts; evaluate, planning; planned_exclusions; report; export_study; study_worker.
+figures; findings; contrasts; evaluate; planned_exclusions; planning; report; export_study; study_worker.
 
 Public modules: contrasts, data, evaluate, export, export_study, findings, levels.exponents, levels.thresholds,
 levels.tracks, planning, planning.power_curves, planning.power_estimates, planning.preregistration,

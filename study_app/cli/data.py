@@ -162,20 +162,38 @@ def unblind(results: Path, by: str, reason: str) -> None:
 @PARTICIPANT
 @SESSION
 @click.option("--trial", type=WholeNumber(1), help="Exclude only this trial; default: the whole session.")
-@click.option("--rule", metavar="RULE", default="", help="The exclusion rule that applies to the session.")
+@click.option("--rule", metavar="RULE", default="", help="The planned exclusion rule that the session meets.")
 @BY
 @REASON
 def exclude(results: Path, participant: str, session: int, trial: int | None, rule: str, by: str, reason: str) -> None:
-    """Exclude a session or a trial from the analysis, with a reason; nothing is deleted."""
+    """Exclude a session or a trial from the analysis, with a reason; nothing is deleted.
+
+    With --rule, the session must meet this rule of the protocol. If the rule cannot be checked before unblinding, this
+    is recorded.
+    """
     from study_app.store.exclusions import describe_exclusion
     from study_app.store.exclusions import exclude as exclude_from
     from study_app.store.merged import locate_participant
 
+    exclude_each_other(trial=trial, rule=rule or None)
+    if rule and not _was_rule_checked(results, participant, session, rule):
+        reason += "; the rule could not be checked because the key was sealed"
     exclusion = exclude_from(
         *locate_participant(results, participant), session, trial=trial, by=by, reason=reason, rule=rule
     )
     click.echo(describe_exclusion(replace(exclusion, participant=participant)))
     _warn_if_unblinded(results)
+
+
+def _was_rule_checked(results: Path, participant: str, session: int, rule: str) -> bool:
+    """Return whether a session meets a rule; print a warning if this can only be checked after unblinding."""
+    from study_app.analysis.data import load_study
+    from study_app.analysis.planned_exclusions import check_rule
+
+    if check_rule(load_study(results), participant, session, rule):
+        return True
+    click.echo(f"warning: the rule {rule} can only be checked after unblinding; the report will check it", err=True)
+    return False
 
 
 def _warn_if_unblinded(results: Path) -> None:

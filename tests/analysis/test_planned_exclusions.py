@@ -11,19 +11,22 @@ import pytest
 from study_app import api
 from study_app.analysis.data.study_tables import Study, load_study
 from study_app.analysis.evaluate import evaluate
-from study_app.analysis.planned_exclusions import planned_exclusions, proposals, rule_sentences
-from study_app.analysis.planning.preregistration import commitment, preregistration
+from study_app.analysis.planned_exclusions import check_rule, planned_exclusions, proposals, rule_sentences
+from study_app.analysis.planning.preregistration import FILE, commitment, deviations, preregistration
 from study_app.analysis.report.sections import conduct
 from study_app.analysis.report.write_report import report
-from study_app.errors import ProtocolError, StoreError
+from study_app.analysis.wording import percent
+from study_app.errors import AnalysisError, ProtocolError, StoreError
 from study_app.protocol.load import load
 from study_app.protocol.source.files import shipped_file
+from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store.exclusions import exclude, keep
 from study_app.store.unblinding import unblind
 from tests.analysis.conftest import SAMPLE
 from tests.analysis.made_up import liquids
 from tests.analysis.made_up import study as made_up_study
 from tests.compiled import needs_servo
+from tests.studies import made_up
 
 PAIRS = """
 format = 2
@@ -131,6 +134,14 @@ def test_keys_that_were_exchanged_are_proposed_and_decided_by_a_person(pairs: Pa
     assert "0 of 12" in found.why
     assert "p < .001" in found.why, "0.5 to the power of 12"
     assert thresholds(study) == [None, "P001"], "not in the mean without a decision"
+    assert check_rule(study, "P002", 1, "below_chance")
+    assert not check_rule(replace(study, settings={}), "P001", 1, "below_chance"), "the key is sealed"
+    with pytest.raises(AnalysisError, match="the rule requires that a block has fewer correct answers than expected"):
+        check_rule(study, "P001", 1, "below_chance")
+    beyond = with_rules(study, {"rule": "threshold_beyond_levels"})
+    assert [check_rule(beyond, found.participant, 1, found.rule) for found in proposals(beyond, evaluate(beyond))] == [
+        True, True,
+    ]  # fmt: skip
     report(pairs, tmp_path / "open")
     page = (tmp_path / "open" / "report.html").read_text("utf-8")
     assert (
@@ -169,6 +180,55 @@ def study_with(tmp_path: Path, rules: str, name: str = "demo") -> Path:
     text = shipped_file(name).read_text("utf-8")
     path.write_text(f"{text}\n{rules}", encoding="utf-8", newline="\n")
     return path
+
+
+@pytest.mark.slow
+def test_an_exclusion_under_a_rule_that_the_session_does_not_meet_is_rejected_or_reported(tmp_path: Path) -> None:
+    rules = "".join(
+        f'[[analysis.exclusions]]\nrule = "{rule}"\nlimit = {limit}\n'
+        for rule, limit in (("constant_answers", 97), ("fast_answers", 58))
+    )
+    path, folder = study_with(tmp_path, rules), tmp_path / "results"
+    rehearse_answers(path, participants=4, seed=5, results=folder, features=made_up("demo"))
+    study = load_study(folder)
+    assert check_rule(study, "P001", 1, "fast_answers")
+    with pytest.raises(AnalysisError, match=r"rule 'fast_answer' \(planned rules: constant_answers, fast_answers\)"):
+        check_rule(study, "P001", 1, "fast_answer")
+    with pytest.raises(AnalysisError, match=r"\(it does not plan any rules\); .* omit --rule"):
+        check_rule(with_rules(study), "P001", 1, "fast_answers")
+    given = study.responses.loc[study.responses["counted"] & (study.responses["participant"] == "P002"), "response"]
+    share = percent(given.value_counts().max() / len(given))
+    why = f"{share} of its {len(given)} answers to statements are identical, and the rule requires more than 97 %"
+    with pytest.raises(AnalysisError, match=f"session 1 does not meet the rule constant_answers: {why}; "):
+        check_rule(study, "P002", 1, "constant_answers")
+    answers = study.answered[study.answered["counted"] & (study.answered["participant"] == "P003")]
+    median = (answers["first_choice_s"] - answers["onset_s"]).median()
+    hurried = with_rules(study, {"rule": "fast_answers", "limit": 0.2})
+    with pytest.raises(AnalysisError, match=f"time is {median:.2f} s, and the rule requires less than 0.2 s; "):
+        check_rule(hurried, "P003", 1, "fast_answers")
+
+    exclude(folder, "P001", 1, rule="fast_answers", by="AB", reason="hasty")
+    exclude(folder, "P002", 1, rule="constant_answers", by="AB", reason="bored")
+    assert check_rule(load_study(folder), "P002", 1, "constant_answers"), "`exclude` rejects it"
+    protocol = load(path)
+    (folder / FILE).write_text(
+        preregistration(protocol, str(study.participants["protocol_hash"][0])), encoding="utf-8", newline="\n"
+    )
+    study = load_study(folder)
+    planned = planned_exclusions(study, evaluate(study, recordings=False))
+    assert planned is not None
+    assert [(proposal.participant, proposal.decision) for proposal in planned.proposals] == [
+        ("P001", "excluded"), ("P003", "undecided"), ("P004", "undecided"),
+    ]  # fmt: skip
+    assert [len(results.people) for results in (planned.included, planned.left_out)] == [3, 0]
+    assert [sentence.partition("identical. ")[2] for sentence in rule_sentences(study, None)] == [
+        "No session met this rule. 1 session was excluded under this rule but does not meet it.", "",
+    ]  # fmt: skip
+    assert rule_sentences(study, None)[1].endswith("58 s. Three sessions met this rule.")
+    assert (
+        f"participant P002, session 1 was excluded under the rule constant_answers, but does not meet it: {why}; "
+        "recorded reason: bored (decided by AB)"
+    ) in deviations(study).found
 
 
 def test_the_preregistration_quotes_the_rules(tmp_path: Path) -> None:

@@ -80,18 +80,24 @@ def test_sites_are_merged_and_those_that_were_there_are_kept(labs: Path) -> None
         )
 
 
-def test_decisions_about_a_session_are_recorded_at_its_site(labs: Path) -> None:
+def test_decisions_about_a_session_are_recorded_at_its_site(labs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pooled, north = labs / "pooled", labs / "pooled" / "sites" / "A"
     run("merge", f"A={labs / 'A'}", f"C={labs / 'C'}", "--to", pooled)
     trial = ("--participant", "A-P002", "--trial", 2)
     assert run("exclude", pooled, *trial, *WHO, "coughed") == (["participant A-P002, session 1, trial 2"], [])
     rule = ("--rule", "fast_answers")
-    assert run("exclude", pooled, "--participant", "A-P001", *rule, *WHO, "hasty") == (
-        ["participant A-P001, session 1"], [],
-    )  # fmt: skip
+    hasty = ("--participant", "A-P001", *rule, *WHO, "hasty")
+    run("exclude", pooled, *hasty, code=1)
+    run("exclude", pooled, *hasty, "--trial", 2, code=2)
+    monkeypatch.setattr("study_app.analysis.planned_exclusions.check_rule", lambda *_: False)
+    assert run("exclude", pooled, *hasty) == (
+        ["participant A-P001, session 1"],
+        ["warning: the rule fast_answers can only be checked after unblinding; the report will check it"],
+    )
+    unchecked = "hasty; the rule could not be checked because the key was sealed (decided by AK)"
     assert [[*row[:5], row[6]] for row in rows(north / "exclusions.csv")] == [
         ["P002", "1", "2", "AK", "coughed", "false"],
-        ["P001", "1", "n/a", "fast_answers", "hasty (decided by AK)", "false"],
+        ["P001", "1", "n/a", "fast_answers", unchecked, "false"],
     ]
     assert not (pooled / "sites" / "C" / "exclusions.csv").exists()
     assert run("include", pooled, *trial, *WHO, "quietly")[0] == [

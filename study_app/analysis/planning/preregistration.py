@@ -15,6 +15,7 @@ from study_app.analysis.data.blocks import SPENDINGS, TRENDS, Decided, decisions
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.html_page import bullets, heading, paragraph
 from study_app.analysis.levels.thresholds import FAMILIES, REMOVED
+from study_app.analysis.planned_exclusions import unmet_exclusion_sentences
 from study_app.analysis.planning.simulated_studies import compares_statements, question_contrasts
 from study_app.analysis.results import min_sample
 from study_app.analysis.statistics.equivalence import fewest_participants
@@ -594,6 +595,7 @@ def _deviation_lines(study: Study, sites: Mapping[str, Commitment | None], commi
         )
     if len(by_person) > _SHOWN:
         yield f"report.json lists {len(by_person) - _SHOWN} more exclusions without a preregistered rule"
+    yield from unmet_exclusion_sentences(study)
     if study.decided.changed:
         yield "the decisions about the analysis differ between sessions, so all results are exploratory"
 
