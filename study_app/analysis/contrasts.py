@@ -17,6 +17,7 @@ import pandas as pd
 
 from study_app import number_text
 from study_app.analysis.data.blocks import Item, PlacedQuestion, PlacedScore
+from study_app.analysis.data.measures import by_participant
 from study_app.analysis.data.study_tables import Study, group_members
 from study_app.analysis.findings.finding import FOUND, HOLM, TESTS, BlockAnswers, verdict
 from study_app.analysis.html_page import bullets, ends_of, heading, paragraph, table_of
@@ -38,12 +39,13 @@ from study_app.analysis.statistics.effect_sizes import (
     jzs_bayes_factor,
     paired_delta,
 )
-from study_app.analysis.statistics.equivalence import STEPS, is_beyond, p_equivalent, people_beyond
+from study_app.analysis.statistics.equivalence import is_beyond, p_equivalent, people_beyond
 from study_app.analysis.statistics.mean_tests import SAME, Means, means_of, p_differs, resamples_for
 from study_app.analysis.statistics.outcome import SIDES, Array, Interval, clopper_pearson, holm
 from study_app.analysis.statistics.thresholds import random_effects_weights
 from study_app.analysis.wording import interval, listed, number, p_equals, p_value, significant
 from study_app.protocol.model import Contrast, quoted_title
+from study_app.protocol.participants import fewest_participants
 
 _STATISTICS: Final[Mapping[str, tuple[type[LevelStatistic[Any]], str]]] = {
     "threshold": (Thresholds, "threshold"),
@@ -337,6 +339,27 @@ def _participant_means(numbers: pd.DataFrame) -> Mapping[str, ParticipantValue]:
     return {str(person): ParticipantValue(value=float(mean)) for person, mean in means.items()}
 
 
+def _agreement_values(
+    study: Study, statement: str, answers: BlockAnswers, condition: str | None
+) -> Mapping[str, ParticipantValue]:
+    """Return each participant's agreement with a statement about a condition, or the mean over all conditions.
+
+    A hypothesis about a condition that the block pools with replicates compares this condition alone.
+    """
+    columns = answers.block.columns
+    codes = [setting.code for setting in answers.block.settings if condition in (None, setting.condition)]
+    if condition is not None and len(set(columns.values())) < len(columns):
+        table, own_columns = study.answers(answers.block), {code: place for place, code in enumerate(codes)}
+        rows = by_participant(table[table["code"].isin(codes)], answers.people, own_columns, statement)
+    else:
+        rows = answers.values[statement][:, sorted({columns[code] for code in codes})]
+    return {
+        person: ParticipantValue(value=float(value))
+        for person, value in zip(answers.people, rows.mean(axis=1), strict=True)
+        if not math.isnan(value)
+    }
+
+
 def _participant_values(
     study: Study,
     contrast: Contrast,
@@ -352,15 +375,7 @@ def _participant_values(
         block_answers = next((answered for answered in answers if answered.block.id == block), None)
         if block_answers is None or contrast.measure not in block_answers.values:
             return _values_after_trials(study, contrast, block, condition)
-        codes = [setting.code for setting in block_answers.block.settings if condition in (None, setting.condition)]
-        rows = block_answers.values[contrast.measure][
-            :, sorted({block_answers.block.columns[code] for code in codes})
-        ].mean(axis=1)
-        return {
-            person: ParticipantValue(value=float(row))
-            for person, row in zip(block_answers.people, rows, strict=True)
-            if not math.isnan(row)
-        }
+        return _agreement_values(study, contrast.measure, block_answers, condition)
     result = next(level for level in levels if level.block == block)
     statistic, attribute = _STATISTICS[contrast.measure]
     ratio = _is_ratio(contrast, levels)
@@ -401,7 +416,7 @@ def _test_contrast(
     compared = _collect_samples(study, contrast, answers, levels)
     ratio, means = _is_ratio(contrast, levels), compared.means(strictest)
     names, within = _side_names(study, contrast), _within_names(study, contrast)
-    largest = None if _statement(study, contrast) is None else largest_difference(contrast)
+    largest = None if _statement(study, contrast) is None else contrast.largest_difference
     is_ordinal = contrast.measure not in _STATISTICS and not contrast.is_interaction
     standardised = _standardised_effects(compared, is_ordinal=is_ordinal)
     effect = ends = p_equal = p = p_bootstrap = p_skewed = statistic = error = None
@@ -471,7 +486,16 @@ def _test_contrast(
         freedom=None if error is None or means is None else means.freedom,
         largest=largest,
         scale=_scale_ends(study, contrast),
+        fewest=_fewest_for_equivalence(study, contrast, largest, ratio=ratio),
     )
+
+
+def _fewest_for_equivalence(study: Study, contrast: Contrast, largest: float | None, *, ratio: bool) -> int | None:
+    """Return the number of participants that equivalence within the bound requires; None without a bound."""
+    if contrast.bound is None:
+        return None
+    bounds = sum(other.bound is not None for other in study.contrasts)
+    return fewest_participants(study.decided.alpha / bounds, bound_as_tested(contrast.bound, ratio=ratio), largest)
 
 
 def _side_names(study: Study, contrast: Contrast) -> tuple[str, str]:
@@ -530,11 +554,6 @@ def bound_as_tested(bound: float, *, ratio: bool) -> float:
     return abs(math.log(bound)) if ratio else bound
 
 
-def largest_difference(contrast: Contrast) -> float:
-    """Return the largest possible difference in agreement with a statement."""
-    return STEPS * (2 if contrast.is_interaction else 1)
-
-
 def _largest_possible_share(contrast: Contrast, compared: ContrastSamples, *, ratio: bool) -> float | None:
     """Return the upper confidence limit of the share of participants who differ by more than the bound."""
     if contrast.bound is None or not compared.smallest:
@@ -567,6 +586,11 @@ def answer(contrast: ContrastResult) -> str:
         sentences.append(
             f"The mean {kind} lies within the equivalence bounds (equivalent{p}). However, the data do not rule out "
             f"the possibility that up to {100 * (contrast.not_excluded or 0.0):.0f} % {people}."
+        )
+    elif contrast.equivalent is not None and contrast.is_too_small:
+        each = " in each group" if contrast.contrast.groups else ""
+        sentences.append(
+            f"The sample is too small to show equivalence: at least {contrast.fewest} participants{each} are needed."
         )
     elif contrast.equivalent is not None:
         sentences.append(f"The tests do not show that the mean {kind} lies within the equivalence bounds.")
@@ -680,11 +704,12 @@ def contrast_methods(results: Results) -> Iterator[str]:
     if not contrasts:
         return
     yield from _tests_used(contrasts)
+    reductions = f" ({listed(list(_reductions(results)))})".replace(" ()", "")
     yield (
-        "Each participant contributed one value to each comparison. In addition to the t test, we used a bootstrap "
-        "that includes one hypothetical participant as extreme as the most extreme participant in the sample (Gaffke "
-        "2005), and a t test corrected for skewness (Hall 1992). The reported p value is the largest of the "
-        f"three{_holm_words(contrasts)}."
+        f"Each participant contributed one value to each comparison{reductions}. In addition to the t test, "
+        "we used a bootstrap that includes one hypothetical participant as extreme as the most extreme participant in "
+        "the sample (Gaffke 2005), and a t test corrected for skewness (Hall 1992). The reported p value is the "
+        f"largest of the three{_holm_words(contrasts)}."
     )
     if any(contrast.contrast.measure == "threshold" for contrast in contrasts):
         yield _WEIGHTED.rstrip()
@@ -702,6 +727,21 @@ def contrast_methods(results: Results) -> Iterator[str]:
         f"{question(contrast)}: {_left_out_words(contrast)}": None for contrast in contrasts if contrast.left_out
     }:
         yield f"Some participants were excluded from a test because a value was missing ({'; '.join(exclusions)})."
+
+
+def _reductions(results: Results) -> Iterator[str]:
+    """Yield how several answers or estimates of a participant are reduced to one value, for each kind of measure."""
+    of_questions = [result for result in results.contrasts if result.contrast.measure not in _STATISTICS]
+    if any(result.largest is not None for result in of_questions):
+        yield "the median of repeated answers to a statement"
+    if any(result.largest is None for result in of_questions):
+        yield "the mean of repeated answers to another question"
+    compared = {(block, result.contrast.measure) for result in results.contrasts for block in result.contrast.blocks}
+    for level in results.levels:
+        for measure, (statistic, _) in _STATISTICS.items():
+            standards = {getattr(row, "standard", None) for row in statistic.rows_in(level)}
+            if (level.block, measure) in compared and len(standards) > 1:
+                yield f"the mean over the standards in {quoted_title(level.title)}"
 
 
 def _tests_used(contrasts: Sequence[ContrastResult]) -> Iterator[str]:
@@ -767,7 +807,9 @@ def contrast_section(results: Results) -> Iterator[str]:
     if bounds:
         yield paragraph(
             "“Equivalent” means that the sample is large enough and that both two one-sided t tests and the bootstrap "
-            "show that the mean difference (or ratio) lies within the stated bounds (Holm-adjusted across the bounds).",
+            "show that the mean difference (or ratio) lies within the stated bounds (Holm-adjusted across the bounds). "
+            "The equivalence p value is the largest of their p values, or the probability that the sample includes "
+            "nobody of a minority that could shift the mean by the bound, if this is larger.",
             "soft",
         )
     if rows := [contrast for contrast in contrasts if contrast.left_out]:

@@ -13,13 +13,14 @@ from typing import Any, Final, Literal, TypeAlias, TypeVar
 from study_app.analysis.data.blocks import Block, Decided, Item, Kind, OwnDynamics, Setting
 from study_app.analysis.data.motion import Performance
 from study_app.analysis.statistics.effect_sizes import EffectSize
-from study_app.analysis.statistics.equivalence import STEPS, Equivalence, fewest_participants, smallest_minority
+from study_app.analysis.statistics.equivalence import STEPS, Equivalence
 from study_app.analysis.statistics.outcome import Outcome
 from study_app.analysis.wording import listed, ms, number, percent, significant
 from study_app.discovery import explain_error
 from study_app.errors import PlugInError
 from study_app.protocol.model import Contrast, Published
 from study_app.protocol.orders import Evenness
+from study_app.protocol.participants import fewest_participants, smallest_minority
 
 
 @dataclass(frozen=True, slots=True)
@@ -293,7 +294,8 @@ class ContrastResult(Outcome):
     ``measure_name`` is the measure in words, and ``block_title`` is that of the first block. ``standard_error`` is that
     of the mean difference, of logarithms for a ratio, and ``freedom`` are the degrees of freedom of t. ``largest`` is
     the largest possible difference in agreement with a statement, ``scale`` the ends of the scale of another question
-    or score; None for other measures.
+    or score; None for other measures. ``fewest`` is the number of participants, for groups of each group, without
+    whom equivalence within the study's bound is out of reach.
     """
 
     contrast: Contrast
@@ -322,6 +324,13 @@ class ContrastResult(Outcome):
     freedom: int | None = None
     largest: float | None = None
     scale: tuple[float, float] | None = None
+    fewest: int | None = None
+
+    @property
+    def is_too_small(self) -> bool:
+        """Whether the sample, or the smaller group, is too small to show equivalence within the study's bound."""
+        sizes = [self.n] if self.contrast.groups is None else [len(side.values) for side in self.sides]
+        return self.fewest is not None and min(sizes) < self.fewest
 
     @property
     def comparison(self) -> str:
@@ -415,10 +424,15 @@ def short_text(result: BlockResult, item: str) -> str:
 
 
 def name(result: BlockResult, code: str) -> str:
-    """Return the name of a setting; in a block of delays, which has only one liquid, the delay."""
+    """Return the name of a setting; in a block of delays, which has only one liquid, the delay.
+
+    The condition's ID follows a delay that several conditions have.
+    """
     for setting, text in zip(result.settings, result.names, strict=True):
         if setting.code == code:
-            return ms(setting.delay_ms or 0.0) if result.delays_ms else text
+            delay_ms = setting.delay_ms or 0.0
+            is_replicate = delay_ms in result.replicated_ms
+            return f"{ms(delay_ms)}{f' ({setting.condition})' * is_replicate}" if result.delays_ms else text
     raise KeyError(code)
 
 
@@ -447,11 +461,11 @@ def presentation_sentences(result: BlockResult) -> tuple[str, ...]:
             f"Several conditions have a delay of {delays}; they are treated as repeated presentations of one delay."
         )
     if most > 1:
-        often = f"{most}" if fewest == most else f"{fewest} to {most}"
+        often = _times_words(fewest, most)
         has_threshold = result.findings.get("threshold") is not None
         single = "; the detection threshold is estimated from all individual answers" if has_threshold else ""
         lines.append(
-            f"Each participant rated each {settings_noun(result)} {often} times. The tests use the median of these "
+            f"Each participant rated each {settings_noun(result)} {often}. The tests use the median of these "
             f"answers{single}."
         )
     if len(result.sessions) > 1:
@@ -462,9 +476,16 @@ def presentation_sentences(result: BlockResult) -> tuple[str, ...]:
     return tuple(lines)
 
 
+def _times_words(fewest: int, most: int) -> str:
+    """Return "twice", "once or twice", "1 to 3 times"."""
+    if most == 2:
+        return "twice" if fewest == most else "once or twice"
+    return f"{most} times" if fewest == most else f"{fewest} to {most} times"
+
+
 def min_sample(alpha: float, bound: float) -> str:
     """Return the minimum number of participants for equivalence of statements."""
-    return f"at least {fewest_participants(alpha, bound)} participants"
+    return f"at least {fewest_participants(alpha, bound, STEPS)} participants"
 
 
 def min_sample_reason(alpha: float, bound: float) -> str:
@@ -484,6 +505,7 @@ def test_name(outcome: Outcome) -> str:
         "Wilcoxon signed ranks": "Wilcoxon's signed-rank test",
         "trend over participants": "sign-flip permutation test on the participants' rank correlations",
         "t test of slopes": "Student's t test on the participants' slopes",
+        "t test of differences": "Student's t test on the participants' differences",
     }.get(outcome.test, outcome.test)
 
 

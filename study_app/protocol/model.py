@@ -33,7 +33,7 @@ from study_app.protocol.participants.groups import Group, GroupAssignment, Seque
 from study_app.protocol.participants.raters import SimulatedParticipants
 from study_app.protocol.quantities import MAX_FORCE_N
 from study_app.protocol.questionnaires import Questionnaire
-from study_app.protocol.questions import Scale
+from study_app.protocol.questions import POINTS, Scale
 from study_app.protocol.source.table import Body as PageBody
 from study_app.protocol.source.table import (
     Brief,
@@ -463,6 +463,11 @@ class Contrast(Table):
         return self.groups is not None and self.within is not None
 
     @property
+    def largest_difference(self) -> int:
+        """The largest possible difference if the measure is agreement with a statement."""
+        return (POINTS - 1) * (2 if self.is_interaction else 1)
+
+    @property
     def measure_words(self) -> str:
         """The measure in words: "threshold", "agreement with “thick”"; see also `Protocol.measure_words`."""
         if self.form is not None:
@@ -577,6 +582,11 @@ class ExclusionRule(Table):
         return RULES[self.rule].format(limit=self.limit)
 
 
+Spending: TypeAlias = Literal["obrien-fleming", "pocock"]
+SPENDINGS: Final[Mapping[Spending, str]] = {"obrien-fleming": "O'Brien–Fleming", "pocock": "Pocock"}
+"""The name of each alpha spending function."""
+
+
 class Analysis(Table):
     """Decisions about the analysis; without this table, the report labels all results as exploratory."""
 
@@ -622,7 +632,7 @@ class Analysis(Table):
         description="Numbers of participants at which the key is opened and all hypotheses are tested. The last one "
         "must equal the planned number of participants; default: once, at the end.",
     )
-    spending: Literal["obrien-fleming", "pocock"] = later(
+    spending: Spending = later(
         default="obrien-fleming",
         description=(
             "How alpha is spent across the looks (Lan and DeMets 1983). obrien-fleming: mostly at the last look; "
@@ -663,7 +673,7 @@ class Analysis(Table):
             yield "Participants", f"{self.participants} planned"
         if self.looks:
             looks = ", ".join(map(str, self.looks))
-            yield "Interim analyses", f"with {looks} participants; alpha spending: {self.spending}"
+            yield "Interim analyses", f"with {looks} participants; {SPENDINGS[self.spending]} alpha spending"
         if self.precision is not None:
             width = f"{100 * self.precision:g} %"
             yield "Precision", f"half-width of the 95 % confidence interval for the group mean: {width}"

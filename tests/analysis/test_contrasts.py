@@ -16,6 +16,7 @@ from scipy.stats import ttest_ind, ttest_rel
 
 from study_app.analysis import contrasts
 from study_app.analysis.contrasts import _direction_words, answer, contrast_section
+from study_app.analysis.data.blocks import PlacedScore, QuestionPlace
 from study_app.analysis.data.study_tables import Study, load_study
 from study_app.analysis.evaluate import evaluate
 from study_app.analysis.figures.level_figures import level_figure_tasks
@@ -43,6 +44,7 @@ from study_app.number_text import counted
 from study_app.protocol.load import parse
 from study_app.protocol.model import OF_LEVELS, Contrast, Protocol
 from study_app.protocol.participants.raters import PUBLISHED, TYPICAL
+from study_app.protocol.questionnaires import Score
 from study_app.protocol.source.files import source_bytes
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store.unblinding import unblind
@@ -206,7 +208,9 @@ def test_two_conditions_of_a_statement_are_compared_and_can_be_equivalent() -> N
     assert (same.verdict, same.equivalent) == ("equivalent", True)
     (narrow,) = evaluate(statements(contrast.model_copy(update={"bound": 0.01}))).contrasts
     assert (narrow.verdict, narrow.equivalent) == ("not shown", False)
-    assert "The tests do not show that the mean difference lies within the equivalence bounds." in answer(narrow)
+    assert answer(narrow).endswith(
+        "The sample is too small to show equivalence: at least 1796 participants are needed."
+    )
     (beyond,) = evaluate(statements(contrast, 2.0)).contrasts
     assert beyond.interval is not None
     assert beyond.interval.low > 1.0
@@ -841,9 +845,13 @@ def test_the_measure_of_a_hypothesis_is_named_by_the_texts_of_its_own_block_or_f
     def block(name: str, **shorts: str) -> Any:
         return SimpleNamespace(id=name, items=[SimpleNamespace(id=item, short=text) for item, text in shorts.items()])
 
-    load, after = SimpleNamespace(id="load", title="Load"), SimpleNamespace(id="after", title="After")
+    load, after = (QuestionPlace(name, name.capitalize(), True, ()) for name in ("load", "after"))
+    score = Score(items=("calm",))
     others = SimpleNamespace(
-        scores=[SimpleNamespace(where=form, name="raw", title=f"{form.title} raw") for form in (after, load)],
+        scores=[
+            PlacedScore(where, "raw", instrument, score, ())
+            for where, instrument in ((after, "sus"), (load, "nasa-tlx"))
+        ],
         questions=[
             SimpleNamespace(where=form, id=name, short=f"{name} of {form.id}")
             for name in ("calm", "sure")
@@ -855,7 +863,7 @@ def test_the_measure_of_a_hypothesis_is_named_by_the_texts_of_its_own_block_or_f
     for named, name in (
         ({"measure": "warm", "blocks": ("b",), "conditions": ("c2", "c1")}, "agreement with “Warm”"),
         ({"measure": "warm", "blocks": ("c",), "conditions": ("c2", "c1")}, "agreement with “Lukewarm”"),
-        ({"measure": "raw", "form": "load", "blocks": ("a", "b")}, "Load raw score"),
+        ({"measure": "raw", "form": "load", "blocks": ("a", "b")}, "NASA-TLX raw score"),
         ({"measure": "sure", "form": "load", "blocks": ("a", "b")}, "“sure of load” (Load)"),
         ({"measure": "threshold", "blocks": ("a", "b")}, ""),
     ):

@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from study_app.analysis import contrasts
-from study_app.analysis.contrasts import answer, bound_as_tested, largest_difference, question, t_test_name
+from study_app.analysis.contrasts import answer, bound_as_tested, question, t_test_name
 from study_app.analysis.levels.thresholds import ThresholdEstimate
 from study_app.analysis.results import ContrastResult, ContrastSide, LevelsResult
 from study_app.analysis.statistics.effect_sizes import EffectSize
@@ -117,6 +117,18 @@ def test_equivalence_is_stated_with_the_share_that_is_not_excluded() -> None:
     assert groups.endswith("up to 26 % of a group belong to a minority that the sample does not include.")
     unclear = answer(result_of({**STATED, "bound": 1.0}, equivalent=False))
     assert unclear.endswith("The tests do not show that the mean difference lies within the equivalence bounds.")
+    too_few = answer(result_of({**STATED, "bound": 1.0}, equivalent=False, n=13, fewest=14))
+    assert too_few.endswith("The sample is too small to show equivalence: at least 14 participants are needed.")
+    groups = {
+        "n": 33,
+        "sides": tuple(SimpleNamespace(name=str(n), values=range(n), mean=None) for n in (20, 13)),
+        "higher": None,
+    }
+    for fewest, ends in (
+        (13, "within the equivalence bounds."),
+        (14, "at least 14 participants in each group are needed."),
+    ):
+        assert answer(result_of({**BETWEEN, "bound": 1.0}, equivalent=False, fewest=fewest, **groups)).endswith(ends)
     beyond = Interval(low=1.3, high=2.6, level=0.95, method="t")
     for bound, ends in ((1.25, "lies outside the equivalence bounds (not equivalent)."), (1.35, "equivalence bounds.")):
         text = answer(result_of({**BLOCKS, "bound": bound}, ratio=True, effect=1.8, interval=beyond, equivalent=False))
@@ -217,6 +229,33 @@ def test_differences_are_those_of_participants_with_both_answers_and_the_first_m
     assert (samples.shared, samples.cells, samples.smallest, samples.means(0.05)) == (0.0, (), 1, None)
 
 
+def test_a_condition_that_the_block_pools_with_replicates_is_compared_alone() -> None:
+    """Conditions c1 and c2 have the same delay; P000 rated c1 twice, and P002 did not rate c3."""
+    block = SimpleNamespace(
+        id="b", settings=[SimpleNamespace(code=f"L{n}", condition=f"c{n}") for n in (1, 2, 3)],
+        columns={"L1": 0, "L2": 0, "L3": 1},
+    )  # fmt: skip
+    rows = [
+        ("P000", "L1", 2, 1), ("P000", "L2", 7, 2), ("P000", "L1", 5, 3), ("P000", "L3", 4, 4),
+        ("P001", "L3", 1, 1), ("P001", "L1", 6, 2), ("P001", "L2", 3, 3), ("P002", "L1", 4, 1), ("P002", "L2", 6, 2),
+    ]  # fmt: skip
+    table = pd.DataFrame(rows, columns=["participant", "code", "response", "trial"]).assign(item="warm", session=1)
+    answers: Any = SimpleNamespace(
+        block=block, people=("P000", "P001", "P002"), values={"warm": np.array([[5.0, 4.0], [4.5, 1.0], [5.0, NAN]])}
+    )
+    study: Any = SimpleNamespace(answers=lambda _block: table)
+    values = {
+        condition: {
+            who: held.value for who, held in contrasts._agreement_values(study, "warm", answers, condition).items()
+        }
+        for condition in ("c1", "c2", "c3", None)
+    }
+    assert values == {
+        "c1": {"P000": 3.5, "P001": 6.0, "P002": 4.0}, "c2": {"P000": 7.0, "P001": 3.0, "P002": 6.0},
+        "c3": {"P000": 4.0, "P001": 1.0}, None: {"P000": 4.5, "P001": 2.75},
+    }  # fmt: skip
+
+
 def test_an_interaction_has_the_differences_of_each_group_and_its_values_under_each_condition() -> None:
     groups = pd.array(["old", "new", "old", "other"], "string")
     made = replace(MADE, participants=MADE.participants.assign(group=groups))
@@ -237,8 +276,8 @@ def test_an_interaction_has_the_differences_of_each_group_and_its_values_under_e
 
 
 def test_a_statement_differs_by_at_most_6_points_and_an_interaction_by_12() -> None:
-    assert largest_difference(Contrast.model_validate(STATED)) == 6
-    assert largest_difference(Contrast.model_validate({**STATED, "groups": ("old", "new")})) == 12
+    assert Contrast.model_validate(STATED).largest_difference == 6
+    assert Contrast.model_validate({**STATED, "groups": ("old", "new")}).largest_difference == 12
 
 
 def test_the_bound_of_a_ratio_is_tested_as_a_logarithm() -> None:
@@ -266,8 +305,22 @@ def test_the_methods_name_the_tests_and_corrections_of_all_hypotheses() -> None:
         replace(paired, left_out={"P3": "asleep"}), result_of(crossed),
         result_of({**BLOCKS, "expected": "higher", "bound": 1.2}, ratio=True),
     )  # fmt: skip
-    results: Any = SimpleNamespace(contrasts=rows)
+    rows = (replace(rows[0], largest=6), replace(rows[1], largest=None), rows[2])
+    standards = {level: SimpleNamespace(standard=level) for level in (4, 10)}
+    levels = [
+        SimpleNamespace(block=block, title=title, statistics={"thresholds": [standards[level] for level in given]})
+        for block, title, given in (
+            ("late", "Late part", (4, 10)),
+            ("prompt", "Prompt", (4,)),
+            ("else", "Else", (4, 10)),
+        )
+    ]
+    results: Any = SimpleNamespace(contrasts=rows, levels=levels)
     lines = list(contrasts.contrast_methods(results))
+    assert lines[4].startswith(
+        "Each participant contributed one value to each comparison (the median of repeated answers to a statement, the "
+        "mean of repeated answers to another question and the mean over the standards in “Late part”). In addition to"
+    )
     text = " ".join(lines)
     assert lines[0].endswith(") was tested with a two-sided paired t test.")
     assert lines[2].endswith(") was tested with a one-sided paired t test on log-transformed values.")
@@ -281,6 +334,6 @@ def test_the_methods_name_the_tests_and_corrections_of_all_hypotheses() -> None:
     ):
         assert sentence in text
     assert lines[-1].endswith("with an equivalence bound of 1: P3 (asleep)).")
-    (alone, *_) = contrasts.contrast_methods(SimpleNamespace(contrasts=(paired,)))  # type: ignore[arg-type]
+    (alone, *_) = contrasts.contrast_methods(SimpleNamespace(contrasts=(paired,), levels=()))  # type: ignore[arg-type]
     assert alone.startswith("The hypothesis (")
     assert list(contrasts.contrast_methods(SimpleNamespace(contrasts=()))) == []  # type: ignore[arg-type]

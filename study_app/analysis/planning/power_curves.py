@@ -18,7 +18,7 @@ from matplotlib.ticker import MaxNLocator, PercentFormatter
 
 from study_app import __version__
 from study_app import figure_style as style
-from study_app.analysis.contrasts import inclusion_words, largest_difference
+from study_app.analysis.contrasts import inclusion_words
 from study_app.analysis.data.blocks import TRENDS
 from study_app.analysis.data.measures import Array
 from study_app.analysis.page_layout import SMALL, Style
@@ -232,13 +232,18 @@ def _detectable_effect(shares: Array, effects: Array) -> float | None:
     return float(effects[index - 1] + fraction * (effects[index] - effects[index - 1]))
 
 
+def _longer_delays(block: PlannedBlock) -> list[int]:
+    """Return the indices of the settings with a longer delay than the shortest one."""
+    return [delay for delay in range(1, block.k) if block.names[delay] != block.names[0]]
+
+
 def _lowest_curves(block: PlannedBlock, counts: Counts, studies: int) -> Iterator[Curve]:
     if (block.id, "lowest") not in counts:
         return
     shares = counts[block.id, "lowest"] / studies
     for place, item in enumerate(block.items):
         if shares[:, place].any():
-            for delay in range(1, block.k):
+            for delay in _longer_delays(block):
                 power = tuple(shares[:, place, delay].tolist())
                 yield Curve(
                     block=block.id,
@@ -259,7 +264,7 @@ def _equivalence_curves(block: PlannedBlock, counts: Counts, studies: int) -> It
     shares = counts[block.id, "equivalent"] / studies
     means = counts[block.id, "means"][FULL] / studies
     for place, item in enumerate(block.items):
-        for delay in range(1, block.k):
+        for delay in _longer_delays(block):
             none, full = (tuple(shares[:, effect, place, delay - 1].tolist()) for effect in (0, 1))
             difference = float(means[delay, place] - means[0, place])
             yield Curve(
@@ -483,7 +488,7 @@ def _summary_lines(power: Powers) -> Iterator[str]:
         if curve.question == "contrast" or (primary and curve.question in ("conditions differ", "trend")):
             shares = dict(zip(power.kinds, (kind.power[place] for kind in power.curves_by_kind(curve)), strict=True))
             question = "" if curve.question == "contrast" else f" ({HEADS[curve.question]})"
-            shown = "show equivalence" if curve.setting == IF_EQUAL else "detect the effect"
+            shown = "show equivalence" if curve.over.endswith(IF_EQUAL) else "detect the effect"
             lines.append(
                 f"- {_curve_name(curve, power).strip('*')}{question}: {whole_percent(shares[CONSISTENT])} of studies "
                 f"{shown} if participants are {CONSISTENT}, {whole_percent(shares[main])} if they are "
@@ -514,13 +519,15 @@ def _untested_contrasts(power: Powers) -> Iterator[str]:
         yield from smallest_differences(
             contrast, power.sizes, plan.decided.alphas[-1], len(plan.contrasts) + plan.untested, rows, "statement",
             description, "±{:.2f}".format, shares, contrast.bound, bounds=_count_bounds(plan),
-            largest=largest_difference(contrast), planned=plan.participants, unit=" points",
+            largest=contrast.largest_difference, planned=plan.participants, unit=" points",
             titles=titles,
         )  # fmt: skip
     for contrast, of_groups in plan.of_questions:
         members = len(plan.contrasts) + plan.untested
         alpha, planned = plan.decided.alphas[-1], plan.participants
-        yield from question_differences(contrast, power.sizes, alpha, members, of_groups, planned, titles)
+        yield from question_differences(
+            contrast, power.sizes, alpha, members, of_groups, planned, titles, bounds=_count_bounds(plan)
+        )
 
 
 def _count_bounds(plan: Plan) -> int:

@@ -9,10 +9,10 @@ from scipy.special import stdtrit
 from study_app.analysis.contrasts import inclusion_words
 from study_app.analysis.planning import WANTED
 from study_app.analysis.planning.simulated_studies import IF_EQUAL
-from study_app.analysis.statistics.equivalence import fewest_participants
 from study_app.analysis.statistics.mean_tests import equivalence_power, smallest_shift
 from study_app.analysis.wording import whole_percent
 from study_app.protocol.model import Contrast
+from study_app.protocol.participants import fewest_participants
 
 MOST_SD: Final = 3.0
 """The largest detectable difference [SD] that is reported; sample sizes that need a larger one are too few. [choice]"""
@@ -26,6 +26,8 @@ def question_differences(
     shares: tuple[float, float] | None,
     planned: int | None,
     titles: Mapping[str, str],
+    *,
+    bounds: int,
 ) -> Iterator[str]:
     """Yield the table of a contrast of answers or scores that are not simulated, in standard deviations.
 
@@ -47,6 +49,7 @@ def question_differences(
         description,
         "±{:.2f} SD".format,
         shares,
+        bounds=bounds,
         planned=planned,
         titles=titles,
         measure="" if contrast.form is not None else f"“{contrast.measure}”",
@@ -104,11 +107,12 @@ def smallest_differences(
     def groups_of(n: int) -> list[int]:
         return [n] if shares is None else [int(n * share + 1e-9) for share in shares]
 
-    def differences(n: int, spread: float) -> tuple[float, float] | None:
+    def differences(n: int, spread: float) -> tuple[float | None, float | None]:
+        """Return the half-width and the smallest difference; None if there are too few participants."""
         if min(groups := groups_of(n)) < 3:
-            return None
+            return None, None
         half, least = detectable_difference(*groups, alpha=strictest, expected=contrast.expected)
-        return None if least > MOST_SD else (half * spread, least * spread)
+        return half * spread, None if least > MOST_SD else least * spread
 
     equal = [] if bound is None else [f"shown to be equivalent {IF_EQUAL}"]
     heads = (first, "participants", "SD", "half-width of the 95 % interval", "smallest difference", *equal)
@@ -120,11 +124,11 @@ def smallest_differences(
     test_note = f"{sides}, α = {strictest:.2g}{corrected}"
     equivalence_note = (
         ""
-        if bound is None
-        else f"Equivalence requires at least {fewest_participants(alpha / bounds, bound, largest)} "
+        if contrast.bound is None
+        else f"Equivalence requires at least {fewest_participants(alpha / bounds, bound or contrast.bound, largest)} "
         f"participants{' in each group' if shares else ''}, at α = {alpha / bounds:.2g}. "
     )
-    has_too_few = any(differences(n, spread) is None for n in sizes for *_, spread in rows)
+    has_too_few = any(differences(n, spread)[1] is None for n in sizes for *_, spread in rows)
     too_few_note = (
         f"“Too few” means that fewer than {whole_percent(WANTED)} of studies would detect even a difference of "
         f"{MOST_SD:g} SD. " * has_too_few
@@ -142,7 +146,7 @@ def smallest_differences(
                 contrast,
                 planned,
                 row_note,
-                differences(planned, spread),
+                differences(planned, spread)[1],
                 lambda end: directed_text(end) + unit,
                 assumed,
             ),
@@ -150,12 +154,11 @@ def smallest_differences(
     yield from ("", f"| {' | '.join(heads)} |", "|---:" * len(heads) + "|")
     for name, sd_text, spread in rows:
         for n in sizes:
-            reached, groups = differences(n, spread), groups_of(n)
-            ends = (
-                ["too few", "too few"]
-                if reached is None
-                else [format_difference(reached[0]), directed_text(reached[1])]
-            )
+            (half, least), groups = differences(n, spread), groups_of(n)
+            ends = [
+                "too few" if half is None else format_difference(half),
+                "too few" if least is None else directed_text(least),
+            ]
             if bound is not None:
                 enough_people = min(groups) >= fewest_participants(alpha / bounds, bound, largest)
                 share = equivalence_power(*groups, alpha=alpha / bounds, bound=bound / spread) if enough_people else 0.0
@@ -167,16 +170,15 @@ def _verdict(
     contrast: Contrast,
     planned: int,
     row_note: str,
-    reached: tuple[float, float] | None,
+    least: float | None,
     format_difference: Callable[[float], str],
     assumed: tuple[str, float] | None,
 ) -> str:
     """Return a sentence on the smallest difference that the planned sample detects."""
     in_measure = "" if assumed is None else f" in {assumed[0]}"
     too_few = f"The planned {planned} participants{row_note} are too few to find a difference{in_measure}"
-    if reached is None:
+    if least is None:
         return f"**{too_few} of {MOST_SD:g} SD with {whole_percent(WANTED)} power.**"
-    _, least = reached
     verdict = f"**{too_few} smaller than {format_difference(least)} with {whole_percent(WANTED)} power.**"
     if assumed is None or least <= assumed[1]:
         return verdict

@@ -405,11 +405,12 @@ def _contrast_tables(precisions: Precisions) -> Iterator[str]:
     planned, titles = plans(precisions.protocol, ()), _titles_by_block(precisions.protocol)
     alpha, members = decisions(precisions.protocol).alphas[-1], len(decided.contrasts)
     of_questions = question_contrasts(precisions.protocol)
+    bounds = sum(contrast.bound is not None for contrast in decided.contrasts)
     for contrast in decided.contrasts:
         if contrast in of_questions:
             shares = group_shares(precisions.protocol, contrast)
             yield from question_differences(
-                contrast, precisions.sizes, alpha, members, shares, decided.participants, titles
+                contrast, precisions.sizes, alpha, members, shares, decided.participants, titles, bounds=bounds
             )
             continue
         firsts = [next(iter(planned[block].values())) for block in contrast.blocks if block in planned]
@@ -435,7 +436,7 @@ def _contrast_tables(precisions: Precisions) -> Iterator[str]:
             format_difference,
             group_shares(precisions.protocol, contrast),
             _log_bound(precisions.protocol, contrast) if ratio else contrast.bound,
-            bounds=sum(other.bound is not None for other in decided.contrasts),
+            bounds=bounds,
             planned=decided.participants, assumed=assumed, titles=titles,
         )  # fmt: skip
 

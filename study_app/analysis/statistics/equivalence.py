@@ -23,11 +23,9 @@ from study_app.analysis.statistics.outcome import Array, Interval, Outcome, chec
 from study_app.analysis.wording import bound_text
 from study_app.errors import AnalysisError
 from study_app.number_text import counted
+from study_app.protocol.participants import fewest_participants, smallest_minority
 
 Verdict: TypeAlias = Literal["equivalent", "not equivalent", "inconclusive", "out of reach"]
-
-_LARGEST_MINORITY: Final = 1 / 5
-"""The largest minority that the sample has to represent, however wide the bound, as a share of the population."""
 
 STEPS: Final = 6.0
 """The largest difference between two answers on a seven-point scale."""
@@ -112,22 +110,9 @@ def p_equivalent(means: Means, bound: float, n: int, largest: float | None) -> A
     return np.asarray(np.maximum(np.max(ps, axis=0), p_unseen(n, bound, largest)))
 
 
-def smallest_minority(bound: float, largest: float | None) -> float:
-    """Return the share of people who can shift the mean by the bound, at most `_LARGEST_MINORITY`.
-
-    Each of them differs by ``largest``; None means that differences are unlimited, so that any minority could do so.
-    """
-    return _LARGEST_MINORITY if largest is None else min(_LARGEST_MINORITY, bound / largest)
-
-
 def p_unseen(n: int, bound: float, largest: float | None = STEPS) -> float:
     """Return the probability that a sample of ``n`` participants contains no member of the `smallest_minority`."""
     return float((1 - smallest_minority(bound, largest)) ** n)
-
-
-def fewest_participants(alpha: float, bound: float, largest: float | None = STEPS) -> int:
-    """Return the minimum number of participants for which equivalence can be shown."""
-    return math.ceil(math.log(alpha) / math.log1p(-smallest_minority(bound, largest)) - 1e-9)
 
 
 @lru_cache(maxsize=4096)

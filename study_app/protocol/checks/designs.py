@@ -16,7 +16,6 @@ from study_app.protocol.model import RULES, Contrast, Protocol, Published
 from study_app.protocol.orders.block_orders import order_of
 from study_app.protocol.orders.tracks import tracks_of
 from study_app.protocol.quantities import can_vary
-from study_app.protocol.questions import POINTS
 from study_app.protocol.source.document import Path, entries, names
 from study_app.protocol.source.problems import Fault, unknown_name
 from study_app.protocol.source.table import Table
@@ -232,9 +231,8 @@ def _check_bound(protocol: Protocol, contrast: Contrast, place: Path) -> Iterato
     if contrast.measure in ("threshold", "pse") and spacings == {"log"} and bound <= 1:
         ratio = f"{1 / bound:.3g}" if bound < 1 else "1.25"
         yield Fault(path, f"is {bound:g}, but the bound of a ratio must be greater than 1", f"for example {ratio}")
-    largest = (POINTS - 1) * (2 if contrast.is_interaction else 1)
-    if protocol.compares_statement(contrast) and bound > largest:
-        message = f"is {bound:g}, but differences on seven points are at most {largest}"
+    if protocol.compares_statement(contrast) and bound > contrast.largest_difference:
+        message = f"is {bound:g}, but differences on seven points are at most {contrast.largest_difference}"
         yield Fault(path, message, "choose the largest difference that you consider negligible")
 
 

@@ -1,4 +1,4 @@
-"""Groups of participants, and how simulated participants answer."""
+"""Groups of participants, how simulated participants answer, and how many a test of equivalence requires."""
 
 from study_app.protocol.participants.groups import ASSIGNMENT, EACH_GROUP, RecordedSessions, next_group, sequences_in
 from study_app.protocol.participants.raters import (
@@ -10,6 +10,7 @@ from study_app.protocol.participants.raters import (
     SimulatedParticipants,
     compared_kinds,
 )
+from study_app.protocol.participants.sample_sizes import fewest_participants, smallest_minority
 
 __all__ = [
     "ASSIGNMENT",
@@ -22,6 +23,8 @@ __all__ = [
     "RecordedSessions",
     "SimulatedParticipants",
     "compared_kinds",
+    "fewest_participants",
     "next_group",
     "sequences_in",
+    "smallest_minority",
 ]

@@ -16,8 +16,10 @@ from study_app.protocol.blocks import Block
 from study_app.protocol.checks.consistency import LEAST_N, force_n
 from study_app.protocol.checks.force_limits import PACED, fastest_hz, unpaced_clipping_warning
 from study_app.protocol.model import Follow, Protocol, Published, Reach
+from study_app.protocol.orders.balance import planned_participants
 from study_app.protocol.orders.durations import variants
 from study_app.protocol.orders.tracks import tracks_of
+from study_app.protocol.participants.sample_sizes import fewest_participants
 from study_app.protocol.presented.presented_levels import highest_damping
 from study_app.protocol.questionnaires import Instrument
 from study_app.protocol.questions import POINTS
@@ -273,6 +275,8 @@ def _analysis_warnings(protocol: Protocol) -> Iterator[str]:
             "false-positive rate above alpha"
         )
     yield from _attribute_groups(protocol)
+    yield from _too_few_for_equivalence(protocol)
+    yield from _different_standards(protocol)
     yield from _block_order_warnings(protocol)
     yield from dict.fromkeys(_repeated_pages(protocol))
     for number, value in enumerate(() if analysis is None else analysis.published, start=1):
@@ -286,6 +290,44 @@ def _attribute_groups(protocol: Protocol) -> Iterator[str]:
             yield (
                 f"groups.{name}: the name suggests an attribute that participants already have, but groups are "
                 'assigned at random; if participants have it, set study.group_assignment = "pre-existing"'
+            )
+
+
+def _too_few_for_equivalence(protocol: Protocol) -> Iterator[str]:
+    """Yield warnings about bounds within which the planned participants cannot show equivalence."""
+    analysis = protocol.analysis
+    if analysis is None or analysis.participants is None:
+        return
+    bounds = sum(contrast.bound is not None for contrast in analysis.contrasts)
+    for number, contrast in enumerate(analysis.contrasts, start=1):
+        if contrast.bound is None:
+            continue
+        largest = contrast.largest_difference if protocol.compares_statement(contrast) else None
+        fewest = fewest_participants(analysis.alpha / bounds, contrast.bound, largest)
+        planned = min(planned_participants(protocol, group) or 0 for group in contrast.groups or (None,))
+        if planned < fewest:
+            each = " in each group" if contrast.groups else ""
+            yield (
+                f"analysis.contrasts.{number}.bound: equivalence within this bound requires at least {fewest} "
+                f"participants{each}, but {planned} are planned"
+            )
+
+
+def _different_standards(protocol: Protocol) -> Iterator[str]:
+    """Yield warnings about contrasts of blocks whose values are at, or are averaged over, different standards."""
+    for number, contrast in enumerate(() if protocol.analysis is None else protocol.analysis.contrasts, start=1):
+        blocks = [protocol.blocks[name] for name in contrast.blocks]
+        if contrast.measure not in ("threshold", "pse") or any(block.stimulus is None for block in blocks):
+            continue
+        standards = {block.id: sorted(filter(None, protocol.standards_of(block))) for block in blocks}
+        is_averaged = any(len(values) > 1 for values in standards.values())
+        if len(set(map(tuple, standards.values()))) > 1 and (is_averaged or contrast.measure == "pse"):
+            listed = " and ".join(
+                f"{block} at {', '.join(f'{value:g}' for value in values)}" for block, values in standards.items()
+            )
+            yield (
+                f"analysis.contrasts.{number}: the blocks have different standards ({listed}), so the difference "
+                "between them is confounded with the standard; use the same standards"
             )
 
 

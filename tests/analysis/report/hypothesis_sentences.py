@@ -204,6 +204,8 @@ HYPOTHESES: Final[Sequence[tuple[str, Check]]] = (
      bound_of_a_contrast("beyond")),
     (r"The tests do not show that the mean difference lies within the equivalence bounds\.",
      bound_of_a_contrast("neither")),
+    (r"The sample is too small to show equivalence: at least \d+ participants( in each group)? are needed\.",
+     bound_of_a_contrast("neither")),
     (r"Not tested: (fewer than two participants have both values|the values do not vary between participants, so a "
      r"t test is not possible)\.", contrast_is_untested),
     (r"Excluded: .*\.", when(lambda told: any(one["left_out"] for one in told.contrasts))),

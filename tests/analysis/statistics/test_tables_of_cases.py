@@ -18,6 +18,7 @@ from study_app.analysis.statistics import (
     trend_tests,
 )
 from study_app.errors import AnalysisError
+from study_app.protocol.participants import fewest_participants
 from tests.analysis.outputs import GOLDEN
 from tests.golden import compare, each_once
 
@@ -131,8 +132,9 @@ def of_equivalence() -> Iterator[str]:
     cases = {name: np.asarray(one, float) for name, one in DIFFERENCES.items()}
     for bound, alpha in ((1.0, 0.05), (0.5, 0.05), (3.0, 0.2)):
         yield from results(equivalence.tost, cases, bound, alpha=alpha)
-    limits = {f"{alpha} {bound}": (alpha, bound) for alpha in (0.2, 0.05, 0.01) for bound in (0.5, 1.0, 3.0)}
-    yield from results(equivalence.fewest_participants, limits)
+    cases_of_bounds = product((0.2, 0.05, 0.01), (0.5, 1.0, 3.0))
+    limits = {f"{alpha} {bound}": (alpha, bound, equivalence.STEPS) for alpha, bound in cases_of_bounds}
+    yield from results(fewest_participants, limits)
     yield from results(mean_tests.resamples_for, {str(alpha): alpha for alpha in (0.2, 0.05, 0.01, 0.001, 1e-5)})
     rows = {name: one[None] for name, one in cases.items() if len(one) > 2 and not np.isnan(one).any()}
     yield from results(simulated_studies.difference_ranks, rows)

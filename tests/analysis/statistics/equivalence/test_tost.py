@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from study_app.analysis.statistics.equivalence import fewest_participants, tost
+from study_app.analysis.statistics.equivalence import tost
 from study_app.errors import AnalysisError
+from study_app.protocol.participants import fewest_participants
 
 
 @pytest.mark.slow
