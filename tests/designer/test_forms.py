@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 import shiboken6
 from PySide6.QtCore import QEvent, QPoint, QPointF, Qt
-from PySide6.QtGui import QFocusEvent, QTextCursor
+from PySide6.QtGui import QFocusEvent, QKeySequence, QTextCursor
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
     QAbstractButton,
@@ -23,10 +23,13 @@ from study_app.designer.document.document import Answers, template
 from study_app.designer.document.elements import title_of
 from study_app.designer.document.steps import AddElement, AddKey, ChangeLanguage, RemoveKey, RenameElement
 from study_app.designer.document.toml_edits import Set, Unset
+from study_app.designer.form.card import FormCard
+from study_app.designer.form.fields import TypedSentence, TypedText
 from study_app.designer.form.special import Compared, Hypothesis
 from study_app.designer.new_study_page import Questions, TemplateQuestion, template_choice
 from study_app.designer.problems import problem_rows
 from study_app.designer.window import focus_stops
+from study_app.gui.widgets.boxes import vbox
 from study_app.gui.widgets.controls import IconButton
 from tests.gui.walk import settle
 
@@ -481,6 +484,60 @@ def test_a_bound_that_is_not_a_number_is_refused_with_the_value_that_stays(qtbot
     assert "0.4" in refusals[0]
     assert refusals[1] == ""
     assert tables == [{"measure": "like_honey", "bound": 0.75}]
+
+
+def test_the_help_at_the_foot_of_a_form_is_hidden_while_the_form_is_low(qtbot: Any) -> None:
+    form = FormCard()
+    qtbot.addWidget(form)
+    form.resize(500, 700)
+    form.show()
+    for height, is_shown in ((459, False), (460, True), (351, False), (803, True)):
+        form.resize(500, height)
+        settle(form)
+        assert (form.height(), form.foot.isVisible()) == (height, is_shown)
+        form.show_note("Deleted Late. Ctrl+Z restores it.")
+        assert form.foot.isVisible()
+        form.show_help()
+        assert form.foot.isVisible() == is_shown
+
+
+@pytest.mark.parametrize("kind", [TypedText, TypedSentence])
+def test_a_text_of_several_lines_leaves_undo_and_tab_to_the_form(qtbot: Any, kind: type[TypedText]) -> None:
+    window, text, other = QWidget(), kind("Body, English"), QLineEdit()
+    vbox(text, other, parent=window)
+    qtbot.addWidget(window)
+    window.show()
+    window.activateWindow()
+    qtbot.waitUntil(window.isActiveWindow)
+    undone = list[str]()
+    text.typed.connect(undone.append)
+    text.setFocus()
+    QTest.keyClicks(text, "stir")
+    assert text.typed_text() == "stir"
+    QTest.keySequence(text, QKeySequence(QKeySequence.StandardKey.Undo))
+    assert (undone, text.typed_text()) == (["stir"], "stir"), "the form undoes the step that it gets"
+    menu = text.createStandardContextMenu()
+    assert not [action.text() for action in menu.actions() if action.isEnabled() and "Undo" in action.text()]
+    menu.deleteLater()
+    QTest.keyClick(text, Qt.Key.Key_Tab)
+    assert (other.hasFocus(), text.typed_text()) == (True, "stir")
+    assert (text.accessibleName(), text.focusPolicy()) == ("Body, English", Qt.FocusPolicy.StrongFocus)
+
+
+def test_undo_in_a_text_undoes_the_step_of_the_study(designer: Any) -> None:
+    path = ("pages", "welcome", "body")
+    designer.open("kitchen")
+    designer.go_to(*path[:-1])
+    before, body = designer.text, designer.value(*path)
+    text = designer.field(*path).lines["en"]
+    text.setFocus()
+    text.selectAll()
+    QTest.keyClicks(text, "Stir slowly")
+    assert (text.pending, designer.value(*path)) == (True, body), "it is not a step yet"
+    designer.hit("ctrl+z")
+    assert (designer.text, text.typed_text()) == (before, body)
+    designer.hit("ctrl+shift+z")
+    assert (designer.value(*path), text.typed_text()) == ("Stir slowly", "Stir slowly")
 
 
 def test_the_caret_is_at_the_end_of_a_text_that_is_not_or_completely_selected(designer: Any) -> None:

@@ -251,7 +251,6 @@ class TypedText(_Typed, QPlainTextEdit):
         super().__init__()
         self.begin()
         self.setAccessibleName(name)
-        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)  # the wheel must not focus it
         self.setTabChangesFocus(True)
         self.setUndoRedoEnabled(False)
         self.setFont(font("label", weight=400))
