@@ -23,6 +23,7 @@ from study_app.analysis.data.measures import Array
 from study_app.analysis.statistics.equivalence import STEPS, p_equivalent, shows_equivalence
 from study_app.analysis.statistics.mean_tests import means_of, p_differs, resamples_for
 from study_app.analysis.statistics.outcome import FEW, SIDES, doubled_ranks, false_discovery, holm, p_of_draws
+from study_app.analysis.wording import listed
 from study_app.errors import AnalysisError
 from study_app.protocol.blocks import Block, display_language
 from study_app.protocol.model import OF_LEVELS, Contrast, Protocol
@@ -96,8 +97,9 @@ def plan(protocol: Protocol, features: ConditionFeatures) -> Plan:
     blocks = _compared_blocks(protocol)
     if not blocks:
         raise AnalysisError(
-            f"{protocol.study.name} does not contain any comparisons: a power analysis needs a main block with two or "
-            "more conditions and a questionnaire with statements"
+            f"the power of {protocol.study.name} cannot be estimated, because {_why_no_power(protocol)}; power is "
+            "available for statements in blocks with two or more conditions, for hypotheses about other questions, and "
+            "for thresholds, d′, ratings of certainty and magnitude estimation"
         )
     table = None if protocol.analysis is None else protocol.analysis.model_dump(mode="json")
     contrasts = () if protocol.analysis is None else protocol.analysis.contrasts
@@ -124,6 +126,16 @@ def plan(protocol: Protocol, features: ConditionFeatures) -> Plan:
         untested_bounds=sum(contrast.bound is not None for contrast in contrasts if contrast not in within),
         of_questions=tuple((contrast, group_shares(protocol, contrast)) for contrast in question_contrasts(protocol)),
     )
+
+
+def _why_no_power(protocol: Protocol) -> str:
+    """Return why no result of a study is simulated: its designs, single conditions, or its questions."""
+    designs = [protocol.design_of(block).paper_name for block in protocol.main_blocks if block.design is not None]
+    if designs:
+        return f"results of {listed(list(dict.fromkeys(designs)))} are not simulated"
+    if not any(len(block.conditions) > 1 for block in protocol.main_blocks):
+        return "no main block has two conditions to compare"
+    return "no main block with two or more conditions asks statements, and there is no hypothesis about other questions"
 
 
 def group_shares(protocol: Protocol, contrast: Contrast) -> tuple[float, float] | None:
@@ -312,7 +324,8 @@ def slopes(rising: Array, block: PlannedBlock, both_ways: NDArray[np.bool_]) -> 
     """Return the p (studies, items) of increasing slopes over the delay; like `trend`, by t tests of the slopes."""
     from scipy.stats import ttest_1samp  # noqa: PLC0415 - takes half a second, and reports do not need it
 
-    delays = np.array(block.delays_ms) - np.mean(np.array(block.delays_ms))
+    delays_ms = np.array([setting.delay_ms for setting in block.settings])
+    delays = delays_ms - delays_ms.mean()
     person_slopes = np.einsum("snki,k->sin", rising, delays)
     rising_p, falling_p = np.ones((2, *person_slopes.shape[:2]))
     varied = (np.ptp(person_slopes, axis=-1) > 0) & (person_slopes.shape[-1] >= FEW)

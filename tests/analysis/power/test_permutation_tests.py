@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.stats import ttest_1samp
 
 from study_app.analysis.planning import simulated_studies
 from study_app.analysis.statistics.equivalence import tost
@@ -57,6 +58,20 @@ def test_the_trend_is_the_reports(n: int) -> None:
     assert np.abs(ps - np.array(expected)).max() < CLOSE
 
 
+def delays(*delays_ms: float) -> SimpleNamespace:
+    return SimpleNamespace(settings=[SimpleNamespace(delay_ms=delay_ms) for delay_ms in delays_ms])
+
+
+def test_slopes_are_those_over_all_settings_also_if_two_have_the_same_delay() -> None:
+    delays_ms = (0.0, 0.0, 80.0, 130.0)
+    answers = answered(6, (3, 15, 4, 1), rise=0.3)
+    ps = simulated_studies.slopes(answers, delays(*delays_ms), np.array([False]))[:, 0]
+    expected = [
+        ttest_1samp(np.polyfit(delays_ms, study[:, :, 0].T, 1)[0], 0, alternative="greater").pvalue for study in answers
+    ]
+    assert ps == pytest.approx(expected, rel=1e-9)
+
+
 def test_signed_ranks_are_the_reports() -> None:
     answers = answered(4, (20, 9, 2, 3), rise=0.6)
     ps = simulated_studies.signed(answers, rng())
@@ -72,7 +87,7 @@ def test_where_everybody_answers_alike_nothing_is_found() -> None:
     assert (ps == 1).all()
     assert (of_all == 1).all()
     assert (simulated_studies.trend(simulated_studies.ranks(same), np.array([False, True]), rng()) == 1).all()
-    block = SimpleNamespace(delays_ms=(0.0, 50.0, 100.0))
+    block = delays(0.0, 50.0, 100.0)
     for untested in (same, answered(1, (2, 9, 3, 2), rise=1.0)):
         assert (simulated_studies.slopes(untested, block, np.array([False, True])) == 1).all()
     assert (simulated_studies.signed(same[:, :, :2], rng()) == 1).all()

@@ -22,7 +22,8 @@ from study_app.analysis.planning.simulated_studies import (
 from study_app.analysis.statistics.trend_tests import step_down
 from study_app.cli import commands
 from study_app.errors import AnalysisError
-from study_app.protocol.load import load
+from study_app.protocol.load import load, parse
+from study_app.protocol.model import Protocol
 from study_app.protocol.participants.raters import CONSISTENT, PUBLISHED, REHEARSED
 from study_app.protocol.simulated import NO_FEATURES, TrialFeatures
 from study_app.workers.executors import Workers
@@ -217,11 +218,36 @@ def test_a_planned_block_has_the_conditions_statements_and_features_of_the_study
     assert {block.kind for block in blocks.values()} == {"delays", "liquids"}
 
 
-def test_a_protocol_that_compares_nothing_is_refused() -> None:
-    protocol = load("demo")
-    alone = {name: block.model_copy(update={"questionnaire": None}) for name, block in protocol.blocks.items()}
-    with pytest.raises(AnalysisError, match="does not contain any comparison"):
-        plan(protocol.model_copy(update={"blocks": alone}), felt_in(protocol))
+ADJUSTMENT = """
+format = 2
+study.name = "matching"
+liquids.damper.drag = { law = "linear", damping_nspm = 8 }
+tasks.stir = { kind = "follow", cycles = 1 }
+stimuli.damping = { vary = "damping_nspm", level = "value", standards = [5, 11], levels = [2, 17] }
+methods.set = { kind = "adjustment", repetitions = 6 }
+blocks.weak = { stimulus = "damping", design = "adjustment", method = "set" }
+"""
+
+
+def changed_blocks(**changes: Any) -> Protocol:
+    """Return the demo with changes to each block."""
+    demo = load("demo")
+    blocks = {name: block.model_copy(update=changes) for name, block in demo.blocks.items()}
+    return demo.model_copy(update={"blocks": blocks})
+
+
+@pytest.mark.parametrize(
+    ("protocol", "reason"),
+    [
+        (parse(ADJUSTMENT.encode(), "matching.toml"), "results of the method of adjustment are not simulated;"),
+        (changed_blocks(conditions=("water",)), "no main block has two conditions to compare; power is available"),
+        (changed_blocks(questionnaire=None), "no main block with two or more conditions asks statements"),
+    ],
+)
+def test_a_protocol_without_simulated_results_is_refused_with_the_reason(protocol: Protocol, reason: str) -> None:
+    name = protocol.study.name
+    with pytest.raises(AnalysisError, match=f"^the power of {name} cannot be estimated, because {reason}"):
+        plan(protocol, {})
 
 
 @pytest.mark.parametrize("sizes", ["5,many", "1", "5,2000", ""])

@@ -31,7 +31,10 @@ def planned_block(name: str, kind: Any, settings: tuple[Setting, ...], items: tu
     )  # fmt: skip
 
 
-DELAYS = tuple(Setting(code=f"S{ms}", condition=f"d{ms}", liquid="oil", delay_ms=float(ms)) for ms in (10, 40, 90))
+DELAYS = tuple(
+    Setting(code=f"S{place}", condition=f"d{place}", liquid="oil", delay_ms=float(ms))
+    for place, ms in enumerate((10, 10, 40, 90))
+)
 OILS = tuple(Setting(code=name, condition=name, liquid=name, delay_ms=0.0) for name in ("thin", "wax", "tar"))
 LATE, THICK = (
     planned_block("late", "delays", DELAYS, ("warm", "different")),
@@ -55,7 +58,10 @@ def by_effect(*rows: tuple[int, int]) -> np.ndarray:
 def counts_of(more: int) -> dict[Any, np.ndarray]:
     """Return the counts of one kind of participants; ``more`` studies detect the trend of the second statement."""
     effects = np.array(EFFECTS)[:, None, None]
-    shape_of_late, shape_of_oils = np.array([[0, 0], [1.0, 0.5], [-2.0, 3.0]]), np.array([[0.0], [2.5], [-1.0]])
+    shape_of_late, shape_of_oils = (
+        np.array([[0, 0], [0.2, 0.1], [1.0, 0.5], [-2.0, 3.0]]),
+        np.array([[0.0], [2.5], [-1.0]]),
+    )
     return {
         ("oils", "means"): STUDIES * (4 + effects * shape_of_oils),
         ("oils", "any"): by_effect((1, 9), (2, 13)),
@@ -63,9 +69,12 @@ def counts_of(more: int) -> dict[Any, np.ndarray]:
         ("late", "means"): STUDIES * (4 + effects * shape_of_late),
         ("late", "all"): by_effect((1, 10), (0, 19)),
         ("late", "found"): np.stack([by_effect((0, 12), (1, 17)), by_effect((1, 4 + more), (2, 6 + more))], axis=2),
-        ("late", "lowest"): np.array([[[0, 7, 12], [0, 0, 0]], [[0, 11, 16], [0, 0, 0]]]),
+        ("late", "lowest"): np.array([[[0, 3, 7, 12], [0, 0, 0, 0]], [[0, 4, 11, 16], [0, 0, 0, 0]]]),
         ("late", "equivalent"): np.array(
-            [[[[4, 6], [1, 2]], [[3, 0], [5, 7]]], [[[14, 16], [11, 12]], [[13, 10], [15, 17]]]]
+            [
+                [[[9, 4, 6], [8, 1, 2]], [[7, 3, 0], [6, 5, 7]]],
+                [[[19, 14, 16], [18, 11, 12]], [[17, 13, 10], [20, 15, 17]]],
+            ]
         ),
         (PAIRED.described(), "contrast"): by_effect((3, 15), (4, 18)),
         (f"{PAIRED.described()}, if there is no difference", "contrast"): by_effect((0, 5), (0, 11)),
@@ -168,13 +177,13 @@ def test_the_tables_name_each_block_test_and_range_over_the_kinds_of_participant
     assert "## Title late: can the study support the hypothesis?" not in lines
     summary = lines.index("## Power with the planned 6 participants")
     assert lines[summary + 2 : summary + 6] == [
-        f"- {title}: {consistent} of studies detect the effect if participants are consistent, {typical} if they are "
-        f"typical, and {noisy} if they are noisy."
-        for title, (consistent, typical, noisy) in (
-            ("Different (trend over delay)", ("35 %", "20 %", "0 %")),
-            (FIRST, ("75 %",) * 3),
-            (f"{FIRST}, if there is no difference", ("25 %",) * 3),
-            (SECOND, ("80 %",) * 3),
+        f"- {title}: {consistent} of studies {finding} if participants are consistent, {typical} if they are typical, "
+        f"and {noisy} if they are noisy."
+        for title, finding, (consistent, typical, noisy) in (
+            ("Different (trend over delay)", "detect the effect", ("35 %", "20 %", "0 %")),
+            (FIRST, "detect the effect", ("75 %",) * 3),
+            (f"{FIRST}, if there is no difference", "show equivalence", ("25 %",) * 3),
+            (SECOND, "detect the effect", ("80 %",) * 3),
         )
     ]
 
