@@ -12,6 +12,7 @@ from PySide6.QtGui import QColor, QPaintEvent, QRegion
 from PySide6.QtWidgets import QApplication
 
 from study_app.gui.participant.tank.captions import Captions
+from study_app.gui.participant.tank.layers import OnsetPatch
 from study_app.gui.participant.tank_widget import TankWidget
 from study_app.protocol.wording.languages import words
 from tests.gui.drawn import shown
@@ -134,21 +135,51 @@ def test_a_view_that_nobody_can_see_is_told_of_when_it_is_seen(tank: TankWidget,
     assert told == [1, 3]
 
 
-def onsets(make: Make, speeds_mps: list[float], step_ns: int = 10_000_000) -> list[bool]:
-    patch, place, lit = make().patch, 0.0, []
-    patch.follow_motion((0, 0, 0), 0)
-    for index, speed in enumerate(speeds_mps, 1):
-        place += speed * step_ns / 1e9
-        lit.append(patch.follow_motion((place, 0, 0), index * step_ns))
-    return lit
+MM = 1e-3
+SLOW, FAST = (7.9 * MM, 20.1 * MM)
+"""Just slower than the limit of a rest, and just faster than that of a movement [m/s]."""
 
 
-def test_the_patch_toggles_once_when_a_movement_begins_after_a_rest_and_not_for_drift(made: Make) -> None:
-    assert onsets(made, [0, 0, 0.1, 0.2, 0.1]) == [False, False, True, True, True]
-    assert onsets(made, [0.1, 0, 0, 0.1]) == [True] * 4
-    assert onsets(made, [0.1, *[0] * 10, 0.1])[-1] is False
-    assert not any(onsets(made, [0.005] * 40))
-    assert onsets(made, [0, 0, 0.012, 0.05])[-1] is True
+@pytest.mark.parametrize(
+    ("speeds_mps", "is_lit"),
+    [
+        ([FAST], True),
+        ([19.9 * MM], False),
+        ([0, 0, FAST, 200 * MM, FAST], True),
+        ([5 * MM] * 40, False),  # a drift
+        ([FAST, *[0] * 9, FAST], True),  # the hand rested for 90 ms only, so this is the same movement
+        ([FAST, *[SLOW] * 10, FAST], False),
+        ([FAST, *[8.1 * MM] * 40, FAST], True),
+        ([FAST, *[0] * 6, 8.1 * MM, *[0] * 9, FAST], True),
+        ([FAST, *[0] * 6, 8.1 * MM, *[0] * 10, FAST], False),
+        ([FAST, *[0] * 12, 15 * MM, FAST], False),  # it speeds up only after the rest
+        ([FAST, *[0] * 12, FAST, *[0] * 12, FAST, FAST], True),
+    ],
+)
+def test_a_movement_faster_than_20_mm_per_s_after_100_ms_below_8_toggles_the_patch(
+    speeds_mps: list[float], is_lit: bool
+) -> None:
+    patch, x_m = OnsetPatch(), 0.3
+    start_ns = 5_123_000_000
+    assert patch.follow_motion((x_m, -0.02, 0.01), start_ns) is False
+    for index, speed_mps in enumerate(speeds_mps, 1):
+        x_m -= speed_mps * 0.01
+        patch.follow_motion((x_m, -0.02, 0.01), start_ns + index * 10_000_000)
+    assert patch.lit is is_lit
+
+
+def test_the_speed_of_the_patch_is_taken_over_8_ms_in_all_three_directions() -> None:
+    """The path of 0.15, 0.2 and 0.6 mm is 0.65 mm long: 20.1 mm/s over 32.3 ms, and 19.9 mm/s over 32.7 ms."""
+    start_m, end_m = (0.01, 0.02, -0.03), (0.01015, 0.0198, -0.0294)
+    for times_ns, is_lit in (
+        ((32_300_000,), [True]),
+        ((32_700_000,), [False]),
+        ((7_999_999, 8_000_000), [False, True]),
+        ((3_000_000, 6_000_000, 9_000_000), [False, False, True]),
+    ):
+        patch = OnsetPatch()
+        patch.follow_motion(start_m, 0)
+        assert [patch.follow_motion(end_m, time_ns) for time_ns in times_ns] == is_lit
 
 
 def test_patch_in_the_corner_turns_white_at_the_onset_unless_it_is_switched_off(made: Make) -> None:
