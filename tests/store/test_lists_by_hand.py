@@ -427,7 +427,7 @@ def test_marked_claims_are_removed_at_any_age_unless_their_program_runs(tmp_path
     for name, folder in folders.items():
         folder.mkdir()
         if name == "ended":
-            (folder / ".open-0a1b2c3d.json").write_text(ended, encoding="utf-8")
+            (folder / ".open-0a1b2c3d.json").write_text(ended, encoding="utf-8", newline="\n")
         else:
             lock_folder(folder)
     os.utime(folders["old and running"], (time.time() - 3600.0 * 48,) * 2)
