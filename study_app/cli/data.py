@@ -162,15 +162,11 @@ def unblind(results: Path, by: str, reason: str) -> None:
 @PARTICIPANT
 @SESSION
 @click.option("--trial", type=WholeNumber(1), help="Exclude only this trial; default: the whole session.")
-@click.option("--rule", metavar="RULE", default="", help="The planned exclusion rule that the session meets.")
+@click.option("--rule", metavar="RULE", default="", help="A planned exclusion rule that the session meets; this is checked.")
 @BY
 @REASON
 def exclude(results: Path, participant: str, session: int, trial: int | None, rule: str, by: str, reason: str) -> None:
-    """Exclude a session or a trial from the analysis, with a reason; nothing is deleted.
-
-    With --rule, the session must meet this rule of the protocol. If the rule cannot be checked before unblinding, this
-    is recorded.
-    """
+    """Exclude a session or a trial from the analysis, with a reason; nothing is deleted."""
     from study_app.store.exclusions import describe_exclusion
     from study_app.store.exclusions import exclude as exclude_from
     from study_app.store.merged import locate_participant

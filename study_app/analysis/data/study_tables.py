@@ -286,12 +286,17 @@ class Study:
 
     def rows_of(self, asked: PlacedQuestion) -> pd.DataFrame:
         """Return all rows of ``answered`` for a question outside blocks of statements."""
-        place = self.answered["form" if asked.where.is_form else "block"] == asked.where.id
-        rows = self.answered[place.fillna(False) & (self.answered["item"] == asked.id)]
-        if not (asked.where.is_form and asked.where.settings):
+        rows = self.rows_in(asked.where)
+        return rows[rows["item"] == asked.id]
+
+    def rows_in(self, where: QuestionPlace) -> pd.DataFrame:
+        """Return all rows of ``answered`` for the questions of a form or after the trials of a block."""
+        place = self.answered["form" if where.is_form else "block"] == where.id
+        rows = self.answered[place.fillna(False)]
+        if not (where.is_form and where.settings):
             return rows
         codes = rows["after_block"].fillna(START)
-        if asked.where.by_session:
+        if where.by_session:
             codes = codes + OF_SESSION + rows["session"].astype("string")
         return rows.assign(code=codes)
 

@@ -1,8 +1,8 @@
 """Tables as SPSS files (.sav), which jamovi, JASP and R can also read, with labels, levels and missing-value codes.
 
-Answers are numbers with labels: options are nominal, scale points ordinal. In the wide table, an excluded answer is 97,
-an answer off the scale 98 and an answer that was not given 99; all three are declared as missing. Other missing numbers
-are system-missing. As SPSS has no missing texts, these are empty.
+Answers are numbers with labels: options are nominal, scale points ordinal. In the wide table, the answer to a question
+that was not shown is 96, an excluded answer 97, an answer off the scale 98 and an answer that was not given 99. These
+codes are declared as missing. Other missing numbers are system-missing. As SPSS has no missing texts, these are empty.
 """
 
 from __future__ import annotations
@@ -23,10 +23,11 @@ from study_app.analysis.data.study_tables import Study
 from study_app.analysis.export.tables import Cells, ExportTable, QuestionCells
 from study_app.store.files import Column
 
+_NOT_SHOWN: Final = 96
 _EXCLUDED: Final = 97
 _CANNOT_JUDGE: Final = 98
 _NOT_ANSWERED: Final = 99
-_CODES: Final = frozenset((_EXCLUDED, _CANNOT_JUDGE, _NOT_ANSWERED))
+_CODES: Final = frozenset((_NOT_SHOWN, _EXCLUDED, _CANNOT_JUDGE, _NOT_ANSWERED))
 _NAME_BYTES: Final = 64
 _LABEL_BYTES: Final = 255
 _VALUE_LABEL_BYTES: Final = 120
@@ -39,6 +40,7 @@ def wide_sav(study: Study, table: ExportTable, cells: Mapping[str, Cells | Quest
     """Return the wide table as an SPSS file."""
     answers = study.responses
     by_cell = dict(iter(answers.groupby(["block", "code", "item"])))
+    by_setting = dict(iter(study.answered.groupby(["block", "code"])))
     frame = table.frame.copy()
     coded = {}
     for name, cell in cells.items():
@@ -46,7 +48,8 @@ def wide_sav(study: Study, table: ExportTable, cells: Mapping[str, Cells | Quest
             frame[name], coded[name] = _code_question(study, cell, frame[name], frame["participant"])
             continue
         rows = by_cell.get((cell.block.id, cell.setting.code, cell.item.id), answers.head(0))
-        frame[name] = _code_missing_answers(frame[name], frame["participant"], rows)
+        asked = by_setting.get((cell.block.id, cell.setting.code), study.answered.head(0))
+        frame[name] = _code_missing_answers(frame[name], frame["participant"], rows, asked)
         coded[name] = _value_labels(dict(zip(LEVELS, cell.block.labels, strict=True)), cell.block.cannot_judge or "")
     numbered = {name for name, labels in coded.items() if labels}
     columns = tuple(replace(column, kind="number") if column.name in numbered else column for column in table.columns)
@@ -66,31 +69,48 @@ def _code_question(
     question = cells.asked
     if isinstance(question, PlacedScore) or not question.levels:
         return values, {}
-    rows = study.rows_of(question)
+    rows, asked = study.rows_of(question), study.rows_in(question.where)
     if cells.setting is not None:
-        rows = rows[rows["code"] == cells.setting.code]
+        rows, asked = (table[table["code"] == cells.setting.code] for table in (rows, asked))
     if _has_options(question):
         if question.question.names_several:
             return values, {}
         numbers = {option: number for number, option in enumerate(question.levels, start=1)}
-        coded = _code_missing_answers(values.map(numbers), people, rows)
+        coded = _code_missing_answers(values.map(numbers), people, rows, asked)
         return coded, _value_labels({numbers[option]: words for option, words in question.levels.items()}, "")
     levels = {int(point): words for point, words in question.levels.items()}
-    return _code_missing_answers(values, people, rows), _value_labels(levels, question.cannot_judge or "")
+    return _code_missing_answers(values, people, rows, asked), _value_labels(levels, question.cannot_judge or "")
 
 
-def _code_missing_answers(values: pd.Series[Any], people: pd.Series[Any], rows: pd.DataFrame) -> pd.Series[Any]:
-    """Return one cell per participant, with a code for the reason of a missing answer; ``rows`` are all answers."""
+def _code_missing_answers(
+    values: pd.Series[Any], people: pd.Series[Any], rows: pd.DataFrame, asked: pd.DataFrame
+) -> pd.Series[Any]:
+    """Return one cell per participant, with a code for the reason of a missing answer.
+
+    ``rows`` are all answers to the question, with a row without an answer if it was shown; ``asked`` are those to all
+    questions of its questionnaire.
+    """
     counted = rows[rows["counted"]]
     judged = set(counted.loc[counted["cannot_judge"].fillna(False), "participant"])
-    excluded = set(rows.loc[rows["excluded"], "participant"]) - set(counted["participant"])
+    completed = set(asked.loc[asked["counted"], "participant"])
+    excluded = set(asked.loc[asked["excluded"], "participant"]) - completed
     coded = values.astype("Float64")
-    coded = coded.mask(coded.isna() & people.isin(judged), _CANNOT_JUDGE)
-    return coded.mask(coded.isna() & people.isin(excluded), _EXCLUDED).fillna(_NOT_ANSWERED)
+    for code, participants in (
+        (_CANNOT_JUDGE, judged),
+        (_EXCLUDED, excluded),
+        (_NOT_SHOWN, completed - set(counted["participant"])),
+    ):
+        coded = coded.mask(coded.isna() & people.isin(participants), code)
+    return coded.fillna(_NOT_ANSWERED)
 
 
 def _value_labels(levels: Mapping[int, str], cannot_judge: str) -> dict[int, str]:
-    off = {_EXCLUDED: "Excluded", _CANNOT_JUDGE: cannot_judge or "Cannot judge", _NOT_ANSWERED: "No answer"}
+    off = {
+        _NOT_SHOWN: "Not shown",
+        _EXCLUDED: "Excluded",
+        _CANNOT_JUDGE: cannot_judge or "Cannot judge",
+        _NOT_ANSWERED: "No answer",
+    }
     return {**levels, **off}
 
 
@@ -122,7 +142,11 @@ def sav(study: Study, table: ExportTable, coded: Mapping[str, dict[int, str]], o
                 name: {value: _truncate(label, _VALUE_LABEL_BYTES) for value, label in found.items()}
                 for name, found in (levels | flags).items()
             },
-            missing_ranges={name: [*sorted(_CODES & level.keys())] for name, level in levels.items()},
+            missing_ranges={  # SPSS permits at most three single codes
+                name: [{"lo": min(codes), "hi": max(codes)}]
+                for name, level in levels.items()
+                if (codes := _CODES & level.keys())
+            },
             variable_measure={
                 name: "ordinal" if name in ordered else "nominal" if name in levels else _measurement_level(column)
                 for name, column in columns.items()

@@ -99,8 +99,9 @@ def _codebook(study: Study, files: Mapping[str, Any]) -> dict[str, Any]:
         "measures": {
             "quartiles": QUARTILES,
             "agree_percent": f"percentage of valid answers at levels {AGREEMENT[0]} to {AGREEMENT[-1]}",
-            "repeated": "the median of a participant's repeated answers is used; the detection threshold and the "
-            "counts for each level are based on individual answers",
+            "repeated": "the median of a participant's repeated answers to a statement is used; the detection "
+            "threshold and the counts for each level are based on individual answers; for scores and numbers from "
+            "other questions, hypotheses and the first page of the report use the mean, and the wide table the median",
             "counted": "main trials in completed sessions that are not excluded; if a trial was repeated, only its "
             "last attempt",
         },

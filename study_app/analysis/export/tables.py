@@ -248,9 +248,8 @@ def wide_table(study: Study) -> tuple[ExportTable, dict[str, Cells | QuestionCel
     """Return the wide table of all valid answers, and the content of each of its columns.
 
     Columns are ``item__condition``, or ``item__code`` until the key is opened; if names would not be unique, they are
-    ``block__item__condition``. A column has the median of repeated answers, as in the analysis, and the last answer for
-    options and texts. Questions of forms are ``form__item``, scores ``form__score``, and for repeated forms
-    ``form__item__block``.
+    ``block__item__condition``. A column has the median of repeated answers, and the last answer for options and texts.
+    Questions of forms are ``form__item``, scores ``form__score``, and for repeated forms ``form__item__block``.
     """
     people, cells = list(study.people), _wide_cells(study)
     simulated = dict(zip(study.participants["participant"], study.participants["simulated"], strict=True))
@@ -302,7 +301,7 @@ def _statement_column(study: Study, cells: Cells, people: list[str]) -> Answers:
     block, setting, item = cells.block, cells.setting, cells.item
     answers = study.answers(block)
     answers = answers[(answers["code"] == setting.code) & (answers["item"] == item.id)]
-    description = f"{item.text} About {block.name(setting)}, in {block.title}."
+    description = f"{item.text} About {block.name(setting)}, in {block.title}.{_repeats_note(answers, 'median')}"
     return _median_column(answers, "response", people), description, (1, 7)
 
 
@@ -318,21 +317,25 @@ def _question_column(study: Study, cells: QuestionCells, people: list[str]) -> A
     if isinstance(question, PlacedScore):
         instrument = f" of {question.instrument}" if question.instrument else ""
         description = f"Score {question.name}{instrument}, in {question.where.title}.{setting_note}"
-        return _median_column(answers, "score", people), description + _repeats_note(answers, "median"), (None, None)
+        description += _repeats_note(answers, "median", _MEAN_ELSEWHERE)
+        return _median_column(answers, "score", people), description, (None, None)
     text = question.text if question.text.endswith((".", "?", "!")) else f"{question.text}."
     description = f"{text} In {question.where.title}.{setting_note}"
     if question.question.value_type != "text":
-        description += _repeats_note(answers, "median")
+        description += _repeats_note(answers, "median", _MEAN_ELSEWHERE)
         return _median_column(answers, "value", people), description, question.bounds or (None, None)
     description += _repeats_note(answers, "last")
     last = answers.sort_values(["session", "trial"]).groupby("participant")["response"].last()
     return pd.array([last.get(person, pd.NA) for person in people], dtype="string"), description, (None, None)
 
 
-def _repeats_note(answers: pd.DataFrame, which: str) -> str:
-    """Return a sentence on which of a participant's answers a cell has; "" if everybody answered once."""
+_MEAN_ELSEWHERE: Final = " (hypotheses and the first page of the report use the mean)"
+
+
+def _repeats_note(answers: pd.DataFrame, which: str, note: str = "") -> str:
+    """Return a sentence on which of a participant's answers a cell has, with a note; "" if everybody answered once."""
     is_repeated = bool(answers["participant"].duplicated().any())
-    return f" The {which} of each participant's answers." if is_repeated else ""
+    return f" The {which} of each participant's answers{note}." if is_repeated else ""
 
 
 def _median_column(answers: pd.DataFrame, column: str, people: list[str]) -> pd.api.extensions.ExtensionArray:

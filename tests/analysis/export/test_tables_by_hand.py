@@ -157,16 +157,19 @@ def test_the_wide_table_has_the_median_of_each_persons_answers(made: Study, answ
     assert list(cells) == [f"{item}__c{place}" for place in (1, 2, 3) for item in ITEMS]
     for name, cell in cells.items():
         item, _, condition = name.partition("__c")
+        repeated = False
         for person in wide.index:
             values = [
                 answer.value
                 for answer in counted(answers)
                 if answer[:3] == (person, f"L{condition}", item) and answer.value is not None
             ]
+            repeated |= len(values) > 1
             held = wide.loc[person, name]
             assert held == median(values) if values else pd.isna(held), (name, person)
         (column,) = (column for column in table.columns if column.name == name)
-        assert column.description == f"It is {item}. About {made.blocks[0].name(cell.setting)}, in Block."
+        note = " The median of each participant's answers." if repeated else ""
+        assert column.description == f"It is {item}. About {made.blocks[0].name(cell.setting)}, in Block.{note}"
         assert (column.minimum, column.maximum) == (1, 7)
         assert column.kind == ("integer" if (wide[name].dropna() % 1 == 0).all() else "number")
     given = made.responses["response"]
@@ -228,6 +231,7 @@ def test_questions_and_scores_have_their_answers_and_texts_in_the_wide_table_sps
         ],
         columns=["participant", "code", "response", "session", "trial"],
     ).assign(counted=True, excluded=False, cannot_judge=False)
+    monkeypatch.setattr(Study, "rows_in", lambda _study, where: given if where is form else picked)
     for method in ("answers_to", "rows_of"):
         monkeypatch.setattr(Study, method, lambda _study, question: given if question is sure else picked)
     monkeypatch.setattr("study_app.analysis.export.tables.scored", lambda _study, _score: given)
@@ -237,7 +241,8 @@ def test_questions_and_scores_have_their_answers_and_texts_in_the_wide_table_sps
     assert "track__size" not in wide_table(replace(asked, levels=(track,)))[1]
     asked = replace(made, others=OtherQuestions(questions=(sure, pick), scores=(raw,)))
     table, cells = wide_table(asked)
-    median, last = (f" The {which} of each participant's answers." for which in ("median", "last"))
+    median = " The median of each participant's answers (hypotheses and the first page of the report use the mean)."
+    last = " The last of each participant's answers."
     expected = {
         "end__sure__stir": (4, 7, f"How sure? In End. After stir.{median}", 2, 9),
         "end__sure__again": (8, None, "How sure? In End. After again.", 2, 9),
@@ -257,7 +262,7 @@ def test_questions_and_scores_have_their_answers_and_texts_in_the_wide_table_sps
     assert frame[["end__sure__stir", "end__sure__again", "q__pick__mild", "end__raw__stir"]].fillna(
         -1
     ).T.to_numpy().tolist() == [[4, 7, 99, 99], [8, 98, 97, 99], [1, 2, 99, 99], [41, 71, -1, -1]]
-    off = {97: "Excluded", 99: "No answer"}
+    off = {96: "Not shown", 97: "Excluded", 99: "No answer"}
     labels = {"end__sure__again": {2: "low", 9: "high", 98: "no idea", **off}}
     labels["q__pick__mild"] = {1: "Oil", 2: "Water", 98: "Cannot judge", **off}
     assert {name: about.variable_value_labels[name] for name in labels} == labels
@@ -339,7 +344,7 @@ def test_the_codebook_and_the_sav_file_name_every_level_setting_and_missing_answ
 
 
 def test_missing_answers_have_the_code_of_their_reason() -> None:
-    people = pd.Series(["P1", "P2", "P3", "P4", "P5"])
+    people = pd.Series(["P1", "P2", "P3", "P4", "P5", "P6", "P7", "P8"])
     rows = pd.DataFrame(
         {
             "participant": ["P2", "P3", "P4", "P4", "P5"],
@@ -348,9 +353,14 @@ def test_missing_answers_have_the_code_of_their_reason() -> None:
             "excluded": [False, True, False, True, False],
         }
     )
-    coded = spss._code_missing_answers(pd.Series([4, None, None, None, None], dtype="Float64"), people, rows)
+    others = pd.DataFrame({"participant": ["P1", "P6", "P7"], "counted": [True, True, False]})
+    asked = pd.concat([rows, others.assign(cannot_judge=False, excluded=[False, False, True])])
+    values = pd.Series([4, *[None] * 7], dtype="Float64")
+    coded = spss._code_missing_answers(values, people, rows, asked)
     labels = spss._value_labels({4: "four"}, "unsure")
-    assert [labels[int(value)] for value in coded] == ["four", "unsure", "Excluded", "No answer", "No answer"]
+    assert [labels[int(value)] for value in coded] == [
+        "four", "unsure", "Excluded", "No answer", "No answer", "Not shown", "Excluded", "No answer",
+    ]  # fmt: skip
     assert spss._value_labels({}, "")[int(coded[1])] == "Cannot judge"
 
 
@@ -380,7 +390,7 @@ def test_each_column_of_sav_has_its_label_format_measure_and_values(made: Study,
     types = {"a_text": "string", "a_flag": "boolean", "a_whole": "Int64", "a_number": "Float64", "a time": "string"}
     frame = pd.DataFrame({name: pd.array(values, dtype=types[name]) for name, values in rows.items()})
     path = tmp_path / "x.sav"
-    labels = {1: "low", 97: "Excluded", 99: "No answer"}
+    labels = {1: "low", 96: "Not shown", 97: "Excluded", 99: "No answer"}
     path.write_bytes(spss.sav(replace(made, version="2.5"), ExportTable("t", COLUMNS, frame), {"a_whole": labels}))
     found, about = pyreadstat.read_sav(path, user_missing=True)
     assert about.file_label == "Made up (made_up 2.5)"
@@ -391,7 +401,7 @@ def test_each_column_of_sav_has_its_label_format_measure_and_values(made: Study,
     assert about.variable_value_labels == {"a_flag": {0: "false", 1: "true"}, "a_whole": labels}
     measure = {"a_text": "nominal", "a_flag": "nominal", "a_whole": "ordinal", "a_number": "scale", "a_time": "nominal"}
     assert about.variable_measure == measure
-    assert about.missing_ranges == {"a_whole": [{"lo": code, "hi": code} for code in (97, 99)]}
+    assert about.missing_ranges == {"a_whole": [{"lo": 96, "hi": 99}]}
     formats = {"a_flag": "F1.0", "a_whole": "F4.0"}
     assert {name: about.original_variable_types[name] for name in formats} == formats
     assert found.astype(object).where(found.notna(), None).to_numpy().tolist() == [
