@@ -210,16 +210,61 @@ def test_a_hypothesis_on_a_design_of_conditions_begins_with_d_prime(study: Study
     assert next(row.facts.items for row in rows if row.path == ("analysis", "contrasts"))[0].measures == first.measures
 
 
+def test_numbers_and_scores_of_a_form_are_measures_of_the_block_before_it_but_texts_and_choices_are_not(
+    study: Study,
+) -> None:
+    whole = after(study, SetValue(DESIGN, "abx"))
+    two, _ = whole.with_edits(*edits_to_duplicate(whole, DESIGN[:2])[0])
+    form = ("questionnaires", "after")
+    items = [
+        {"id": "thick", "text": "It felt thick.", "short": "Thick"},
+        {"id": "weight", "kind": "number", "text": "How heavy was it?", "short": "Weight"},
+        {"id": "reason", "kind": "text", "text": "Why?", "short": "Reason"},
+        {"id": "hand", "kind": "choice", "text": "Which hand?", "short": "Hand",
+         "options": [{"id": "left", "text": "Left"}, {"id": "right", "text": "Right"}]},
+    ]  # fmt: skip
+    edits = (Set((*form, "items"), items), Set((*form, "scores"), {"effort": {"items": ["thick"]}}))
+    study, _ = two.with_edits(*edits, Set(("sequence",), ["feel", "after", "feel_2"]))
+    assert study.faults == ()
+    rows = (row for section in form_of(study, ("sequence",)).sections for row in section.rows)
+    first, last = next(row.facts.items for row in rows if row.path == ("analysis", "contrasts"))
+    assert (first.name, last.name, last.measures) == ("feel", "feel_2", (("d_prime", "Sensitivity d′"),))
+    assert dict(first.measures) == {
+        "d_prime": "Sensitivity d′",
+        "after/effort": "Effort score (After)",
+        "after/thick": "“Thick” (After)",
+        "after/weight": "“Weight” (After)",
+    }
+
+
 @pytest.mark.parametrize(
-    ("study", "block", "durations_s"),
+    ("study", "block", "durations_s", "opened", "sentence"),
     [
-        (template("viscosity-jnd"), "training", (4.0, 0.7, 4.0, 2.0, 0.5, 0.9)),
-        (template("viscosity-jnd"), "viscosity", (4.0, 0.7, 4.0, 2.0, 0.9)),
-        (read_study(matching.TEXT.encode()), "matching", (2.0, 0.7, 2.0, 30.0, 0.9)),
+        (
+            template("viscosity-jnd"),
+            "training",
+            (4.0, 0.7, 4.0, 2.0, 0.5, 0.9),
+            ("Cycles", "Pause", "Cycles", "Question", "Feedback duration", "Between trials"),
+            "12.1 s: Interval 4 s, Pause 0.7 s, Interval 4 s, Question about 2 s, Feedback 0.5 s, Between trials 0.9 s",
+        ),
+        (
+            template("viscosity-jnd"),
+            "viscosity",
+            (4.0, 0.7, 4.0, 2.0, 0.9),
+            ("Cycles", "Pause", "Cycles", "Question", "Between trials"),
+            "11.6 s: Interval 4 s, Pause 0.7 s, Interval 4 s, Question about 2 s, Between trials 0.9 s",
+        ),
+        (
+            read_study(matching.TEXT.encode()),
+            "matching",
+            (2.0, 0.7, 2.0, 30.0, 0.9),
+            ("Cycles", "Pause", "Cycles", "Maximum duration", "Between trials"),
+            "35.6 s: Interval 2 s, Pause 0.7 s, Interval 2 s, Setting about 30 s, Between trials 0.9 s",
+        ),
     ],
 )
-def test_the_trial_strip_has_the_duration_of_each_phase(
-    study: Study, block: str, durations_s: tuple[float, ...]
+def test_the_trial_strip_has_the_duration_of_each_phase_and_the_label_of_its_field(
+    study: Study, block: str, durations_s: tuple[float, ...], opened: tuple[str, ...], sentence: str
 ) -> None:
     (design,) = study.document["designs"]
     for key, value in {"pause_s": 0.7, "between_s": 0.9, **({"feedback_s": 0.5} if design == "pair" else {})}.items():
@@ -228,6 +273,8 @@ def test_the_trial_strip_has_the_duration_of_each_phase(
     (strip,) = (row.facts for row in rows if row.path[-1] == "design")
     assert tuple(phase.duration_s for phase in strip.phases) == durations_s
     assert strip.duration_s == pytest.approx(sum(durations_s))
+    assert tuple(phase.opens for phase in strip.phases) == opened
+    assert strip.sentence == f"One trial takes {sentence}."
 
 
 EXCLUSION = ("analysis", "exclusions", 0)
