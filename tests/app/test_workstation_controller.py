@@ -35,6 +35,27 @@ def test_settings_that_cannot_be_kept_are_told_and_count_all_the_same(desk, qtbo
     settings_file().parent.unlink()
 
 
+def test_the_settings_page_shows_the_stored_settings_the_workspace_and_what_undo_reverts(
+    desk, qtbot, tmp_path, monkeypatch
+):
+    monkeypatch.setenv("LIQUID_STUDY_WORKSPACE", str(tmp_path / "lab"))
+    desk.change_settings({"theme": "dark"})
+    page = desk.make_place()
+    qtbot.addWidget(page)
+
+    def shown():
+        return page.settings.theme, page.settings.viewing_distance_mm, page.undo.text(), page.undo.isEnabled()
+
+    assert shown() == ("dark", DEFAULTS.viewing_distance_mm, "Undo theme", True)
+    assert (page.folder.whole, page.kept_in.whole) == (str(tmp_path / "lab"), f"Saved in {settings_file()}")
+    page.changed.emit({"viewing_distance_mm": 640})
+    assert shown() == ("dark", 640, "Undo viewing distance", True)
+    page.undo.click()
+    assert shown() == ("dark", DEFAULTS.viewing_distance_mm, "Undo theme", True)
+    page.undo.click()
+    assert shown() == (DEFAULTS.theme, DEFAULTS.viewing_distance_mm, "Undo", False)
+
+
 def test_a_device_that_nobody_knows_is_told_and_the_mouse_stands_in(qapp):
     save_settings(MachineSettings(device="hammer", theme="dark"))
     settings, trouble = settings_here()

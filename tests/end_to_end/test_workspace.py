@@ -115,6 +115,25 @@ def test_the_first_start_asks_once_and_creates_nothing_before_the_answer(documen
     again.end()
 
 
+@pytest.mark.slow
+def test_a_file_is_refused_as_the_workspace_and_stays_no_setting(documents, tmp_path, monkeypatch, qtbot):
+    start_folder(tmp_path / "start", monkeypatch)
+    (tmp_path / "file").write_text("", encoding="utf-8", newline="\n")
+    visit, messages = MainController(), []
+    qtbot.addWidget(visit.window)
+    monkeypatch.setattr(visit.window, "show_message", lambda title, sentence: messages.append((title, sentence)))
+    visit.open()
+    visit.question.path.show_value(str(tmp_path / "file"))
+    visit.question.accept()
+    ((title, sentence),) = messages
+    assert title == "This folder cannot be used as the workspace"
+    assert str(tmp_path / "file") in sentence
+    assert sentence.endswith(".")
+    assert (visit.check, settings_file().exists()) == (None, False)
+    visit.window.close()
+    visit.end()
+
+
 def test_an_earlier_results_folder_becomes_the_workspace(documents, tmp_path):
     settings_file().parent.mkdir(parents=True)
     settings_file().write_text(
