@@ -24,9 +24,10 @@ from study_app.designer.document.elements import title_of
 from study_app.designer.document.steps import AddElement, AddKey, ChangeLanguage, RemoveKey, RenameElement
 from study_app.designer.document.toml_edits import Set, Unset
 from study_app.designer.form.card import FormCard
-from study_app.designer.form.fields import TypedSentence, TypedText
+from study_app.designer.form.fields import SENTENCE_EDGE_PX, TypedSentence, TypedText
 from study_app.designer.form.special import Compared, Hypothesis
 from study_app.designer.new_study_page import Questions, TemplateQuestion, template_choice
+from study_app.designer.parts import FIELD_PX
 from study_app.designer.problems import problem_rows
 from study_app.designer.window import focus_stops
 from study_app.gui.widgets.boxes import vbox
@@ -254,6 +255,7 @@ def test_add_offers_the_conditions_that_a_block_does_not_have(designer: Any) -> 
     shipped = {name for name in offered if " liquid, " in name}
     assert offered - shipped == {*titles, "New condition …"}
     assert any(name.startswith("Honey") for name in shipped)
+    assert (field.names.currentText(), field.names.placeholderText()) == ("", "Add …")
 
 
 def test_add_to_the_session_shows_titles(designer: Any) -> None:
@@ -522,6 +524,22 @@ def test_a_text_of_several_lines_leaves_undo_and_tab_to_the_form(qtbot: Any, kin
     QTest.keyClick(text, Qt.Key.Key_Tab)
     assert (other.hasFocus(), text.typed_text()) == (True, "stir")
     assert (text.accessibleName(), text.focusPolicy()) == ("Body, English", Qt.FocusPolicy.StrongFocus)
+
+
+def test_a_sentence_grows_as_its_field_becomes_narrower_up_to_its_lines(qtbot: Any) -> None:
+    max_lines = 3
+    sentence = TypedSentence("Description, English", max_lines=max_lines)
+    qtbot.addWidget(sentence)
+    sentence.show_text("stir the thin liquid slowly and hold the ball still")
+    line_px = sentence.fontMetrics().lineSpacing()
+    text_px = sentence.fontMetrics().horizontalAdvance(sentence.typed_text())
+    sentence.resize(2 * text_px, sentence.height())
+    sentence.show()
+    is_high = Qt.ScrollBarPolicy.ScrollBarAsNeeded
+    for fraction, lines, scrolls in ((2.0, 1, False), (0.75, 2, False), (0.2, max_lines, True), (2.0, 1, False)):
+        sentence.resize(round(fraction * text_px), sentence.height())
+        assert sentence.height() == max(FIELD_PX, lines * line_px + SENTENCE_EDGE_PX), fraction
+        assert (sentence.verticalScrollBarPolicy() == is_high) == scrolls, fraction
 
 
 def test_undo_in_a_text_undoes_the_step_of_the_study(designer: Any) -> None:

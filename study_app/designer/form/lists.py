@@ -268,7 +268,6 @@ class _AdditionList(KeysOpenList):
         self.clear()
         for name, data in items:
             self.addItem(name, data)
-        self.setCurrentIndex(-1)
         self.setEnabled(bool(self.count()))
 
     def _choose_at(self, index: int) -> None:

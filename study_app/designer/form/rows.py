@@ -207,6 +207,5 @@ def choice_label(choice: Choice, default: object) -> str:
     if choice.value is None:
         return "Not set"
     package, _, name = str(choice.value).rpartition(":")
-    text = name if name.isdigit() else label_of(name)
-    text = f"{text} ({package})" if package else text
+    text = f"{label_of(name)} ({package})" if package else label_of(name)
     return f"{text} (default)" if choice.value == default else text

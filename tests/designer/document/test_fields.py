@@ -8,10 +8,11 @@ from typing import Any
 import pytest
 
 from study_app.designer.document.elements import element_of
-from study_app.designer.document.fields import Row, label_of, row_at, rows, unit_of
+from study_app.designer.document.fields import Choice, Row, label_of, row_at, rows, unit_of
 from study_app.designer.document.steps import AddKey, StepContext
 from study_app.designer.document.study import Study, read_study
 from study_app.designer.form.form import form_of
+from study_app.designer.form.rows import choice_label
 from study_app.number_text import exact_text
 from study_app.protocol.file_format.json_schema import schema
 from study_app.protocol.source.document import Path, entries
@@ -64,6 +65,24 @@ def described(node: Any) -> Iterator[tuple[str, str, tuple[str, ...]]]:
             ]
             if "description" in part:
                 yield key, part["description"], tuple(map(exact_text, bounds))
+
+
+@pytest.mark.parametrize(
+    ("value", "default", "label"),
+    [
+        (None, None, "Not set"),
+        (None, "random", "Not set"),
+        ("force_limit_n", "random", "Force limit"),
+        ("force_limit_n", "force_limit_n", "Force limit (default)"),
+        ("lab_tools:stir_fast", None, "Stir fast (lab_tools)"),
+        ("lab_tools:stir_fast", "lab_tools:stir_fast", "Stir fast (lab_tools) (default)"),
+        ("23", None, "23"),
+    ],
+)
+def test_a_choice_has_the_label_of_its_value_with_its_package_and_whether_it_is_the_default(
+    value: str | None, default: object, label: str
+) -> None:
+    assert choice_label(Choice(value), default) == label
 
 
 def test_every_key_of_every_model_reaches_a_form_with_its_words_and_bounds() -> None:
