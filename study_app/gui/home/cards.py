@@ -213,7 +213,6 @@ class SessionsCard(Card):
         self._sessions, self._now = tuple(sessions), now
         self.where.show_text(f"in {where}")
         self._show_kinds()
-        self.rows.show_rows(self._sessions, now)
         self._apply_filter()
 
     def show_kind(self, kind: str) -> None:
@@ -232,7 +231,7 @@ class SessionsCard(Card):
 
     def _apply_filter(self) -> None:
         kind = str(self.kind.currentData() or "") if self._sessions else _ALL
-        self.rows.show_matching(lambda session: kind in (session.kind, _ALL))
+        self.rows.show_rows((session for session in self._sessions if kind in (session.kind, _ALL)), self._now)
         hidden = [
             counted(count, f"{other or 'participant'} session")
             for other in KINDS

@@ -40,6 +40,8 @@ class SessionsCard(Card):
         self.state.setFont(font("body"))
         self.state.addItem(_ALL_STATES, "")
         self._none = ""
+        self._sessions: tuple[SessionFacts, ...] = ()
+        self._now = datetime.now().astimezone()
         self.rows = SessionsTable(_COLUMNS, "")
         self.head = label("", "label", weight=600, tabular=True)
         self.why = label("", "small", "text2", wraps=True)
@@ -65,7 +67,7 @@ class SessionsCard(Card):
     def show_sessions(self, sessions: Sequence[SessionFacts], none: str = "No sessions.") -> None:
         """Show the sessions, or the text ``none`` if there are none; the filters are kept."""
         self._none = none
-        self.rows.show_rows(sessions, datetime.now().astimezone())
+        self._sessions, self._now = tuple(sessions), datetime.now().astimezone()
         has_groups = any(session.group for session in sessions)
         self.search.setPlaceholderText("Participant or group" if has_groups else "Participant")
         chosen = self.state.currentData()
@@ -85,7 +87,7 @@ class SessionsCard(Card):
         state = str(self.state.currentData() or "")
         filtered = bool(state or self.search.text().strip())
         self.rows.none.setText("No session matches." if filtered else self._none)
-        self.rows.show_matching(session_filter(self.search.text(), state))
+        self.rows.show_rows(filter(session_filter(self.search.text(), state), self._sessions), self._now)
 
 
 class ExclusionsCard(Card):

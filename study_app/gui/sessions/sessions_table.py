@@ -1,6 +1,6 @@
 """The table of sessions: participant, study, start, status, validity and answers."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Iterable, Sequence
 from datetime import datetime
 from typing import Any
 
@@ -78,8 +78,6 @@ class SessionsTable(QWidget):
     def __init__(self, columns: Sequence[Column], none: str) -> None:
         super().__init__()
         self._names = [column.name for column in columns]
-        self._sessions: tuple[SessionFacts, ...] = ()
-        self._matches: Callable[[SessionFacts], bool] = lambda _facts: True
         self._now = datetime.now().astimezone()
         headings: dict[str, str] = {column.name: column.heading for column in columns}
         self.model = Rows(headings, lambda facts, name: _session_cell(facts, name, self._now))
@@ -102,15 +100,10 @@ class SessionsTable(QWidget):
         row = self.table.chosen_row
         return None if row is None else self.shown[row]
 
-    def show_rows(self, sessions: Sequence[SessionFacts], now: datetime) -> None:
-        """Show the sessions that match the filter, and keep the selection."""
-        self._sessions, self._now = tuple(sessions), now
-        self.show_matching(self._matches)
-
-    def show_matching(self, matches: Callable[[SessionFacts], bool]) -> None:
-        """Show only matching sessions from now on."""
-        selected, self._matches = self.chosen, matches
-        self.model.show(filter(matches, self._sessions))
+    def show_rows(self, sessions: Iterable[SessionFacts], now: datetime) -> None:
+        """Show sessions, and keep the selection."""
+        selected, self._now = self.chosen, now
+        self.model.show(sessions)
         folders = [session.folder for session in self.shown]
         if selected is not None and selected.folder in folders:
             self.table.selectRow(folders.index(selected.folder))

@@ -1,7 +1,7 @@
 """Home: cards, sessions, and the ways into a session, while studies, drafts and files come, change and go."""
 
 import threading
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import pytest
@@ -334,6 +334,10 @@ def test_the_card_of_sessions_counts_each_kind_and_says_which_ones_it_does_not_s
         assert not card.details.isEnabled()
     assert emptied == [False, True]
     card.show_sessions(facts[3:], "results", now)
+    card.show_kind("sample")
+    for days, started in enumerate(("Today 18:30", "Yesterday 18:30", "9 Mar 18:30")):
+        card.show_sessions(facts[3:], "results", now + timedelta(days=days))
+        assert [card.rows.model.index(0, column).data() for column in (0, 2)] == ["P3", started]
     for kind, words in (("pilot", "No pilot sessions."), ("simulated", "No simulated sessions.")):
         card.show_kind(kind)
         assert card.nothing.text() == f"{words} Not shown: 1 sample session."
