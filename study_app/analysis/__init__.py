@@ -8,6 +8,6 @@ Reading order: wording, worker_messages; statistics; data; results; page_layout,
 figures; findings; contrasts; evaluate; planned_exclusions; planning; report; export_study; study_worker.
 
 Public modules: contrasts, data, evaluate, export, export_study, findings, levels.exponents, levels.thresholds,
-levels.tracks, planning, planning.power_curves, planning.power_estimates, planning.preregistration,
+levels.tracks, planned_exclusions, planning, planning.power_curves, planning.power_estimates, planning.preregistration,
 planning.simulated_studies, planning.threshold_studies, report, results, statistics, worker_messages.
 """

@@ -181,7 +181,7 @@ def unmet_exclusion_sentences(study: Study) -> Iterator[str]:
         )
 
 
-def _why_unmet(study: Study, participant: str, session: int, rule: str) -> str:
+def _why_unmet(study: Study, participant: str, session: int, rule: Any) -> str:
     """Return the value of a session that does not meet a rule, with the rule's limit, or the rule's condition."""
     limit = _planned_limits(study).get(rule)
     match rule:
