@@ -1,6 +1,6 @@
 """The report: findings in words, tables and figures, with everything needed to check them.
 
-Reading order: methods, questions_in_full; sections, study_figures; first_page; write_report.
+Reading order: methods, questions_in_full, r_script; sections, study_figures; first_page; write_report.
 """
 
 from study_app.analysis.report.sections import answers

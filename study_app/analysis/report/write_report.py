@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, fields, is_dataclass
 from functools import partial
-from importlib import metadata, resources
+from importlib import metadata
 from itertools import chain
 from pathlib import Path
 from platform import python_version
@@ -38,6 +38,7 @@ from study_app.analysis.report import sections
 from study_app.analysis.report.first_page import cards, figures_shown, first_page, presented_in
 from study_app.analysis.report.methods import methods, version_words
 from study_app.analysis.report.questions_in_full import appendix
+from study_app.analysis.report.r_script import r_script
 from study_app.analysis.report.study_figures import block_figure_tasks
 from study_app.analysis.results import (
     BlockResult,
@@ -236,13 +237,6 @@ def _path_in_study(study: Study, path: Any) -> str:
     return str(path.relative_to(study.folder).as_posix())
 
 
-def r_script(study: Study) -> str:
-    """Return the R script, which reads the exported tables and tests.csv."""
-    script = resources.files("study_app.analysis.report").joinpath("templates", "report.R").read_text("utf-8")
-    sealed = "FALSE" if study.revealed else "TRUE"
-    return "".join(f"# {line}\n" for line in credit_lines(study)) + f"sealed <- {sealed}  # the key\n{script}"
-
-
 _HASHES_SHOWN = 12
 """The most files whose hashes the page lists; it always shows a combined hash."""
 
@@ -318,7 +312,7 @@ def report_files(study: Study, progress: Progress = report_no_progress) -> tuple
         texts["planned_exclusions"] = [asdict(proposal) for proposal in planned.proposals]
     files: dict[str, bytes] = {}
     for file, make in (
-        ("report.R", lambda: r_script(study).encode()),
+        ("report.R", lambda: r_script(study, results).encode()),
         ("methods.txt", with_d_z(f"{texts['methods']}\n", "dz").encode),
         ("tests.csv", lambda: tests_csv(results)),
         ("motion.csv", lambda: motion_csv(results)),

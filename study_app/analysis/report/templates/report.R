@@ -2,7 +2,8 @@
 #   Rscript report.R [TABLES [TESTS]]   folders of the exported tables and of tests.csv; default: this folder
 # The exit code is 1 if any number differs or if there is nothing to compare. Exact p values of trends and of pairs are
 # computed from all changes of sign. For Friedman's test, only approximate p values are compared. Monte Carlo p values
-# are not compared.
+# are not compared. For hypotheses, the t test and the effects are compared, but not the bootstrap, the correction for
+# skewness, the adjusted p or the intervals of standardised effects.
 
 folders <- c(commandArgs(trailingOnly = TRUE), ".", ".")
 folders <- if (length(folders) == 3) folders[c(1, 1)] else folders[1:2]
@@ -14,7 +15,7 @@ exported <- function(name) {
 number <- function(texts) suppressWarnings(as.numeric(texts))  # answers to other questions may be text
 answers <- exported("responses")
 answers <- answers[answers$counted == "true", ]
-answers$response <- number(answers$response)
+answers$response <- number(answers$value)
 tests <- csv(file.path(folders[2], "tests.csv"))
 differing <- compared <- 0
 
@@ -38,15 +39,15 @@ add <- function(chances, values, each = rep(1 / length(values), length(values)))
 at_least <- function(chances, value) sum(chances[(value + 1):length(chances)])
 
 # One row per participant and one column per condition ("L1 L2", or "D1+D4 D2" if two codes have the same delay);
-# repeated answers are replaced by their median. With by_session: one column per session, which contains the median over
-# the conditions that the participant answered in all sessions.
-wide <- function(block, item, codes, by_session = FALSE) {
+# repeated answers are replaced by their median (or mean). With by_session: one column per session, which contains the
+# median over the conditions that the participant answered in all sessions.
+wide <- function(block, item, codes, by_session = FALSE, repeated = median) {
   codes <- strsplit(codes, " ")[[1]]
   columns <- rep(codes, lengths(strsplit(codes, "+", fixed = TRUE)))
   names(columns) <- unlist(strsplit(codes, "+", fixed = TRUE))
-  rows <- answers[answers$block == block & answers$item == item & !is.na(answers$response), ]
+  rows <- answers[answers$block %in% block & answers$item == item & !is.na(answers$response), ]
   settings <- factor(columns[rows$code], codes)
-  if (!by_session) return(tapply(rows$response, list(rows$participant, settings), median))
+  if (!by_session) return(tapply(rows$response, list(rows$participant, settings), repeated))
   sessions <- factor(rows$session, unique(sort(answers$session[answers$block == block])))
   cells <- tapply(rows$response, list(rows$participant, settings, sessions), median)
   common <- apply(!is.na(cells), c(1, 2), all)
@@ -93,7 +94,7 @@ equivalent <- function(what, d, row) {
 }
 for (place in seq_len(nrow(tests))) {
   row <- tests[place, ]
-  if (is.na(row$item) || is.na(row$statistic) && is.na(row$p) || grepl("step-down", row$question)) next
+  if (startsWith(row$test, "contrast") || is.na(row$item) || is.na(row$statistic) && is.na(row$p) || grepl("step-down", row$question)) next
   what <- paste0(row$block, " ", row$item, if (!is.na(row$comparison)) paste0(" (", row$comparison, ")"), ", ",
                  row$question, ":")
   x <- wide(row$block, row$item, row$codes, row$question == "sessions differ")
@@ -105,6 +106,60 @@ for (place in seq_len(nrow(tests))) {
     "equivalence, two one-sided t tests" = equivalent(what, d, row))
 }
 numbers <- sum(!is.na(tests[c("statistic", "p", "low", "high")]))
+
+# Hypotheses: each participant's value on each side, in logarithms for a ratio; then t tests.
+groups_of <- function(people) {
+  trials <- exported("trials")
+  trials$group[match(people, trials$participant)]
+}
+side <- function(h, place, ratio) {
+  if (h$table != "responses") {
+    rows <- exported(h$table)
+    rows <- rows[rows$block == h$blocks[place] & !is.na(rows[[h$measure]]), ]
+    values <- number(rows[[h$measure]])
+    return(tapply(if (ratio) log(values) else values, rows$participant, mean))
+  }
+  if (is.na(h$form)) return(rowMeans(wide(h$blocks[place], h$measure, h$codes[place], repeated = h$repeated)))
+  rows <- answers[answers$form %in% h$form & answers$after_block %in% h$blocks[place] & answers$item == h$measure, ]
+  tapply(rows$response, rows$participant, mean, na.rm = TRUE)
+}
+hypothesis <- function(place, row, h) {
+  what <- paste0("hypothesis ", place, ", ", h$measure, ":")
+  if (h$skipped != "") return(cat(what, "not computed, because", h$skipped, "\n"))
+  ratio <- row$effect_name == "ratio"
+  values <- side(h, 1, ratio)
+  if (length(h$blocks) == 2) {
+    second <- side(h, 2, ratio)
+    people <- intersect(names(values), names(second))
+    values <- values[people] - second[people]
+  }
+  values <- values[is.finite(values)]
+  if (length(h$groups) == 2) {
+    groups <- groups_of(names(values))
+    x <- values[groups %in% h$groups[1]]; y <- values[groups %in% h$groups[2]]
+    mean <- mean(x) - mean(y); error <- sqrt(var(x) / length(x) + var(y) / length(y))
+    freedom <- length(x) + length(y) - 2
+    sd <- sqrt((sum((x - mean(x))^2) + sum((y - mean(y))^2)) / freedom)
+    standardised <- mean / sd * exp(lgamma(freedom / 2) - lgamma((freedom - 1) / 2)) / sqrt(freedom / 2)  # Hedges' g
+    freedom <- min(length(x), length(y)) - 1  # variances may be unequal
+  } else {
+    mean <- mean(values); error <- sd(values) / sqrt(length(values)); freedom <- length(values) - 1
+    standardised <- mean / sd(values)  # d_z
+  }
+  t <- mean / error
+  p <- if (grepl("one-sided \\(higher", row$method)) pt(t, freedom, lower.tail = FALSE) else
+    if (grepl("one-sided \\(lower", row$method)) pt(t, freedom) else 2 * pt(-abs(t), freedom)
+  shown <- if (ratio) exp else identity
+  same(paste(what, "t"), row$statistic, t)
+  same(paste(what, "p"), row$p, p)
+  same(paste(what, row$effect_name), row$effect, shown(mean))
+  same(paste(what, "interval, low"), row$low, shown(mean - qt(0.975, freedom) * error))
+  same(paste(what, "interval, high"), row$high, shown(mean + qt(0.975, freedom) * error))
+  same(paste(what, "standardised effect"), h$standardised, standardised)
+}
+stated <- tests[startsWith(tests$test, "contrast"), ]
+for (place in seq_along(hypotheses)) hypothesis(place, stated[place, ], hypotheses[[place]])
+numbers <- numbers + sum(!is.na(stated$effect)) + sum(!is.na(sapply(hypotheses, `[[`, "standardised")))
 
 # Blocks with levels: d' and criterion, exponents, and settings in the method of adjustment.
 judged <- exported("tracks")
@@ -173,7 +228,7 @@ cat(compared, "of", numbers, "numbers compared\n")
 if (compared == 0) {
   cat("nothing to compare:", if (sealed)
     "the key was sealed, so conditions are not compared; run liquid-study unblind, then write these files again\n"
-  else "no test, threshold or setting has a number that R computes\n")
+  else "no test, hypothesis, threshold or setting has a number that R computes\n")
   quit(status = 1)
 }
 if (differing == 0) cat("all numbers that R computed agree with the report\n") else {
