@@ -10,7 +10,7 @@ from click.testing import CliRunner
 from scipy.stats import norm, skew, ttest_1samp
 from scipy.stats import t as student
 
-from study_app.analysis.data.blocks import Decided, Spending
+from study_app.analysis.data.blocks import Decided
 from study_app.analysis.data.study_tables import load_study
 from study_app.analysis.evaluate import evaluate
 from study_app.analysis.findings.statement_tests import DelayTrend, MeanTests
@@ -24,6 +24,7 @@ from study_app.analysis.statistics.slope_tests import slope_test
 from study_app.cli import commands
 from study_app.errors import ProtocolError
 from study_app.protocol.load import parse
+from study_app.protocol.model import Spending
 from study_app.protocol.participants.raters import PUBLISHED, TYPICAL
 from study_app.protocol.source.files import source_bytes
 from study_app.session.simulated.answers_only import rehearse_answers
@@ -123,7 +124,7 @@ def test_a_look_is_planned_and_its_alpha_is_less_than_that_of_all() -> None:
     )
     assert counts[contrast.described(), "contrast"][0, FULL] == shown > 0
     text = preregistration(protocol, "0" * 64)
-    assert "all tests are run when 6 and 12 valid sessions are complete" in text
+    assert "all tests are run when 6 and 12 participants have completed a valid session;" in text
     assert f"up to {first:.3g} and {last:.3g} are significant at these looks (O'Brien–Fleming alpha spending" in text
 
 

@@ -102,7 +102,7 @@ SHUFFLED = 'order = "shuffled"\nquestionnaire = "feel"'
             {"standards = [1, 2]": "standards = [1, 2.5]"},
             {
                 "Design 2IFC of viscosity_pa_s, standards 1, 2.5 Pa·s: 2 intervals, 0.6 s apart",
-                "Levels Weber fraction 0.2 to 0.8 (constant), 24 trials per standard",
+                "Levels Weber fraction 0.2 to 0.8 (constant: 3 levels, 8 presentations each), 24 trials per standard",
                 "Comparisons viscosity_pa_s 1.2 to 4.5 Pa·s",
             },
         ),
@@ -116,12 +116,39 @@ SHUFFLED = 'order = "shuffled"\nquestionnaire = "feel"'
             },
         ),
         (
+            "every_design",
+            {
+                'design = "estimation"': 'design = "guess"',
+                "[stimuli.around]": '[designs.guess]\nkind = "estimation"\nmodulus = { level = 2, number = 40 }\n'
+                "[stimuli.around]",
+            },
+            {
+                "Levels value 0.5 to 8 Pa·s (constant: 5 levels, 1 presentation each), 6 trials",
+                "Modulus the number 40 for 2 Pa·s, presented in the first trial, which is not analysed",
+            },
+        ),
+        (
             "grouped",
             {
+                'study.name = "grouped"': 'study.name = "grouped"\nstudy.description = """\nIs honey\nheavier?\n"""',
                 "[groups.first_thin]": "[groups.first_thin]\nshare = 2",
                 "[groups.first_thick]": "[groups.first_thick]\nshare = 3",
             },
-            {"Group first_thin, share 2", "Group first_thick, share 3", "Answers 6 to 7 per session"},
+            {
+                "Description Is honey heavier?",
+                "Group first_thin, share 2",
+                "Group first_thick, share 3",
+                "Answers 6 to 7 per session",
+                "Questions 1 statement (questionnaire judgement)",
+            },
+        ),
+        (
+            "grouped",
+            {
+                'short = "Heavy" }': 'short = "Heavy" },\n{ id = "why", kind = "text", text = "Why?", short = "Why", '
+                'show_if = { item = "heavy", at_least = 5 } }'
+            },
+            {"Answers up to 13 per session", "Group first_thick (about 2 min, up to 12 answers)"},
         ),
     ],
 )

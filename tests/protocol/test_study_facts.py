@@ -187,7 +187,7 @@ def test_each_decision_about_the_analysis_has_its_own_row() -> None:
     ]
     others = [
         ("Participants", "30 planned"),
-        ("Interim analyses", "with 10, 30 participants; alpha spending: pocock"),
+        ("Interim analyses", "with 10, 30 participants; Pocock alpha spending"),
         ("Precision", "half-width of the 95 % confidence interval for the group mean: 15 %"),
         ("Proposes exclusion", "the median response time is below 0.3 s"),
         ("Hypothesis", "just-noticeable difference differs between near and far"),

@@ -12,7 +12,7 @@ from typing import Any, Final, Literal, Self, TypeAlias, get_args
 from study_app.analysis.wording import significant
 from study_app.errors import AnalysisError
 from study_app.protocol.blocks import Compared, Phase, block_titles, display_language
-from study_app.protocol.model import Analysis, Contrast, Protocol, Published
+from study_app.protocol.model import SPENDINGS, Analysis, Contrast, Protocol, Published, Spending
 from study_app.protocol.participants import RecordedSessions
 from study_app.protocol.presented import link_descriptions
 from study_app.protocol.questionnaires import Instrument, Score
@@ -367,7 +367,6 @@ def _level_block(protocol: Mapping[str, Any], step: str, key: Key | None, whole:
 
 
 _Direction: TypeAlias = Literal["increasing", "decreasing"]
-Spending: TypeAlias = Literal["obrien-fleming", "pocock"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -461,7 +460,6 @@ TRENDS: Final = {
 }
 """Descriptions of the tests of a trend over the delay."""
 
-SPENDINGS: Final[Mapping[Spending, str]] = {"obrien-fleming": "O'Brien–Fleming", "pocock": "Pocock"}
 NOTHING_DECIDED: Final = Decided(
     made=False,
     changed=False,

@@ -2,7 +2,7 @@
 
 import json
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Final
@@ -10,24 +10,24 @@ from typing import Final
 from pydantic import TypeAdapter
 
 from study_app import __version__, number_text
-from study_app.analysis.contrasts import RATIOS, inclusion_words, largest_difference, t_test_name
-from study_app.analysis.data.blocks import SPENDINGS, TRENDS, Decided, decisions
+from study_app.analysis.contrasts import RATIOS, inclusion_words, t_test_name
+from study_app.analysis.data.blocks import TRENDS, Decided, decisions
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.html_page import bullets, heading, paragraph
 from study_app.analysis.levels.thresholds import FAMILIES, REMOVED
 from study_app.analysis.planned_exclusions import unmet_exclusion_sentences
 from study_app.analysis.planning.simulated_studies import compares_statements, question_contrasts
 from study_app.analysis.results import min_sample
-from study_app.analysis.statistics.equivalence import fewest_participants
 from study_app.analysis.statistics.outcome import FEW
 from study_app.analysis.statistics.thresholds import FEWEST
 from study_app.analysis.wording import bound_text, counted, listed, percent, significant
 from study_app.errors import AnalysisError
 from study_app.protocol.blocks import Block, block_titles, display_language
-from study_app.protocol.descriptions import describe, limit_rows
+from study_app.protocol.descriptions import describe, limit_rows, number_range
 from study_app.protocol.load import parse, protocol_hash, source_bytes
-from study_app.protocol.model import Analysis, Contrast, Protocol
+from study_app.protocol.model import SPENDINGS, Analysis, Contrast, Protocol
 from study_app.protocol.orders import block_orders_by_group, variants
+from study_app.protocol.participants import fewest_participants
 from study_app.protocol.source import text_in
 from study_app.protocol.warnings import PRECISION, expected_of, precision_plan, precision_rows, threshold_plan
 from study_app.psychophysics.people import BETWEEN_PEOPLE
@@ -168,7 +168,7 @@ def _equivalence_sentences(protocol: Protocol, contrast: Contrast) -> str:
     if contrast.bound is None or protocol.analysis is None:
         return ""
     bounds = sum(contrast.bound is not None for contrast in protocol.analysis.contrasts)
-    largest = largest_difference(contrast) if protocol.compares_statement(contrast) else None
+    largest = contrast.largest_difference if protocol.compares_statement(contrast) else None
     people = "participants in each group" if contrast.groups else "participants"
     alpha = decisions(protocol).alphas[-1] / bounds
     adjusted = "" if bounds == 1 else f", with Holm's adjustment for the {bounds} hypotheses that have a bound"
@@ -187,11 +187,17 @@ def _interval_lines(protocol: Protocol, block: Block) -> Iterator[str]:
     stimulus = protocol.stimulus_of(block)
     quantity, unit = stimulus.quantity, stimulus.unit
     standards = [standard for standard in protocol.standards_of(block) if standard is not None]
+    standards_text = f"{listed([f'{standard:g}' for standard in standards])} {unit}".rstrip()
     if threshold_plan(protocol, block) is None:
-        questions = {"number": "What is the exponent of the power law for", "rating": "How do ratings change with"}
-        yield f"Block {title}: {questions.get(design.reply, 'How do answers change with')} {quantity}?"
+        compared = bool(standards) and design.intervals > 1
+        questions = {
+            "number": f"what is the exponent of the power law for {quantity}",
+            "rating": f"how do ratings change with {quantity}",
+            "setting": f"which settings of {quantity} {f'match {standards_text}' if compared else 'are chosen'}",
+        }
+        yield f"Block {title}: {questions.get(design.reply, f'how do answers change with {quantity}')}?"
         return
-    at = f" at {listed([f'{standard:g}' for standard in standards])} {unit}".rstrip() if standards else ""
+    at = f" at {standards_text}" if standards else ""
     kind = "Weber fraction" if stimulus.level_kind == "weber" else "threshold"
     yield (
         f"Block {title}: what is the {kind} for {quantity}{at}? We report an estimate with a 95 % interval but no test."
@@ -264,72 +270,115 @@ def analyses(protocol: Protocol) -> Iterator[str]:
                     "standard, with a 95 % confidence interval (Student's t)."
                 )
         elif block.design is not None and block.stimulus is not None:
-            yield (
-                f"Block {title}: for each level, we report the mean across participants of their mean answers, "
-                "with a 95 % confidence interval (Student's t). If participants estimate numbers, we use the "
-                "logarithms of the answers, and the exponent is their slope on the logarithm of the level."
-            )
-            if protocol.design_of(block).reply == "rating":
-                yield (
-                    f"Block {title}: we report d_a for each level relative to the lowest level, calculated from "
-                    "the area under the ROC curve."
-                )
+            yield from _answer_sentences(protocol.design_of(block).reply, title)
         elif block.design is not None:
             yield (
                 f"Block {title}: we report d′ for each participant, calculated from rates with the log-linear "
                 "correction."
             )
     yield from _description_sentences(protocol)
-    statement_blocks = protocol.blocks_with_statements
-    if not statement_blocks:
+    yield from _statement_sentences(protocol)
+
+
+def _answer_sentences(reply: str, title: str) -> Iterator[str]:
+    """Yield sentences on the analysis of answers that enter no psychometric function; ``reply`` is their kind."""
+    if reply == "setting":
+        yield (
+            f"Block {title}: for each participant and standard, we report the mean of the settings (the point of "
+            "subjective equality), their standard deviation, the constant error, and the difference between settings "
+            "reached from above and from below. For the group, we report means with 95 % confidence intervals "
+            "(Student's t). If levels are spaced logarithmically, we use the logarithms of the settings."
+        )
         return
+    answers = "logarithmic answers" if reply == "number" else "answers"
+    exponent = " The exponent is the slope of these logarithms on the logarithm of the level." * (reply == "number")
+    yield (
+        f"Block {title}: for each level, we report the mean across participants of their mean {answers}, with a 95 % "
+        f"confidence interval (Student's t).{exponent}"
+    )
+    if reply == "rating":
+        yield (
+            f"Block {title}: we report d_a for each level relative to the lowest level, calculated from the area "
+            "under the ROC curve."
+        )
+
+
+def _statement_sentences(protocol: Protocol) -> Iterator[str]:
+    """Yield sentences on the tests of statements, and alpha."""
+    blocks = [block for block in protocol.blocks_with_statements if len(block.conditions) > 1]
     decided = decisions(protocol)
-    kinds = {protocol.compared_in(block.id) for block in statement_blocks}
-    if "delays" in kinds:
+    if delayed := [block for block in blocks if protocol.compared_in(block.id) == "delays"]:
         yield (
-            f"Delays: we test for trends with {TRENDS[decided.trends]}. The test is one-sided if a direction is "
-            "stated, otherwise two-sided. If the answers to a statement show a trend, we drop the longest delay and "
-            f"repeat the test until no trend remains. {_equivalence_words(decided)}We estimate the "
-            "detection threshold from agreement if agreement shows a trend."
+            f"{_blocks_words(protocol, delayed)}: we test for trends with {TRENDS[decided.trends]}. The test is "
+            "one-sided if a direction is stated, otherwise two-sided. If the answers to a statement show a trend, we "
+            f"drop the longest delay and repeat the test until no trend remains. {_equivalence_words(decided)}We "
+            "estimate the detection threshold from agreement if agreement shows a trend."
         )
-    if others := kinds - {None, "delays"}:
+    others = [block for block in blocks if block not in delayed]
+    if pairs := [block for block in others if len(block.conditions) == 2]:
+        yield f"{_blocks_words(protocol, pairs)}: we test each statement with Wilcoxon's signed-rank test."
+    if several := [block for block in others if len(block.conditions) > 2]:
         yield (
-            f"{' and '.join(sorted(map(str, others))).capitalize()}: we test each statement with Friedman's test "
-            "(permutation), and compare pairs of conditions with Wilcoxon's signed-rank test."
+            f"{_blocks_words(protocol, several)}: we test each statement with Friedman's test (permutation). If a "
+            "statement shows a difference, we compare pairs of conditions with Wilcoxon's signed-rank test, "
+            "Holm-adjusted across all pairs in the block."
         )
-    yield (
-        "We claim a difference for a statement only if the permutation test over all statements in its block is "
-        "significant (Holm-adjusted across the blocks). Intervals for mean rank correlations and exploratory tests of "
-        f"means require at least {FEW} participants."
-    )
-    yield (
-        f"Alpha is {decided.alpha:g}. The p values of primary statements ({', '.join(decided.primary) or 'all'}) are "
-        "Holm-adjusted; those of other statements, which are exploratory, are adjusted with the Benjamini–Hochberg "
-        "method."
-        if protocol.analysis is not None
-        else "The protocol does not have an [analysis] table, so all results are exploratory."
-    )
+    if blocks:
+        yield (
+            "We claim a difference for a statement only if the permutation test over all statements in its block is "
+            "significant (Holm-adjusted across the blocks). Intervals for mean rank correlations and exploratory tests "
+            f"of means require at least {FEW} participants."
+        )
+    if protocol.analysis is None:
+        yield "The protocol does not have an [analysis] table, so all results are exploratory."
+    elif blocks:
+        yield (
+            f"Alpha is {decided.alpha:g}. The p values of primary statements ({', '.join(decided.primary) or 'all'}) "
+            "are Holm-adjusted; those of other statements, which are exploratory, are adjusted with the "
+            "Benjamini–Hochberg method."
+        )
+    elif protocol.analysis.contrasts:
+        yield f"Alpha is {decided.alpha:g}."
+
+
+def _blocks_words(protocol: Protocol, blocks: Sequence[Block]) -> str:
+    """Return the titles of blocks as the beginning of a sentence."""
+    return f"Block{'s' * (len(blocks) > 1)} {listed([_title(protocol, block.id) for block in blocks])}"
+
+
+def _described_answers(protocol: Protocol) -> list[str]:
+    """Return phrases for the answers that are described but, except in hypotheses, not tested."""
+    places, mixed = [_form_title(protocol, form) for form in protocol.forms], []
+    for block in protocol.main_blocks:
+        asked = protocol.questionnaire_of(block.id) if block.design is None else None
+        if asked is None:
+            continue
+        title = f"block {_title(protocol, block.id)}"
+        if not asked.statements or len(block.conditions) == 1:
+            places.append(title)
+        elif len(asked.statements) < len(asked.items):
+            mixed.append(title)
+    return [
+        f"to the questions {other}in {listed(in_places)}"
+        for other, in_places in (("", places), ("other than statements ", mixed))
+        if in_places
+    ]
 
 
 def _description_sentences(protocol: Protocol) -> Iterator[str]:
     """Yield sentences on the description of answers to forms and to questions that are not statements."""
-    titles = [
-        _title(protocol, block.id)
-        for block in protocol.main_blocks
-        if block.design is None
-        and (asked := protocol.questionnaire_of(block.id)) is not None
-        and len(asked.statements) < len(asked.items)
-    ]
-    described = []
-    if protocol.forms:
-        described.append(f"the questions in {listed([_form_title(protocol, form) for form in protocol.forms])}")
-    if titles:
-        described.append(f"the questions other than statements in {listed([f'block {title}' for title in titles])}")
-    if not described:
+    if not (described := _described_answers(protocol)):
         return
-    hypotheses = " except in the hypotheses above" * bool(question_contrasts(protocol))
+    contrasts = () if protocol.analysis is None else protocol.analysis.contrasts
+    of_single = any(
+        len(protocol.blocks[name].conditions) == 1
+        for contrast in contrasts
+        if protocol.compares_statement(contrast)
+        for name in contrast.blocks
+    )
+    hypotheses = " except in the hypotheses above" * (of_single or bool(question_contrasts(protocol)))
     yield (
-        f"We describe the answers to {listed(described)} and do not test them{hypotheses}. We report the mean score of "
+        f"We describe the answers {listed(described)}, but do not test them{hypotheses}. We report the mean score of "
         "each questionnaire across participants with its 95 % confidence interval (Student's t). If a questionnaire "
         "is not scored, we report the means of its ratings and numbers. We count how often each option is chosen."
     )
@@ -359,15 +408,17 @@ def preregistration(protocol: Protocol, protocol_hash: str, power: str | None = 
     committed = commitment(protocol, protocol_hash)
     study = protocol.study
     language = _language(protocol)
+    description = " ".join(study.description.split())
     lines = [
         f"# Preregistration: {text_in(study.title, language)}",
         "",
         f"Study {study.name}, version {study.version}; protocol file with SHA-256 `{protocol_hash}`. liquid-study "
         f"{__version__} generated this text from that file alone. Register the text before the first session.",
         "",
+        *([description, ""] if description else []),
         "## Hypotheses and questions",
         "",
-        *(f"- {line}" for line in hypotheses(protocol, language)),
+        *(f"- {line}" for line in list(hypotheses(protocol, language)) or [_without_hypothesis(protocol)]),
         "",
         "## Design",
         "",
@@ -398,6 +449,12 @@ def preregistration(protocol: Protocol, protocol_hash: str, power: str | None = 
     return "\n".join(lines)
 
 
+def _without_hypothesis(protocol: Protocol) -> str:
+    """Return a sentence on what a study without hypotheses and questions describes."""
+    described = _described_answers(protocol)
+    return "No hypothesis is stated." + (f" The study describes the answers {listed(described)}." if described else "")
+
+
 def _design_lines(protocol: Protocol) -> Iterator[str]:
     study = protocol.study
     yield (
@@ -421,11 +478,23 @@ def _design_lines(protocol: Protocol) -> Iterator[str]:
             "difference between them may have other causes."
         )
     yield from _block_order_lines(protocol)
-    yield ("Each participant's trial orders are generated from the session's seed, as described below for each block.")
     for block in protocol.main_blocks:
         compared = f"levels of {block.stimulus}" if block.stimulus is not None else listed(list(block.conditions))
         alone, title = block.stimulus is None and len(block.conditions) == 1, _title(protocol, block.id)
-        yield f"Block {title} {'presents' if alone else 'compares'} {compared}."
+        yield f"Block {title} {'presents' if alone else 'compares'} {compared}.{_trial_order_sentence(protocol, block)}"
+
+
+def _trial_order_sentence(protocol: Protocol, block: Block) -> str:
+    """Return a sentence on how the trial order of a block arises; "" for a single condition."""
+    squares = {"latin": "a Latin square", "williams": "a Williams design"}
+    if block.design is None and len(block.conditions) < 2:
+        return ""
+    if block.design is None and block.order == "fixed":
+        return " The trial order is the same for all participants."
+    if block.design is None and block.order in squares:
+        by = "participant's position in the group" if protocol.groups else "number in the participant's ID"
+        return f" The trial order follows a row of {squares[block.order]}, assigned by the {by}."
+    return " The trial order is drawn for each session."
 
 
 def _block_order_lines(protocol: Protocol) -> Iterator[str]:
@@ -448,13 +517,18 @@ def _participant_lines(protocol: Protocol, committed: Commitment, power: str | N
     sample_size = "The number of participants has not been decided, and there is no stopping rule."
     if committed.participants is not None:
         decided = decisions(protocol)
-        sample_size = (
-            f"We plan to include {number_text.counted(committed.participants, 'participant')}. The study ends when "
-            "this number of valid sessions is complete; only then are the data unblinded and tested."
+        counts = [protocol.session_count(group) or 1 for group in protocol.groups or (None,)]
+        one_session = max(counts) == 1
+        each = "" if one_session else f", with {number_range(counts)} sessions each"
+        complete = "completed a valid session" if one_session else "completed all of their sessions with valid data"
+        planned = f"We plan to include {number_text.counted(committed.participants, 'participant')}{each}. "
+        sample_size = planned + (
+            f"The study ends when this number of participants have {complete}; only then are the data unblinded and "
+            "tested."
             if not decided.looks
-            else f"We plan to include {committed.participants} participants. The data are unblinded and all tests are "
-            f"run when {listed([str(look) for look in decided.looks])} valid sessions are complete; adjusted p values "
-            f"of up to {listed([significant(level) for level in decided.alphas])} are significant at these looks "
+            else "The data are unblinded and all tests are run when "
+            f"{listed([str(look) for look in decided.looks])} participants have {complete}; adjusted p values of "
+            f"up to {listed([significant(level) for level in decided.alphas])} are significant at these looks "
             f"({SPENDINGS[decided.spending]} alpha spending, Lan & DeMets 1983). The study ends at the first look at "
             "which all primary statements and hypotheses are supported, or otherwise at the last look."
         )

@@ -23,7 +23,7 @@ from study_app.protocol.quantities import liquid_words
 from study_app.protocol.questionnaires import Instrument
 from study_app.protocol.questions import Context, Question
 from study_app.protocol.randomization.sequences import row_count
-from study_app.protocol.trials.methods import Adjustment
+from study_app.protocol.trials.methods import Adjustment, Constant
 from study_app.protocol.trials.stimuli import DELAY, DELAYS, OF_CONDITION, OF_LINK
 from study_app.protocol.trials.tasks import Follow
 from study_app.protocol.warnings.expected_precision import precision_rows
@@ -118,15 +118,17 @@ def _head_lines(protocol: Protocol, language: str) -> Iterable[str]:
     ball_mm = scene.body.diameter_m * 1000
     sessions = [variant.protocol for variant in variants(protocol)]
     counts = [orders_of(session).answers for session in sessions]
-    minutes = [round(expected_duration_s(session) / 60) for session in sessions]
+    answers = f"up to {max(counts)}" if any(map(_has_conditional_items, sessions)) else number_range(counts)
+    description = " ".join(study.description.split())
     rows = [
+        *([("Description", description)] if description else ()),
         ("Languages", ", ".join(study.languages)),
         ("Parts", f"{protocol.parts}"),
         *([("Groups", _ASSIGNMENTS[study.group_assignment])] if protocol.groups else ()),
         *(("Group", f"{name}, share {group.share}") for name, group in protocol.groups.items()),
-        ("Answers", f"{number_range(counts)} per {'session' if protocol.sessions_differ else 'participant'}"),
+        ("Answers", f"{answers} per {'session' if protocol.sessions_differ else 'participant'}"),
         ("Blinding", _BLINDINGS[study.blinding]),
-        ("Expected duration", f"about {number_range(minutes)} min"),
+        ("Expected duration", _duration_words(*map(expected_duration_s, sessions))),
         ("Force limit", f"{device.force_limit_n:g} N"),
         ("Servo", f"{device.rate_hz:g} Hz"),
         ("Tank", f"{sizes} mm in the hand frame, {scene.scale:g} times as large in the scene"),
@@ -141,12 +143,28 @@ def number_range(numbers: Sequence[float], digits: str = "") -> str:
     return least if least == largest else f"{least} to {largest}"
 
 
+def _duration_words(*durations_s: float) -> str:
+    """Return the range of expected durations as text: "about 4 min", "about 2 to 3 min", "less than 1 min"."""
+    minutes = [round(duration_s / 60) for duration_s in durations_s]
+    if max(minutes) == 0:
+        return "less than 1 min"
+    return f"up to about {max(minutes)} min" if 0 in minutes else f"about {number_range(minutes)} min"
+
+
+def _has_conditional_items(protocol: Protocol) -> bool:
+    """Whether a question of a session is asked only after certain answers."""
+    asked = (*(protocol.questionnaire_of(block.id) for block in protocol.main_blocks), *protocol.forms.values())
+    return any(item.show_if is not None for questionnaire in asked if questionnaire for item in questionnaire.items)
+
+
 def _session_lines(variant: Variant, planned: int | None, language: str) -> Iterable[str]:
     protocol, title = variant.protocol, "Session"
     if variant.name:
-        minutes = f"about {expected_duration_s(protocol) / 60:.0f} min"
+        answers = counted(orders_of(protocol).answers, "answer")
+        at_most = "up to " if _has_conditional_items(protocol) else ""
         title = (
-            f"{variant.name[0].upper()}{variant.name[1:]} ({minutes}, {counted(orders_of(protocol).answers, 'answer')})"
+            f"{variant.name[0].upper()}{variant.name[1:]} ({_duration_words(expected_duration_s(protocol))}, "
+            f"{at_most}{answers})"
         )
     rows: list[tuple[str, str, str]] = []
     kind: str
@@ -179,18 +197,20 @@ def _block_lines(protocol: Protocol, block: Block, language: str, delay_ticks: i
         ("Recorded as", ", ".join(block_codes(protocol, block))),
         ("Conditions", ", ".join(protocol.conditions_in(block.id))),
         *([] if block.design is not None or compared is None else [("Compared", compared)]),
+        *([("Replicates", "conditions with the same delay are analysed as one condition")] if block.replicates else []),
     ]
     if block.design is not None:
         rows += _design_rows(protocol, block, delay_ticks)
-        rows.append(("Duration", f"about {expected_duration_s(protocol, block.id) / 60:.0f} min"))
+        rows.append(("Duration", _duration_words(expected_duration_s(protocol, block.id))))
     rows.append(("Task", protocol.tasks[block.task].summary))
     if block.design is None and questionnaire is None:
         rows.append(("Questions", "none"))
     elif block.design is None and questionnaire is not None:
-        order = "in the order of the file" if questionnaire.item_order == "fixed" else "in a new order each time"
+        order = ", in the order of the file" if questionnaire.item_order == "fixed" else ", in a new order each time"
+        order = "" if len(questionnaire.items) == 1 else order
         noun = "statement" if len(questionnaire.statements) == len(questionnaire.items) else "question"
         questions = counted(len(questionnaire.items), noun)
-        rows.append(("Questions", f"{questions} (questionnaire {block.questionnaire}), {order}"))
+        rows.append(("Questions", f"{questions} (questionnaire {block.questionnaire}){order}"))
     return _titled_lines(f"{part}{protocol.text(block.title, language)} (block {block.id}, {block.phase})", rows)
 
 
@@ -220,6 +240,8 @@ def _design_rows(protocol: Protocol, block: Block, delay_ticks: int) -> Iterator
     guess = design.guess_rate if design.can_be_correct(stimulus) else 0.0
     target = method.target(guess, design.success_of(stimulus))
     target_text = "" if target is None else f": {target}"
+    if isinstance(method, Constant):
+        target_text = f": {counted(len(levels), 'level')}, {counted(method.repetitions, 'presentation')} each"
     trials = slots[0] * method.tracks
     tracks = "" if method.tracks == 1 else f" in {method.tracks} tracks"
     yield (
@@ -227,6 +249,12 @@ def _design_rows(protocol: Protocol, block: Block, delay_ticks: int) -> Iterator
         f"{name} {number_range(levels, '.3g')}{f' {unit}' if unit and stimulus.level_kind != 'weber' else ''} "
         f"({method.kind}{target_text}), {trials} trials{per_standard}{tracks}",
     )
+    if (modulus := design.first) is not None:
+        yield (
+            "Modulus",
+            f"the number {modulus.number:g} for {f'{modulus.level:g} {unit}'.rstrip()}, presented in the first trial, "
+            "which is not analysed",
+        )
     if isinstance(method, Adjustment):
         low, high = stimulus.domain
         steps = round((high - low) / method.step(stimulus))

@@ -141,13 +141,13 @@ def test_a_preregistration_states_the_looks_and_the_goal_of_precision() -> None:
 
     goal = " The goal is a 95 % interval for the group mean no wider than ±30 %."
     assert lines() == (
-        "We plan to include 12 participants. The study ends when this number of valid sessions is complete; only then "
-        f"are the data unblinded and tested.{goal}"
+        "We plan to include 12 participants. The study ends when this number of participants have completed a valid "
+        f"session; only then are the data unblinded and tested.{goal}"
     )
     looks = lines(("precision = 0.3", 'looks = [6, 12]\nspending = "pocock"'))
     assert looks.startswith(
-        "We plan to include 12 participants. The data are unblinded and all tests are run when 6 and 12 valid sessions "
-        "are complete; adjusted p values of up to 0.031 and 0.0"
+        "We plan to include 12 participants. The data are unblinded and all tests are run when 6 and 12 participants "
+        "have completed a valid session; adjusted p values of up to 0.031 and 0.0"
     )
     assert "(Pocock alpha spending, Lan & DeMets 1983)" in looks
     assert lines(("participants = 12\nprecision = 0.3\n", "")) == (
@@ -174,7 +174,7 @@ def test_a_preregistration_states_how_groups_are_formed_and_in_which_order_they_
         "The order of blocks in group first_thin is fixed: “Thin” and “Thick”.",
         "The order of blocks in group first_thick is fixed: “Thick” and “Thin”.",
     ]
-    assert "Block “Thin” compares water and honey." in lines
+    assert "Block “Thin” compares water and honey. The trial order is drawn for each session." in lines
 
 
 def test_a_preregistration_states_one_order_of_blocks_if_all_groups_have_it() -> None:

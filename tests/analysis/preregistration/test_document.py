@@ -17,6 +17,7 @@ from study_app.cli import commands
 from study_app.protocol.load import load, parse
 from study_app.protocol.source.files import protocol_hash, shipped, source_bytes
 from tests.analysis.power.test_threshold_power import swept
+from tests.protocol.edited_studies import text_of
 from tests.protocol.trials.level_studies import FIVE_POINTS, study
 
 HEADS = (
@@ -61,12 +62,12 @@ def test_a_study_of_thresholds_states_levels_sample_size_and_catch_rule() -> Non
     assert "Weber fraction for damping at the hand at 4, 8, 16 and 32 N·s/m?" in text
     assert "exponent 1, Weber's law" in text
     assert "Weber fraction 0.19, at 71 % correct, n = 10" in text
-    assert "We plan to include 20 participants. The study ends when this number of valid sessions is complete" in text
+    assert "We plan to include 20 participants. The study ends when this number of participants have completed" in text
     assert (
         "are the data unblinded and tested. The goal is a 95 % interval for the group mean no wider than ±20 %." in text
     )
     assert "we simulated 50 trials per standard" in text
-    assert "- Block “Viscosity” compares levels of damping." in text
+    assert "- Block “Viscosity” compares levels of damping. The trial order is drawn for each session.\n" in text
     assert 'Rule "catch": a session with more than 25 % incorrect answers' in text
     assert "the trial is repeated, for up to 3 presentations in total" in text
     assert "Hartung–Knapp 95 % interval if there are at least 3 participants" in text
@@ -96,7 +97,7 @@ def test_a_study_of_statements_states_its_hypotheses_and_corrections() -> None:
     text = preregistration(load("rek2024"), "0" * 64)
     assert "Hypothesis, block “Delay effect”: agreement with" in text
     assert "(comfortable) decreases with the delay." in text
-    assert "- Block “Baseline settings” compares water, honey and light_oil." in text
+    assert "- Block “Baseline settings” compares water, honey and light_oil. The trial order" in text
     assert "within ±1 point?" in text
     assert "above chance (statements: “like_water” for water, “like_honey” for honey and “like_oil” for" in text
     assert "Alpha is 0.05. The p values of primary statements (all) are Holm-adjusted" in text
@@ -163,7 +164,7 @@ def test_a_study_of_d_prime_states_only_what_applies_to_it_and_its_precision_onc
     text = preregistration(protocol, "0" * 64)
     assert "- Block “Prompt”: how well can slime be discriminated from water (d′)?" in text
     assert "- Block “Late”: how well can late_slime be discriminated from late_water (d′)?" in text
-    assert "- We describe the answers to the questions in “After” and do not test them. We report the mean" in text
+    assert "- We describe the answers to the questions in “After”, but do not test them. We report the mean" in text
     assert "maximum number of attempts to deliver an interval trial (3)" in text
     for other in ("threshold", "speed of the target", "delivered level", "delay difference", "Primary"):
         assert other not in text
@@ -179,3 +180,131 @@ def test_limits_of_levels_are_stated_if_levels_vary() -> None:
     assert "speed of the target it follows (40 %)" in text
     assert "interval's delivered level (2 %)" in text
     assert "delay difference" not in text
+
+
+LIQUIDS = """
+format = 2
+study = { name = "liquids", description = "Which liquid\\nfeels heavy?" }
+conditions.water.liquid = "water"
+conditions.oil.liquid = "oil"
+conditions.honey.liquid = "honey"
+liquids.water.density_kg_m3 = 998
+liquids.oil.density_kg_m3 = 870
+liquids.honey.density_kg_m3 = 1420
+tasks.stir = { kind = "explore", min_s = 2, max_s = 6, instruction = "Stir." }
+scales.seven.labels.en = ["1", "2", "3", "4", "5", "6", "7"]
+[analysis]
+participants = 9
+[questionnaires.after]
+scale = "seven"
+intro = "Do you agree?"
+items = [{ id = "heavy", text = "It was heavy.", short = "Heavy" }]
+[blocks.two]
+conditions = ["water", "honey"]
+order = "latin"
+questionnaire = "after"
+[blocks.three]
+conditions = ["water", "oil", "honey"]
+order = "shuffled"
+questionnaire = "after"
+"""
+NUMBER = '{ id = "heavy", kind = "number", text = "How heavy?", short = "Weight" }'
+STATEMENT = '{ id = "heavy", text = "It was heavy.", short = "Heavy" }'
+TWO_SESSIONS = 'format = 2\nsequences = [["two", "three"], ["three"]]'
+FORM = "[questionnaires.after]"
+HYPOTHESIS = '[[analysis.contrasts]]\nmeasure = "heavy"\nblocks = ["two"]\nconditions = ["honey", "water"]\n'
+ONLY_WATER = ('["water", "oil", "honey"]', '["water"]')
+SIGNED_RANKS = "we test each statement with Wilcoxon's signed-rank test."
+
+
+@pytest.mark.parametrize(
+    ("edits", "lines", "missing"),
+    [
+        (
+            [],
+            [
+                f"- Block “Two”: {SIGNED_RANKS}",
+                "- Block “Three”: we test each statement with Friedman's test (permutation). If a statement shows a "
+                "difference, we compare pairs of conditions with Wilcoxon's signed-rank test, Holm-adjusted across all "
+                "pairs in the block.",
+                "- Block “Two” compares water and honey. The trial order follows a row of a Latin square, assigned by "
+                "the number in the participant's ID.",
+                "- Block “Three” compares water, oil and honey. The trial order is drawn for each session.",
+                "We plan to include 9 participants. The study ends when this number of participants have completed a "
+                "valid session; only then are the data unblinded and tested.",
+                "Which liquid feels heavy?",
+            ],
+            ["seed, as", "We describe"],
+        ),
+        (
+            [(', "oil", "honey"]', ', "oil"]'), ("format = 2", TWO_SESSIONS), ('"shuffled"', '"fixed"')],
+            [
+                f"- Blocks “Two” and “Three”: {SIGNED_RANKS}",
+                "- Block “Three” compares water and oil. The trial order is the same for all participants.",
+                "We plan to include 9 participants, with 2 sessions each. The study ends when this number of "
+                "participants have completed all of their sessions with valid data; only then are the data unblinded "
+                "and tested.",
+            ],
+            ["Friedman"],
+        ),
+        (
+            [(STATEMENT, NUMBER), ("scale = \"seven\"\n", ""), ONLY_WATER, ("[analysis]\nparticipants = 9\n", "")],
+            [
+                "- No hypothesis is stated. The study describes the answers to the questions in block “Two” and block "
+                "“Three”.",
+                "- The protocol does not have an [analysis] table, so all results are exploratory.",
+                "- Block “Three” presents water.",
+            ],
+            ["statement", "Alpha"],
+        ),
+        (
+            [(STATEMENT, f"{STATEMENT}, {NUMBER.replace('heavy', 'mass', 1)}"), ONLY_WATER],
+            ["- We describe the answers to the questions in block “Three” and to the questions other than statements "
+             "in block “Two”, but do not test them."],
+            ["except in the hypotheses"],
+        ),
+        (
+            [(STATEMENT, NUMBER), ("scale = \"seven\"\n", ""), (FORM, HYPOTHESIS + FORM)],
+            ["“Two” and block “Three”, but do not test them except in the hypotheses above.", "- Alpha is 0.05."],
+            ["No hypothesis", "primary"],
+        ),
+    ],
+)  # fmt: skip
+def test_a_study_of_liquids_states_the_tests_and_orders_of_each_block(
+    edits: list[tuple[str, str]], lines: list[str], missing: list[str]
+) -> None:
+    source = LIQUIDS
+    for old, new in edits:
+        assert source.count(old) == 1, old
+        source = source.replace(old, new)
+    text = preregistration(parse(source.encode(), "liquids.toml"), "0" * 64)
+    assert [line for line in lines if line not in text] == []
+    assert [words for words in missing if words in text] == []
+
+
+@pytest.mark.parametrize(
+    ("study", "block", "question", "sentence"),
+    [
+        (
+            "every_design", "number", "what is the exponent of the power law for viscosity?",
+            "mean across participants of their mean logarithmic answers, with a 95 % confidence interval (Student's "
+            "t). The exponent is the slope of these logarithms on the logarithm of the level.",
+        ),
+        (
+            "every_design", "rate", "how do ratings change with viscosity?",
+            "mean across participants of their mean answers, with a 95 % confidence interval (Student's t).\n",
+        ),
+        (
+            "matching", "matching", "which settings of damping at the hand match 6 N·s/m?",
+            "for each participant and standard, we report the mean of the settings (the point of subjective equality)",
+        ),
+    ],
+)  # fmt: skip
+def test_the_analysis_of_a_block_of_levels_is_that_of_its_kind_of_answer(
+    study: str, block: str, question: str, sentence: str
+) -> None:
+    text = preregistration(parse(text_of(study).encode(), "levels.toml"), "0" * 64)
+    title = f"- Block “{block.capitalize()}”: "
+    analysis = next(line for line in text.splitlines(keepends=True) if line.startswith(f"{title}for each"))
+    assert f"{title}{question}\n" in text
+    assert sentence in analysis
