@@ -104,7 +104,7 @@ class Questionnaire(Table):
     """Questions asked after a trial, or separately if ``sequence`` lists the questionnaire."""
 
     title: Localised | None = Field(default=None, description="Heading; default: the trial's name.")
-    intro: Localised = Field(description="The question shown above the statements.")
+    intro: Localised = Field(description="Text shown above the questions.")
     scale: Id | None = Field(default=None, description="The scale for all statements, if there are any.")
     item_order: Literal["fixed", "shuffled"] = Field(
         default="fixed", description="fixed: as written; shuffled: a new order for every trial."

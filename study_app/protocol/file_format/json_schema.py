@@ -219,6 +219,9 @@ def length_texts(node: _Node) -> Iterator[str]:
 def _default_text(key: str, part: _Node, node: _Node) -> str:
     if key in node.get("required", ()):
         return "required"
+    exceptions = node.get("if", {}).get("not", {}).get("required", ())
+    if exceptions and key in node["then"]["required"]:
+        return f"required without {' or '.join(f'`{name}`' for name in exceptions)}"
     value = part.get("default")
     return (
         "" if value is None or value in ([], {}) else f"`{json.dumps(value, ensure_ascii=False)}`".replace("|", "\\|")

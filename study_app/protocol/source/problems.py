@@ -153,6 +153,13 @@ def faults_of(error: ValidationError, document: Mapping[str, Any], schema: Schem
     ]
 
 
+def _meaning(properties: Sequence[Schema]) -> str:
+    """Return the first sentence of a key's description in lower case; "" without one."""
+    description = next((str(node["description"]) for node in properties if "description" in node), "")
+    sentence = re.split(r"[.;:](?:\s|$)", description, maxsplit=1)[0]
+    return sentence[:1].lower() + sentence[1:]
+
+
 def _fault(details: ErrorDetails, document: Mapping[str, Any], schema: Schema) -> Fault:
     kind, value, context = details["type"], details["input"], details.get("ctx", {})
     path = _path_in(document, details["loc"], keep_last=kind in {"missing", "extra_forbidden"})
@@ -162,9 +169,9 @@ def _fault(details: ErrorDetails, document: Mapping[str, Any], schema: Schema) -
         last = path[-1]
         if isinstance(last, int):
             return Fault(path, f"entry {last + 1} is missing")
-        properties = (node.get("properties", {}).get(last, {}) for node in _nodes_at(document, path[:-1], schema))
+        properties = [node.get("properties", {}).get(last, {}) for node in _nodes_at(document, path[:-1], schema)]
         constant = next((key["const"] for key in properties if "const" in key), None)
-        hint = "" if constant is None else f"write {last} = {shown_value(constant)}"
+        hint = _meaning(properties) if constant is None else f"write {last} = {shown_value(constant)}"
         return Fault(path, "is missing", hint, kind="missing")
     if kind == "extra_forbidden":
         permitted = {key for node in _nodes_at(document, path[:-1], schema) for key in node.get("properties", {})}
