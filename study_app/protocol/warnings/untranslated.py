@@ -91,22 +91,29 @@ def _untranslated(
 
 
 def describe_untranslated(document: Mapping[str, Any], *, lists_places: bool) -> Iterator[str]:
-    """Yield a warning for each language with untranslated texts.
+    """Yield a warning for each language with untranslated texts, and one with words that may be the same in both.
 
     With ``lists_places`` it adds their first places; otherwise it begins with the place of the first text.
     """
     texts, only_one = untranslated_texts(document), len(languages_of(document)) == 1
-    for (language, source), count in Counter((text.language, text.source) for text in texts).items():
+    for (language, source, may_be_right), count in Counter(map(_kind_of, texts)).items():
         source_name, target = language_name(source), language_name(language)
         count_text = f"{counted(count, 'text')} {'is' if count == 1 else 'are'}"
         problem = f"{count_text} still in {source_name} and must be translated into {target}"
+        if may_be_right:
+            problem = f"{count_text} the same in {source_name} and {target} and may have to be translated into {target}"
         if only_one:
             problem = f"{count_text} still in {source_name}, but the study's only language is {target}"
-        untranslated = [text for text in texts if (text.language, text.source) == (language, source)]
+        untranslated = [text for text in texts if _kind_of(text) == (language, source, may_be_right)]
         place, more = _place_text(untranslated[0]), "; this is the first of them" if count > 1 else ""
         if lists_places:
             place, more = "study.languages", f": {listed_places(untranslated)}"
         yield f"{place}: {problem}{more}"
+
+
+def _kind_of(text: UntranslatedText) -> tuple[str, str, bool]:
+    """Return a text's language and source, and whether it is a word of the author that may be the same in both."""
+    return text.language, text.source, text.is_word and not text.ships
 
 
 def untranslated_on_pages(document: Mapping[str, Any]) -> tuple[UntranslatedText, ...]:
