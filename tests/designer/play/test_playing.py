@@ -257,6 +257,20 @@ def test_the_stop_button_of_the_notice_ends_the_preparation_or_the_session(
     assert (stops, data.exists(), header.strip.isVisible()) == (["session"], False, False)
 
 
+def test_another_study_discards_the_data_of_a_pilot_that_has_ended(designer: Any, folders: Path) -> None:
+    designer.open()
+    header, data = designer.place.header, folders / "pilot"
+    data.mkdir()
+    designer.playing.pilot = playing._Pilot(
+        SimpleNamespace(words="Thin"), "scripted", data, choices=SimpleNamespace(results=data)
+    )
+    header.strip.show_notice(playing_notice("Thin", "Mouse"))
+    designer.playing.stop()
+    assert data.exists(), "it has ended already"
+    designer.open("rek2024")
+    assert (designer.playing.pilot, header.strip.notice, data.exists()) == (None, None, False)
+
+
 def test_another_device_is_asked_for_and_a_fault_ahead_is_named(
     qtbot: Any, likert: Any, folders: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -18,7 +18,7 @@ from study_app.protocol.wording.languages import words
 from study_app.session.pages import EndPage, FeedbackPage, Page, PausePage, TroublePage
 from study_app.session.transitions.events import Chosen, Continue, ForceStopped, PauseRequested, ResumeRequested
 from tests.gui.participant.driver import KEY, Participant, name_of, told_of
-from tests.gui.small import explore, questionnaire, task_page, text_page, view
+from tests.gui.small import choice, explore, questionnaire, task_page, text_page, view
 
 Opening = Callable[..., Participant]
 SMALL = (1024, 640)
@@ -258,6 +258,31 @@ def test_closing_by_accident_is_a_pause_which_lies_over_the_tank(opened: Partici
     assert opened.page.under is under
     opened.window.may_close = True
     assert opened.window.close()
+
+
+@pytest.mark.parametrize(
+    ("page", "pauses", "closes"),
+    [
+        (text_page(), True, False),
+        (task_page(), True, False),
+        (questionnaire(), True, False),
+        (choice(), True, False),
+        (FeedbackPage(False), True, False),
+        (PausePage(force_off=False), False, False),
+        (TroublePage("One moment", "Help comes."), False, False),
+        (EndPage("Thank you", "You may let go."), False, True),
+    ],
+    ids=lambda value: type(value).__name__,
+)
+def test_escape_pauses_the_session_and_closes_the_last_page(
+    opened: Participant, page: Page, pauses: bool, closes: bool
+) -> None:
+    closed = list[Page | None]()
+    opened.window.left.connect(lambda: closed.append(opened.window.page))
+    opened.show(page)
+    opened.press(KEY.Key_Escape)
+    assert [(type(event), event.by) for event in opened.told] == [(PauseRequested, "participant")] * pauses
+    assert (opened.window.isVisible(), closed) == (not closes, [page] * closes)
 
 
 @pytest.mark.slow
