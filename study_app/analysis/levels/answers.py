@@ -10,6 +10,7 @@ from typing import Final, NamedTuple
 import numpy as np
 import pandas as pd
 
+from study_app.analysis import wording
 from study_app.analysis.data.blocks import LevelBlock, Setting
 from study_app.analysis.data.measures import number_or_none
 from study_app.analysis.data.study_tables import Study
@@ -39,6 +40,8 @@ from study_app.number_text import counted
 from study_app.protocol.trials import Reply, Stimulus
 
 _MOST_NAMED = 6
+_MOST_LISTED: Final = 12
+"""The most levels that are listed one by one."""
 
 
 def _condition_words(setting: Setting) -> str:
@@ -176,10 +179,15 @@ class Settings(LevelStatistic[SettingEstimate]):
         against = standards_phrase(self.result, self.rows)
         to = against.replace(" for ", " to match ", 1) if block.design.intervals > 1 else ""
         kind, (low, high) = KINDS[block.stimulus.level_kind], block.stimulus.levels
+        top = f"{high:g}" if block.stimulus.level_kind == "weber" else with_unit(self.result, high)
+        numbers = {row.n for row in self.participant_rows(self.result)}
+        least, most = min(numbers), max(numbers)
+        often = wording.counted(most, "time") if least == most else f"{least} to {most} times"
+        each = " for each standard" if len({row.standard for row in self.rows}) > 1 else ""
         yield (
-            f"In “{self.result.title}”, participants set {self.result.quantity}{to} by {block.design.paper_name}; "
-            f"{kind} ranged from {low:g} to {high:g}, and the starting level alternated between the lower and the "
-            "upper end of this range."
+            f"In “{self.result.title}”, participants set {self.result.quantity}{to} by {block.design.paper_name}, "
+            f"{often}{each}; {kind} ranged from {low:g} to {top}, and the starting level alternated between values "
+            "near the lower and the upper end of this range."
         )
 
     @classmethod
@@ -413,6 +421,14 @@ class Answers(LevelStatistic[LevelAnswers]):
             [[person, *(cell(person, answers) for answers in columns)] for person in people(self.result)],
         )
 
+    def _presented_levels(self, stimulus: Stimulus) -> str:
+        """Return the presented levels as a phrase: "of 20, 60 and 120 ms", or their range if they are many."""
+        levels = sorted({row.level for row in self.rows if row.level is not None and not row.catch})
+        level_unit = "" if stimulus.level_kind == "weber" else f" {self.result.unit or ''}".rstrip()
+        if self.result.adaptive or len(levels) > _MOST_LISTED:
+            return f"from {cell_text(levels[0])} to {cell_text(levels[-1])}{level_unit}"
+        return f"of {listed([cell_text(level) for level in levels])}{level_unit}"
+
     def methods(self, block: LevelBlock) -> Iterator[str]:
         if not self.rows:
             return
@@ -429,12 +445,12 @@ class Answers(LevelStatistic[LevelAnswers]):
             conditions = listed([*map(_condition_words, settings)]) or "conditions"
             yield f"In “{title}” ({design}), {conditions} were compared."
             return
-        kind, (low, high) = KINDS[stimulus.level_kind], stimulus.levels
-        chosen = "" if block.method is None else f"; levels were chosen by {block.method.paper_name}"
-        top = f"{high:g}" if stimulus.level_kind == "weber" else with_unit(self.result, high)
+        kind, chosen = KINDS[stimulus.level_kind], ""
+        if block.method is not None:
+            chosen = f"; levels were chosen by {block.method.paper_name}"
         delays = dict.fromkeys(_delay_words(setting.of) for setting in block.settings if setting.of is not None)
         yield (
-            f"In “{title}” ({design}), {self.result.quantity} was judged at {kind} from {low:g} to {top}"
+            f"In “{title}” ({design}), {self.result.quantity} was judged at {kind} {self._presented_levels(stimulus)}"
             f"{standards_phrase(self.result, self.rows)}{''.join(delays)}{chosen}."
         )
         if (modulus := block.design.first) is not None:

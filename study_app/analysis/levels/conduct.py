@@ -134,6 +134,8 @@ class Delivery(LevelStatistic[_Row]):
             f"Some intervals exceeded a limit: {listed(violations)}."
             if reasons
             else "All intervals were within the limits."
+            if any(row["measured"] for row in self.rows)
+            else "The delivered levels were not measured, so it is not known whether they were within the limits."
         )
         mass = (
             " Apparent mass is the coefficient m in a least-squares fit of F = −b v − m a to the force sent to the "

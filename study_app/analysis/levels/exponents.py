@@ -165,11 +165,11 @@ class Exponents(LevelStatistic[ExponentEstimate]):
                 "means Weber’s law (the JND is proportional to the standard), and 0 means a constant JND. The group "
                 "value is the mean across participants with a t-based confidence interval."
             )
+        units = "; it does not depend on the unit that a participant chose" if self.result.own_units else ""
         return (
             "The exponent n of answer ∝ levelⁿ (Stevens 1957) is the least-squares slope of a participant’s "
-            "mean ln answer at each level on ln level, at the levels delivered to the hand; it does not depend "
-            "on the unit that a participant chose. The group value is the mean across participants with a "
-            "t-based confidence interval."
+            f"mean ln answer at each level on ln level, at the levels delivered to the hand{units}. The group value is "
+            "the mean across participants with a t-based confidence interval."
         )
 
     def is_comparable_with(self, measure: str) -> bool:

@@ -76,3 +76,9 @@ def test_planted_exponents_are_found_for_fractions_and_for_differences(weber: bo
 def test_the_heading_names_the_law_of_the_exponents(summary: str, heading: str) -> None:
     found: Any = SimpleNamespace(summary=summary, statistics={})
     assert Exponents(found).heading() == heading
+
+
+@pytest.mark.parametrize("own_units", [True, False])
+def test_exponents_are_independent_of_the_unit_only_if_participants_chose_it(own_units: bool) -> None:
+    found: Any = SimpleNamespace(summary="geometric mean", statistics={}, own_units=own_units)
+    assert ("unit that a participant chose" in Exponents(found).explanation()) == own_units

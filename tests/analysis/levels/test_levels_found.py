@@ -211,6 +211,9 @@ def test_the_delivery_of_each_standard_counts_analysed_trials_and_averages_their
         "and pace error in three intervals."
     )
     assert shown("conduct", [third]).explanation() == f"{LEVEL_ERROR} All intervals were within the limits."
+    assert shown("conduct", [{**third, "measured": 0}]).explanation() == (
+        f"{LEVEL_ERROR} The delivered levels were not measured, so it is not known whether they were within the limits."
+    )
 
 
 def test_a_session_is_excluded_if_more_catch_trials_than_the_limit_are_incorrect() -> None:
