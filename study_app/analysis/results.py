@@ -430,9 +430,10 @@ def name(result: BlockResult, code: str) -> str:
     """
     for setting, text in zip(result.settings, result.names, strict=True):
         if setting.code == code:
+            if not result.delays_ms:
+                return text
             delay_ms = setting.delay_ms or 0.0
-            is_replicate = delay_ms in result.replicated_ms
-            return f"{ms(delay_ms)}{f' ({setting.condition})' * is_replicate}" if result.delays_ms else text
+            return f"{ms(delay_ms)} ({setting.condition})" if delay_ms in result.replicated_ms else ms(delay_ms)
     raise KeyError(code)
 
 

@@ -38,7 +38,7 @@ from study_app.analysis.results import (
     min_sample_reason,
     short_text,
 )
-from study_app.analysis.statistics.equivalence import Equivalence, fewest_participants, tost
+from study_app.analysis.statistics.equivalence import STEPS, Equivalence, tost
 from study_app.analysis.statistics.equivalence import Verdict as Nearness
 from study_app.analysis.statistics.thresholds import Threshold, detection_threshold
 from study_app.analysis.statistics.trend_tests import StepDown, Trend, step_down
@@ -56,7 +56,7 @@ from study_app.analysis.wording import (
     significant,
     with_group,
 )
-from study_app.protocol.participants import EACH_GROUP
+from study_app.protocol.participants import EACH_GROUP, fewest_participants
 
 
 @dataclass(frozen=True, slots=True)
@@ -265,7 +265,7 @@ class ContrastsWithControl(Finding[tuple[ContrastWithControl, ...]]):
         if not against:
             return
         first, lead, control = against[0].found, lead_phrase(result), ms(against[0].control_ms)
-        if result.n < fewest_participants(first.alpha, first.bound):
+        if result.n < fewest_participants(first.alpha, first.bound, STEPS):
             yield (
                 f"{lead}: to show that a mean answer stays within {bound_text(first.bound)} of that at {control}, a "
                 f"study needs {min_sample_reason(first.alpha, first.bound)}. This study has "
@@ -378,18 +378,29 @@ class LowestDelay(Finding[tuple[LowestTrend, ...]]):
             ),
             words=4,
         )
-        members = self.value[0].members
-        corrected = (
-            f"“Shortest” requires p ≤ alpha / {members} at every step, which controls the error rate across "
-            f"{all_of(members, 'statement')}; “uncorrected” requires p ≤ alpha, which controls it only within a single "
-            "statement"
-        )
         yield paragraph(
             "If there is a trend, the longest delay is dropped and the trend is tested again; this is repeated until "
-            f"no trend remains. {corrected if members > 1 else 'Every step requires p ≤ alpha'}. The shortest delay is "
-            "an upper bound: it tends to be too long rather than too short, because with few participants only long "
-            "delays show a trend.",
+            f"no trend remains. {self._criterion()}. The shortest delay is an upper bound: it tends to be too long "
+            "rather than too short, because with few participants only long delays show a trend.",
             "soft",
+        )
+
+    def _criterion(self) -> str:
+        """Return a clause on the p values that the steps require, by family of statements."""
+        families = {test.primary: test.members for test in DelayTrend.value_in(self.result)}
+        limits = {primary: f"alpha / {members}" if members > 1 else "alpha" for primary, members in families.items()}
+        if set(limits.values()) == {"alpha"}:
+            return "Every step requires p ≤ alpha"
+        required = f"p ≤ {next(iter(limits.values()))} at every step"
+        across = all_of(next(iter(families.values())), "statement")
+        if len(families) > 1:
+            required = (
+                f"p ≤ {limits[True]} for primary and p ≤ {limits[False]} for exploratory statements at every step"
+            )
+            across = "the primary and across the exploratory statements"
+        return (
+            f"“Shortest” requires {required}, which controls the error rate across {across}; “uncorrected” requires "
+            "p ≤ alpha, which controls it only within a single statement"
         )
 
 
@@ -603,7 +614,7 @@ class _EquivalentDelays(Finding[None]):
             return self.make_answer("not tested", f"This was not tested, because {why}.")
         at, within = common_ms(self.result), _bounds_phrase(against[0])
         if at is None:
-            fewest = fewest_participants(against[0].found.alpha, against[0].found.bound)
+            fewest = fewest_participants(against[0].found.alpha, against[0].found.bound, STEPS)
             needed = f" (at least {fewest} participants are needed)" if self.result.n < fewest else ""
             return self.make_answer(
                 "inconclusive",

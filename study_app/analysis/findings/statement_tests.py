@@ -44,13 +44,14 @@ from study_app.analysis.results import (
 )
 from study_app.analysis.statistics.outcome import Interval, Outcome, false_discovery, holm, student_interval
 from study_app.analysis.statistics.rank_tests import SignedRanks, friedman, global_permutation, signed_rank_test
-from study_app.analysis.statistics.slope_tests import HOTELLING, T_TEST, SlopeTest, slope_test
+from study_app.analysis.statistics.slope_tests import HOTELLING, PAIRED, T_TEST, SlopeTest, slope_test
 from study_app.analysis.statistics.trend_tests import trend
 from study_app.analysis.wording import (
     all_of,
     bound_text,
     counted,
     listed,
+    ms,
     number,
     p_equals,
     p_value,
@@ -214,16 +215,16 @@ class SettingsDiffer(StatementTests):
         return self.result.names
 
     def methods(self) -> Iterator[str]:
-        if tests := self.value:
-            test = _first_tested(tests)
+        if (test := _first_tested(self.value)) is not None:
             yield (
-                f"Each statement was tested with {test_name(test.outcome)} ({test.outcome.method}), {families(tests)}; "
-                f"the effect size is {test.outcome.effect_name}."
+                f"Each statement was tested with {test_name(test.outcome)} ({test.outcome.method}), "
+                f"{families(self.value)}; the effect size is {test.outcome.effect_name}."
             )
 
 
-def _first_tested(tests: Sequence[Tested]) -> Tested:
-    return next((test for test in tests if test.outcome.p is not None), tests[0])
+def _first_tested(tests: Sequence[Tested]) -> Tested | None:
+    """Return the first test with a p value."""
+    return next((test for test in tests if test.outcome.p is not None), None)
 
 
 class DelayTrend(StatementTests):
@@ -255,20 +256,28 @@ class DelayTrend(StatementTests):
 
     def methods(self) -> Iterator[str]:
         if trends := self.value:
-            decided = self.results.decided
+            decided, first = self.results.decided, _first_tested(trends)
             sides = [decided.direction(test.item) is not None for test in trends]
             stated = "before the first session" if decided.binding else "by the protocol"
             one_sided = f"one-sided in the direction stated {stated}" if all(sides) else "two-sided"
             if any(sides) and not all(sides):
                 one_sided = f"one-sided if a direction was stated {stated}, otherwise two-sided"
-            if decided.trends == "ranks":
-                one_sided = f"{_first_tested(trends).outcome.method.split(',')[0]}; {one_sided}"
+            if decided.trends == "ranks" and first is not None:
+                one_sided = f"{first.outcome.method.split(',')[0]}; {one_sided}"
             yield f"Trends across delays were tested with {TRENDS[decided.trends]} ({one_sided}), {families(trends)}."
             yield (
                 "If a statement showed a trend, the longest delay was dropped and the rank correlations were tested "
-                "again, until no trend remained. At every step, a trend required p ≤ alpha divided by the number of "
-                "statements. The shortest delay with a trend is an upper bound for the shortest noticeable delay."
+                f"again, until no trend remained. At every step, a trend required p ≤ alpha{_divided_words(trends)}. "
+                "The shortest delay with a trend is an upper bound for the shortest noticeable delay."
             )
+
+
+def _divided_words(trends: Sequence[Tested]) -> str:
+    """Return a phrase on the correction of alpha for the number of statements, with a leading space, or ""."""
+    families = {test.primary: test.members for test in trends}
+    if len(families) > 1:
+        return " divided by the number of primary or of exploratory statements, respectively"
+    return " divided by the number of statements" if len(trends) > 1 else ""
 
 
 class _SessionsDiffer(StatementTests):
@@ -279,6 +288,7 @@ class _SessionsDiffer(StatementTests):
     row_place = 4
     what = "comparison of sessions"
     sealed = KINDS
+    compares_settings = False
     asks = "sessions differ"
     title = "Do sessions differ?"
 
@@ -361,10 +371,12 @@ class OverAll(Finding[Outcome | None]):
 
     def methods(self) -> Iterator[str]:
         if self.value is not None:
+            several = len(self.result.items) > 1
+            across = f" across {all_of(len(self.result.items), 'statement')}" if several else ""
+            statistic_words = "the sum of the statements' Friedman statistics" if several else "Friedman's statistic"
             yield (
-                f"First, the {settings_noun(self.result)}s were compared across "
-                f"{all_of(len(self.result.items), 'statement')} with a within-participant permutation test; the "
-                "statistic was the sum of the statements' Friedman statistics."
+                f"First, the {settings_noun(self.result)}s were compared{across} with a within-participant "
+                f"permutation test; the statistic was {statistic_words}."
             )
 
 
@@ -437,7 +449,7 @@ class Effects(Finding[tuple[Effect, ...]]):
             for place in range(shown_values.shape[1]):
                 numbers = dict(zip(people, shown_values[:, place].tolist(), strict=True))
                 numbers = {person: value for person, value in numbers.items() if not math.isnan(value)}
-                column_name = name(result, codes[place + over_delay]).removesuffix(" ms")
+                column_name = f"{result.delays_ms[place + 1]:g}" if over_delay else name(result, codes[place])
                 columns.append(Column(name=column_name, values=numbers, mean=mean_of(numbers.values(), level)))
             panels.append(
                 Panel(
@@ -450,7 +462,7 @@ class Effects(Finding[tuple[Effect, ...]]):
                     ends=None if over_delay else (LEVELS[0], LEVELS[-1]),
                 )
             )
-        first = name(result, result.settings[0].code)
+        first = ms(result.delays_ms[0]) if over_delay else result.names[0]
         subject = f"Difference between each participant's answers and those at {first}" if over_delay else (
             f"Each participant's answers about each {settings_noun(result)}"
         )  # fmt: skip
@@ -675,6 +687,7 @@ class MeanTests(StatementTests):
         if tests:
             descriptions = {
                 HOTELLING: "differences between the conditions were tested with Hotelling's T²",
+                PAIRED: "the difference between the two conditions was tested with Student's t test",
                 T_TEST: "the participants' slopes were tested with Student's t test",
             }
             words = listed([descriptions[test] for test in descriptions if test in tests])

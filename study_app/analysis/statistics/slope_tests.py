@@ -21,6 +21,7 @@ from study_app.errors import AnalysisError
 
 _LEVEL: Final = 0.95
 T_TEST: Final = "t test of slopes"
+PAIRED: Final = "t test of differences"
 HOTELLING: Final = "Hotelling's T²"
 
 
@@ -55,11 +56,11 @@ def slope_test(values: ArrayLike, columns: ArrayLike | None = None, direction: D
     design = _design_matrix(rows.shape[1], columns)
     n, effects = len(rows), design.shape[1]
     test = SlopeTest(
-        test=T_TEST if effects == 1 else HOTELLING,
+        test=HOTELLING if effects > 1 else PAIRED if columns is None else T_TEST,
         n=n,
         dropped=dropped,
         statistic_name="t" if effects == 1 else "F",
-        effect_name="slope" if effects == 1 else "differences",
+        effect_name="differences" if effects > 1 else "difference" if columns is None else "slope",
     )
     intercepts, *slopes = np.linalg.pinv(np.column_stack([np.ones(len(design)), design])) @ rows.T
     person_slopes = np.array(slopes).T
@@ -67,7 +68,8 @@ def slope_test(values: ArrayLike, columns: ArrayLike | None = None, direction: D
     fewest = max(FEW, effects + 1)
     if n < fewest or np.linalg.matrix_rank(covariance, tol=1e-12) < effects:
         too_few = (
-            f"no test of means for fewer than {fewest} participants, because it relies on normally distributed slopes"
+            f"no test of means for fewer than {fewest} participants, because it relies on normally distributed "
+            f"{'differences' if columns is None else 'slopes'}"
         )
         note = too_few if n < fewest else _NO_SPREAD
         note = NO_VARIATION if n and not np.ptp(rows, axis=1).any() else note

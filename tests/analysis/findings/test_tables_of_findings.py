@@ -323,7 +323,8 @@ LOWEST = lowest("warm", (90.0, 0.001), (40.0, 0.03)), lowest("calm", (90.0, 0.04
 
 def test_the_shortest_delay_with_a_trend_is_corrected_over_the_statements() -> None:
     assert [row.over_all_ms for row in LOWEST] == [90.0, None]
-    finding = delay_findings.LowestDelay(block("delays", findings={"lowest": LOWEST}), RESULTS)
+    trends = with_verdict("warm", ranks()), with_verdict("calm", ranks())
+    finding = delay_findings.LowestDelay(block("delays", findings={"lowest": LOWEST, "trends": trends}), RESULTS)
     lines = lines_of(finding.section())
     assert lines[1:4] == [
         "Statement | shortest | uncorrected | longest delay and p at each step",
@@ -338,9 +339,15 @@ def test_the_shortest_delay_with_a_trend_is_corrected_over_the_statements() -> N
         ["calm", "up to 90 ms", 0.04, 2, "b: stepping down within calm"],
         ["calm", "up to 40 ms", None, 2, "b: stepping down within calm"],
     ]
-    alone = replace(LOWEST[0], members=1)
-    finding = delay_findings.LowestDelay(block("delays", findings={"lowest": (alone,)}), RESULTS)
+    alone, warm = replace(LOWEST[0], members=1), with_verdict("warm", ranks(), members=1)
+    finding = delay_findings.LowestDelay(block("delays", findings={"lowest": (alone,), "trends": (warm,)}), RESULTS)
     assert "no trend remains. Every step requires p ≤ alpha. The shortest delay" in lines_of(finding.section())[3]
+    others = [with_verdict(item, ranks(), primary=False, members=3) for item in ("calm", "thick", "wet")]
+    both = block("delays", findings={"lowest": (alone, LOWEST[1]), "trends": (warm, *others)})
+    assert (
+        "“Shortest” requires p ≤ alpha for primary and p ≤ alpha / 3 for exploratory statements at every step, which "
+        "controls the error rate across the primary and across the exploratory statements;"
+    ) in lines_of(delay_findings.LowestDelay(both, RESULTS).section())[-1]
 
 
 def test_the_answer_on_noticed_delays_prefers_primary_statements_and_turns_falling_ones() -> None:
