@@ -41,11 +41,15 @@ _Draw: TypeAlias = Callable[[PlacedQuestion, QuestionResult, Look], Sheet]
 
 @dataclass(frozen=True, slots=True)
 class _QuestionFigure:
-    """A kind of figure: its drawing function and the sentence of its caption."""
+    """A kind of figure: its drawing function and the sentence of its caption.
+
+    ``repeated`` is another caption for participants who answered more than once.
+    """
 
     id: str
     draw: _Draw
     caption: str
+    repeated: str = ""
 
 
 def _draw_rows(names: Sequence[str], ns: Sequence[int], look: Look, *, row_pt: float) -> tuple[Sheet, Axes]:
@@ -142,6 +146,7 @@ _OPTIONS: Final = _QuestionFigure(
     "counts",
     draw_options,
     "Bars show the number of participants who chose each option; grey bars show the number who answered.",
+    "Bars show the number of answers with each option; grey bars show the total number of answers.",
 )
 
 
@@ -224,7 +229,9 @@ def _picture(
 ) -> Picture:
     figure = by_name(_FIGURES, result.figure or "")
     title = result.short if result.short == result.title else f"{result.title}: {result.short}"
-    caption = f"{result.title}: “{result.text}” {figure.caption} {sample_words(study, study.n)}"
+    is_repeated = any(int(group.numbers["n"]) > int(group.numbers["participants"]) for group in result.groups)
+    drawn = figure.repeated if is_repeated and figure.repeated else figure.caption
+    caption = f"{result.title}: “{result.text}” {drawn} {sample_words(study, study.n)}"
     rows = study.answers_to(question)[["participant", "session", "code", "response"]].rename(
         columns={"response": question.id}
     )

@@ -392,11 +392,11 @@ def test_each_answered_question_has_its_figure_caption_and_table(monkeypatch: py
     )
     monkeypatch.setattr(Study, "answers_to", lambda *_: rows)
     monkeypatch.setattr(question_figures, "picture_of", lambda *given, numbers: (*given, numbers))
-    numbers = {"n": 2, "counts": {"3": 1, "7": 1}}
+    numbers = {"n": 2, "participants": 2, "counts": {"3": 1, "7": 1}}
     asked_questions = [
         question("rating", ("All", numbers)),
         replace(question("counts", ("All", numbers)), where="pitch", short="End"),
-        replace(question("counts", ("All", {"n": 0})), item="none"),
+        replace(question("counts", ("All", {"n": 0, "participants": 0})), item="none"),
         replace(question("texts", ("All", numbers)), figure=None, item="why"),
         replace(question("distribution", ("All", numbers)), where="late", short="End", item="age"),
     ]
@@ -424,6 +424,27 @@ def test_each_answered_question_has_its_figure_caption_and_table(monkeypatch: py
         f"answers. {SAMPLE}"
     )
     assert table.splitlines() == ["participant\tsession\tit", "P1\t1\t7", "P2\t2\t3"]
+
+
+@pytest.mark.parametrize(
+    ("n", "sentence"),
+    [
+        (9, "Bars show the number of participants who chose each option; grey bars show the number who answered."),
+        (14, "Bars show the number of answers with each option; grey bars show the total number of answers."),
+    ],
+)
+def test_bars_show_answers_if_participants_answered_more_than_once(
+    n: int, sentence: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(
+        Study, "answers_to", lambda *_: pd.DataFrame(columns=["participant", "session", "code", "response"])
+    )
+    monkeypatch.setattr(question_figures, "picture_of", lambda *given, **_: given[4])
+    numbers = {"n": n, "participants": 9, "counts": {"3": 5, "7": n - 5}}
+    placed: Any = SimpleNamespace(questions=[asked({"3": "low", "7": "high"})])
+    made = replace(MADE, others=placed, levels=())
+    ((*_, draw_task),) = question_figures.question_figure_tasks(made, [question("counts", ("All", numbers))])
+    assert draw_task() == f"End: “How?” {sentence} {SAMPLE}"
 
 
 def answers_at(person: str | None, level: float, value: float, **changes: Any) -> LevelAnswers:
