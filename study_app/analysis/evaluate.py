@@ -121,13 +121,17 @@ def evaluate_block(study: Study | None, answers: BlockAnswers, tell: Callable[[s
 
     ``tell`` is called with the name of each finding before it is computed.
     """
-    block, has_own_codes = answers.block, study is not None and study.own_codes
+    block = answers.block
+    is_unmatched = study is not None and (study.own_codes or study.has_unmatched_sites)
     result = summarize_block(study, answers)
     for finding in all_findings():
         if not finding.what:
             continue
-        if block.kind not in (finding.kinds if block.revealed else () if has_own_codes else finding.sealed):
-            if not block.revealed and block.kind in (*finding.waits, *(finding.sealed if has_own_codes else ())):
+        sealed, waits = finding.sealed, finding.waits
+        if is_unmatched and finding.compares_settings:
+            sealed, waits = (), (*waits, *sealed)
+        if block.kind not in (finding.kinds if block.revealed else sealed):
+            if not block.revealed and block.kind in waits:
                 result = replace(result, absent=(*result.absent, NotTested(finding.what, SEALED)))
             continue
         tell(finding.what)
@@ -180,7 +184,7 @@ def _order_balance(study: Study) -> dict[str, Evenness]:
 
     It is unknown in a sealed study in which each site or each participant has its own codes.
     """
-    if study.own_codes or (study.sites and not study.revealed):
+    if study.own_codes or study.has_unmatched_sites:
         return {}
     included = study.participants.loc[study.participants["counted"], ["participant", "session"]]
     rows = study.trials[study.trials["phase"] == "main"].merge(included, on=["participant", "session"])

@@ -264,6 +264,24 @@ class Study:
         """Whether codes differ between participants, as is the case while the key is sealed."""
         return not self.revealed and self.protocol.get("study", {}).get("codes") == "participant"
 
+    @property
+    def has_unmatched_sites(self) -> bool:
+        """Whether the codes of different sites cannot be matched, because the key is sealed."""
+        return bool(self.sites) and not self.revealed
+
+    def setting_count(self, block: Block | QuestionPlace) -> int:
+        """Return the number of different settings of a block: conditions with the same delay count as one.
+
+        As long as the sites' codes cannot be matched, each setting has one code per site.
+        """
+        if isinstance(block, Block):
+            return len(set(block.columns.values())) // self._codes_per_setting
+        return len(block.settings) // self._codes_per_setting
+
+    @property
+    def _codes_per_setting(self) -> int:
+        return len(self.sites) if self.has_unmatched_sites else 1
+
     def tell_doubts(self, warn: Callable[[str], object] | None) -> None:
         """Call ``warn`` once for each file that differs from its recorded state."""
         if warn is None:

@@ -269,10 +269,11 @@ def counts(study: Study, block: Block) -> list[str]:
     asked = int(table["presented"].sum())
     lacking = asked - int(table["n"].sum())
     words = f"n = {counted(n, 'participant')}"
-    if people != {n}:
+    if people != {n} and not study.has_unmatched_sites:
         words = f"n = {_range_text(people)} of {n} participants per {_setting_noun(block)}"
     missing = f", {lacking} of {asked} ratings missing" if lacking else ""
-    return [f"{words}{missing}", f"n = {_range_text(people)}{missing}"]
+    fewest = str(n) if study.has_unmatched_sites else _range_text(people)
+    return [f"{words}{missing}", f"n = {fewest}{missing}"]
 
 
 def _range_text(values: set[int]) -> str:
@@ -294,12 +295,13 @@ def _caption_sentences(study: Study, block: Block) -> Iterator[str]:
     simulated = "simulated participants, not people; " if study.simulated else ""
     yield (
         f"{'Pilot. ' if study.pilot else ''}Agreement with {counted(len(block.items), 'statement')} about "
-        f"{counted(len(block.settings), _setting_noun(block))} ({simulated}{counts(study, block)[0]})."
+        f"{counted(study.setting_count(block), _setting_noun(block))} ({simulated}{counts(study, block)[0]})."
     )
     over_delay = block.kind == "delays" and block.revealed
     yield from _marks_of_delays(study, block) if over_delay else _marks_of_bars(block)
     if not study.revealed:
-        yield "Conditions appear as codes because the study is blinded; their order has no meaning."
+        sites = ", and codes of different sites cannot be matched" if study.sites else ""
+        yield f"Conditions appear as codes because the study is blinded; their order has no meaning{sites}."
     trials = _counted_trials(study, block)
     errors = trials["delay_error_mean_ms"].dropna()
     if block.kind == "delays" and block.revealed and len(errors):

@@ -148,7 +148,8 @@ def summarize_block(study: Study | None, answers: BlockAnswers) -> BlockResult:
         incomplete={
             item: people
             for item, values in answers.values.items()
-            if (people := tuple(np.array(answers.people)[np.isnan(values).any(axis=1)].tolist()))
+            if not (study is not None and study.has_unmatched_sites)
+            and (people := tuple(np.array(answers.people)[np.isnan(values).any(axis=1)].tolist()))
         },
     )
 
@@ -373,6 +374,8 @@ class Finding(Generic[_R]):
     kinds, sealed, waits : tuple of str
         The kinds of blocks in which it is tested once the key is open, in which it is tested while the key is sealed,
         and in which it is listed as missing until the key is open.
+    compares_settings : bool
+        Whether the test needs codes that mean the same for all participants.
     statements : bool
         Whether the value consists of tests of single statements whose verdicts the study's limitations mention.
     empty : _R
@@ -392,6 +395,7 @@ class Finding(Generic[_R]):
     kinds: ClassVar[tuple[Kind, ...]] = KINDS
     sealed: ClassVar[tuple[Kind, ...]] = ()
     waits: ClassVar[tuple[Kind, ...]] = ()
+    compares_settings: ClassVar[bool] = True
     statements: ClassVar[bool] = False
     empty: ClassVar[Any] = None
     figure_name: ClassVar[str] = ""

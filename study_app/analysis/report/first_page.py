@@ -111,8 +111,10 @@ def presented_in(study: Study) -> dict[str, Presented]:
 
 
 def _trials_phrase(study: Study, block: LevelBlock) -> str:
-    """Return a phrase on the number of trials of each participant in a block, with a leading comma, or ""."""
+    """Return a phrase on the trials of each participant in a block without the modulus, with a leading comma, or ""."""
     counted = study.trials[study.trials["counted"] & (study.trials["block"] == block.id)]
+    if block.design.first is not None:
+        counted = counted[counted["index"] > 1]
     trials = counted.groupby("participant").size()
     if trials.empty:
         return ""
@@ -252,7 +254,11 @@ def _scale_words(contrast: ContrastResult, results: Results) -> str:
         return f" Values are in {level.unit}." if level.unit else ""
     if level is not None and hypothesis.measure == "d_prime":
         return " At chance, d′ is 0."
-    return "" if contrast.scale is None else " The scale ranges from {:g} to {:g}.".format(*contrast.scale)
+    return (
+        ""
+        if contrast.scale is None
+        else " The scale ranges from {:g} to {:g}.".format(*contrast.scale).replace("-", "−")
+    )
 
 
 def _cell_words(contrast: ContrastResult) -> Iterator[str]:
@@ -438,7 +444,10 @@ def _number_words(numbers: Numbers, presented: Mapping[str, Presented] = _NOT_PR
         low, high = (f"{end:g}" if float(end).is_integer() else number(end) for end in (min(values), max(values)))
         return f"{subject} was {number(means[0][1].value)} ({spread}range {low} to {high}, n = {n})."
     scale = "" if numbers.bounds is None else " on a scale from {:g} to {:g}".format(*numbers.bounds).replace("-", "−")
-    text = f"{subject} was {listed(parts)}{scale} (95 % confidence interval{'s' * (len(parts) > 1)}, n = {n})."
+    details = f"95 % confidence interval{'s' * (len(parts) > 1)}, n = {n}"
+    if all(mean.low is None for _, mean, _ in means):
+        details = f"n = {n}{'; no confidence interval because all values are equal' * (n > 1)}"
+    text = f"{subject} was {listed(parts)}{scale} ({details})."
     if len(means) != 2:
         return text
     (first, first_values), (second, second_values) = numbers.by_setting
@@ -483,7 +492,7 @@ def _choice_words(result: QuestionResult) -> str:
         most = int(max(counts.values()))
         first, *tied = [f"“{result.options.get(option, option)}”" for option, count in counts.items() if count == most]
         tied_note = f", and as many chose {listed(tied)}" if tied else ""
-        setting_note = f" ({name_in_sentence(group.name)})" if len(result.groups) > 1 else ""
+        setting_note = f" {_setting_words(group.name)}" if len(result.groups) > 1 else ""
         if n > people:
             tied_note = f", and as many {listed(tied)}" if tied else ""
             given = f"{n} answers by {number_text.counted(people, 'participant')}"

@@ -6,10 +6,9 @@ from typing import Final
 
 from study_app import __version__, number_text
 from study_app.analysis.contrasts import contrast_methods
-from study_app.analysis.data.blocks import SPENDINGS, Block, name_in_sentence
+from study_app.analysis.data.blocks import Block, name_in_sentence
 from study_app.analysis.data.measures import QUARTILES
 from study_app.analysis.data.study_tables import Study, group_assignment, group_counts
-from study_app.analysis.figures.answer_figures import people_by_setting
 from study_app.analysis.findings import all_findings
 from study_app.analysis.findings.delays import ContrastsWithControl
 from study_app.analysis.findings.statement_tests import DelayTrend, Effects, MeanTests, OverAll
@@ -18,8 +17,10 @@ from study_app.analysis.planned_exclusions import NEED_KEY, proposals, rule_cond
 from study_app.analysis.results import BlockResult, Results, lead_phrase, presentation_sentences
 from study_app.analysis.wording import counted, listed, ms, number, significant
 from study_app.protocol.blocks import block_titles
+from study_app.protocol.model import SPENDINGS
 from study_app.protocol.participants import RecordedSessions
 from study_app.protocol.quantities import liquid_words
+from study_app.protocol.wording import language_name
 from study_app.store.unblinding import RULES
 
 _FILTERS: Final = {
@@ -53,7 +54,9 @@ def methods(study: Study, results: Results) -> str:
 def _all_sentences(study: Study, results: Results) -> Iterator[str]:
     blocks = [block for block in results.blocks if block.n]
     yield _sample_sentence(study)
+    yield _session_sentence(study)
     yield _group_sentence(study)
+    yield _language_sentence(study)
     yield _sample_size_sentences(study, results)
     yield _exclusion_sentences(study)
     yield _exclusion_rule_sentence(study, results)
@@ -80,11 +83,45 @@ def _sample_sentence(study: Study) -> str:
     kind = " (SIMULATED, not people)" if study.simulated else ""
     conditions_note = ""
     if study.blocks and study.n:
-        is_complete = all(set(people_by_setting(study, block).values()) == {study.n} for block in study.blocks)
+        is_complete = all(_is_complete(study, block) for block in study.blocks)
         conditions_note = ", each in all conditions" if is_complete else _missing_conditions_phrase(study)
     sites = f" at the sites {listed(study.sites)}" if study.sites else ""
     protocol = f"protocol {study.name}, {version_words(study)}"
     return f"{people}{kind} took part in “{study.title}” ({protocol}){sites}{conditions_note}."
+
+
+def _session_sentence(study: Study) -> str:
+    """Return a sentence on the number of included sessions per participant; "" if each has one."""
+    counts = study.participants.loc[study.participants["counted"], "participant"].value_counts()
+    if counts.empty or counts.max() == 1:
+        return ""
+    least, most = int(counts.min()), int(counts.max())
+    return f"Each participant attended {counted(most, 'session') if least == most else f'{least} to {most} sessions'}."
+
+
+def _language_sentence(study: Study) -> str:
+    """Return a sentence on the languages of the pages; "" if the study has only one."""
+    languages = language_words(study)
+    return f"The participants' texts were in {languages}." if languages else ""
+
+
+def language_words(study: Study) -> str:
+    """Return the languages of the participants' pages with counts: "German (n = 5) and English (n = 3)".
+
+    It is "" if the study has only one language.
+    """
+    if len(study.protocol.get("study", {}).get("languages", ())) < 2:
+        return ""
+    sessions = study.participants[study.participants["counted"]]
+    people = sessions.drop_duplicates(["participant", "language"])["language"].value_counts()
+    return listed([f"{language_name(str(code))} (n = {count})" for code, count in people.items()])
+
+
+def _is_complete(study: Study, block: Block) -> bool:
+    """Return whether every included participant was presented with all settings of a block."""
+    trials = study.trials[study.trials["counted"] & (study.trials["block"] == block.id)]
+    columns = trials["code"].map(block.columns).groupby(trials["participant"]).nunique()
+    return len(columns) == study.n and bool((columns == study.setting_count(block)).all())
 
 
 def _missing_conditions_phrase(study: Study) -> str:
@@ -270,11 +307,15 @@ def _other_question_sentences(study: Study, results: Results) -> Iterator[str]:
             continue
         table, names = study.protocol["blocks"][where.id], [setting.condition for setting in where.settings]
         conditions = [name.replace("_", " ") for name in names if name is not None]
-        conditions_text = counted(len(names), "condition") + (f" ({listed(conditions)})" if conditions else "")
-        order = f" {_ORDERS[table['order']]}" if len(names) > 1 else ""
+        count = study.setting_count(where)
+        conditions_text = counted(count, "condition") + (f" ({listed(conditions)})" if conditions else "")
+        order = f" {_ORDERS[table['order']]}" if count > 1 else ""
         repetitions_note = f", {table['repetitions']} times each" if table["repetitions"] > 1 else ""
+        trials = study.trials[study.trials["counted"] & (study.trials["block"] == where.id)]
+        if (trials.groupby("participant")["session"].nunique() > 1).any():
+            repetitions_note = f"{repetitions_note or ', once each'} in each session"
         yield (
-            f"In “{where.title}”, {conditions_text} {'was' if len(names) == 1 else 'were'} "
+            f"In “{where.title}”, {conditions_text} {'was' if count == 1 else 'were'} "
             f"presented{order}{repetitions_note}; participants answered "
             f"{counted(question_counts[where.id], 'question')} after each presentation."
         )
@@ -287,15 +328,16 @@ def _presentation_sentence(study: Study, block: Block, result: BlockResult) -> s
     )
     names = [f"{delay:g}" for delay in result.delays_ms] or [name_in_sentence(name) for name in result.names]
     unit = " ms" if result.delays_ms else ""
-    settings_text = counted(len(names), noun) + (f" ({listed(names)}{unit})" if result.revealed else "")
+    count = study.setting_count(block)
+    settings_text = counted(count, noun) + (f" ({listed(names)}{unit})" if result.revealed else "")
     liquids = (
         sorted({setting.liquid for setting in block.settings if setting.liquid is not None}) if result.delays_ms else []
     )
     liquid = f" in {listed(liquids)}".replace("_", " ") if liquids else ""
     statements = counted(len(result.items), "statement")
     return (
-        f"In “{result.title}”, {settings_text}{liquid} {'was' if len(names) == 1 else 'were'} "
-        f"presented{f' {order}' if order and len(names) > 1 else ''}; participants rated {statements} after each "
+        f"In “{result.title}”, {settings_text}{liquid} {'was' if count == 1 else 'were'} "
+        f"presented{f' {order}' if order and count > 1 else ''}; participants rated {statements} after each "
         "presentation."
     )
 
@@ -350,6 +392,8 @@ def _missing_trials_sentence(study: Study) -> str:
     asked, count = sum(missing.asked for missing in known), sum(missing.count for missing in known)
     if not study.levels or not asked:
         return ""
+    if not count and study.intervals.loc[study.intervals["counted"], "valid"].isna().all():
+        return "Whether interval trials met the limits for valid trials was not measured."
     if not count:
         return "All interval trials in the main blocks met the limits for valid trials."
     lost = f"{count} of {number_text.counted(asked, 'main trial')} {'was' if count == 1 else 'were'} lost"

@@ -30,7 +30,7 @@ from study_app.analysis.planning import WANTED
 from study_app.analysis.planning.power_curves import interval as share_interval
 from study_app.analysis.planning.smallest_differences import MOST_SD, detectable_difference
 from study_app.analysis.questions import MEASURES
-from study_app.analysis.report.methods import late_exclusions
+from study_app.analysis.report.methods import language_words, late_exclusions
 from study_app.analysis.report.questions_in_full import changed_questions
 from study_app.analysis.results import (
     VERDICTS_MEAN,
@@ -60,6 +60,7 @@ from study_app.store.exclusions import dated_reversals, describe_exclusion
 from study_app.store.merged import folders_of
 from study_app.store.session_progress import MISSING_PERCENT, MissingTrials, broken_limits
 from study_app.store.unblinding import RULES as AUTOMATIC_RULES
+from study_app.store.unblinding import reveals_of
 from study_app.store.versions import recorded_contents
 
 
@@ -72,10 +73,7 @@ def no_findings_sentence(results: Results) -> str:
     """Return a sentence on the reason why there are no findings."""
     if results.blocks:
         return "No answers are included yet."
-    return (
-        "The study does not ask participants to rate statements after trials, so there are no tests; the sections "
-        "below show the answers."
-    )
+    return "The study does not ask participants to rate statements after trials; the sections below show the answers."
 
 
 def limits(study: Study, results: Results) -> tuple[str, ...]:
@@ -95,9 +93,9 @@ def limits(study: Study, results: Results) -> tuple[str, ...]:
         out_of_reach = [f"“{short_text(result, test.item)}”" for test in tests if test.verdict == "out of reach"]
         if out_of_reach:
             lines.append(
-                f"{lead_phrase(result)}: the tests for {listed(out_of_reach)} could not have been significant with so "
-                "few participants, because no rearrangement of the answers within participants gives a small enough "
-                "adjusted p value."
+                f"{lead_phrase(result)}: the test{'s' * (len(out_of_reach) > 1)} for {listed(out_of_reach)} could not "
+                "have been significant with so few participants, because no rearrangement of the answers within "
+                "participants gives a small enough adjusted p value."
             )
         untested: dict[str, list[str]] = {}
         for test in tests:
@@ -115,18 +113,20 @@ def limits(study: Study, results: Results) -> tuple[str, ...]:
 def _general_sentences(study: Study, results: Results) -> Iterator[str]:
     decided = results.decided
     if not study.revealed:
+        key, shown = _sealed_key_words(study), "only counts and comparisons that do not depend on their order"
+        if study.own_codes or study.sites:
+            shown = "only counts"
         yield (
-            "The key is sealed: conditions appear as codes, and the report shows only counts and comparisons that do "
-            "not depend on their order. Hypotheses are tested after unblinding. Using these numbers to decide whether "
-            "to continue makes chance findings more likely. To open the key, use Unblind in Results or the command "
-            "liquid-study unblind RESULTS --by NAME --reason TEXT."
+            f"{key}: conditions appear as codes, and the report shows {shown}. Hypotheses are tested after "
+            "unblinding. Using these numbers to decide whether to continue makes chance findings more likely. To open "
+            "the key, use Unblind in Results or the command liquid-study unblind RESULTS --by NAME --reason TEXT."
         )
         if study.own_codes:
             yield "Until unblinding, each participant has a separate set of codes, so conditions cannot be compared."
         if study.sites:
             yield (
-                "Each site has its own key. Until all sites are unblinded, each code begins with the name of the "
-                "site, and conditions cannot be compared across sites."
+                "Each site has its own codes, which cannot be matched with those of other sites until the keys of all "
+                "sites are open, so conditions are not counted or compared across sites."
             )
     if study.simulated:
         yield "The participants were SIMULATED, so this report is not evidence about people."
@@ -160,6 +160,8 @@ def _general_sentences(study: Study, results: Results) -> Iterator[str]:
         )
     if results.questions and not (results.blocks or results.levels):
         lead = "Apart from the hypotheses, the answers" if hypotheses else "The answers"
+        if not study.revealed:
+            lead = "Apart from any hypotheses, the answers"
         yield (
             f"{lead} to these questions are summarised but not tested. The intervals are not corrected for the number "
             "of questions, so if there are many questions, some differences are to be expected by chance."
@@ -185,6 +187,20 @@ def _general_sentences(study: Study, results: Results) -> Iterator[str]:
             "Intervals for mean rank correlations and exploratory tests of means need at least "
             f"{FEW} participants; this study has {study.n}. Effects that this report does not show may still exist."
         )
+
+
+def _sealed_key_words(study: Study) -> str:
+    """Return a clause on the sealed key or, in a merged study, on the keys that are open and sealed."""
+    if not study.sites:
+        return "The key is sealed"
+    opened = {reveal.get("site") for reveal in reveals_of(study.folder)}
+
+    def keys(sites: Sequence[str]) -> str:
+        return f"key of {sites[0]} is" if len(sites) == 1 else f"keys of {listed(sites)} are"
+
+    sealed_sites = [site for site in study.sites if site not in opened] or ["a site without sessions"]
+    open_sites = [site for site in study.sites if site in opened]
+    return f"The {keys(sealed_sites)} sealed{f' (the {keys(open_sites)} open)' if open_sites else ''}"
 
 
 def _late_device_sentence(study: Study) -> Iterator[str]:
@@ -313,8 +329,8 @@ def conclusions(results: Results) -> list[tuple[str, ...]]:
     ]
 
 
-def planned_section(planned: PlannedExclusions | None) -> Iterator[str]:
-    """Yield the sessions that meet a planned rule, and each conclusion that depends on them."""
+def planned_section(planned: PlannedExclusions | None, *, sealed: bool = False) -> Iterator[str]:
+    """Yield the sessions that meet a planned rule and, once the key is open, the conclusions that depend on them."""
     if planned is None:
         return
     yield heading(2, "Planned exclusions")
@@ -326,6 +342,9 @@ def planned_section(planned: PlannedExclusions | None) -> Iterator[str]:
         ("decision", lambda proposal: ", ".join(filter(None, [proposal.decision, proposal.by]))),
         words=4,
     )
+    if sealed:
+        yield paragraph("Conclusions with and without these sessions are compared after unblinding.")
+        return
     included, left_out = map(_conclusions_by_question, (planned.included, planned.left_out))
     differing = [name for name in {**included, **left_out} if included.get(name) != left_out.get(name)]
     if not differing:
@@ -470,8 +489,11 @@ def places(results: Results) -> dict[str, str]:
         level.block: "discrimination" if level.revealed and level.vary is None else "levels" for level in results.levels
     }
 
+    rated = {result.id for result in results.blocks}
+
     def kind(result: QuestionResult) -> str:
-        return "form" if result.is_form else levels.get(result.where, "other questions")
+        questions = "other questions" if result.where in rated else "questions"
+        return "form" if result.is_form else levels.get(result.where, questions)
 
     return {result.where: f"{place_title(result, results)}: {kind(result)}" for result in results.questions}
 
@@ -497,6 +519,8 @@ def question_section(where: str, study: Study, results: Results, pictures: Seque
             continue
         yield heading(3, "Answers" if levels else result.short)
         yield paragraph(result.text)
+        if any(block.id == where and block.design.first is not None for block in study.levels):
+            yield paragraph("The counts include the answers to the modulus.", "soft")
         if any(level.summary == "settings" for level in levels):
             continue  # starting levels differ, so a summary of raw answers has no meaning
         if not result.n:
@@ -579,6 +603,8 @@ def conduct(study: Study, results: Results) -> Iterator[str]:
         yield bullets(
             [f"{tombstone.at[:10]}, recorded by {tombstone.by}: {tombstone.reason}" for tombstone in study.withdrawn]
         )
+    if languages := language_words(study):
+        yield paragraph(f"Languages of the participants' texts: {languages}.")
     masking = Counter(map(str, study.participants["motors_masked"].dropna()))
     if masking:
         answers = [f"{means} in {counted(count, 'session')}" for means, count in masking.most_common()]

@@ -389,7 +389,7 @@ def _render_page(
         ("Groups", lambda: sections.groups(study, results)),
         ("Sites", lambda: sections.groups(study, results, "site")),
         ("Motion and force", lambda: sections.motion(results)),
-        ("Planned exclusions", lambda: sections.planned_section(planned)),
+        ("Planned exclusions", lambda: sections.planned_section(planned, sealed=not study.revealed)),
         ("How the study was run", lambda: sections.conduct(study, results)),
         ("Preregistration", lambda: preregistration_section(study)),
         (
@@ -492,8 +492,14 @@ def _reproduction_sentences(study: Study, results: Results) -> Iterator[str]:
     rows = [
         ("Analysis decided before the first session", "yes" if decided.binding else "no; all results are exploratory"),
         ("Alpha", decided.alpha_words()),
-        ("Equivalence bound for statements", "none" if bound is None else bound_text(bound)),
-        ("Primary statements", (", ".join(decided.primary) or "all") if decided.binding else "none"),
+        *(
+            [
+                ("Equivalence bound for statements", "none" if bound is None else bound_text(bound)),
+                ("Primary statements", (", ".join(decided.primary) or "all") if decided.binding else "none"),
+            ]
+            if results.blocks
+            else []
+        ),
         ("Seed of the analysis", str(results.seed)),
         *((f"Version of {library}", version) for library, version in versions().items()),
         *((f"Plug-in {package}", ", ".join(names)) for package, names in plug_ins(study).items()),

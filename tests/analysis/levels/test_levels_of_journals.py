@@ -19,6 +19,7 @@ from study_app.analysis.export_study import export
 from study_app.analysis.levels.evaluate import level_methods, level_results
 from study_app.analysis.levels.statistic import statistics
 from study_app.analysis.levels.tracks import OF_INTERVALS
+from study_app.analysis.report.first_page import presented_in
 from study_app.analysis.report.write_report import report
 from study_app.protocol.load import load
 from study_app.store.blinded.blinding import complete_protocol, open_events, read_key
@@ -202,7 +203,9 @@ def test_the_methods_state_the_trials_the_unit_and_the_modulus(opened_levels: Pa
     words = " ".join(level_methods(study.levels, level_results(study)))
     number, rate = "magnitude estimation, 6 trials per participant", "ratings, 6 trials per participant"
     for title, design in (("Number", number), ("Rate", rate)):
-        assert re.search(rf"In “{title}” \({design}\), viscosity was judged at values from \S+ to \S+ Pa·s; ", words)
+        assert f"In “{title}” ({design}), viscosity was judged at values of 0.5, 2 and 8 Pa·s; " in words
+    (sentence,) = [given.sentence for block, given in presented_in(study).items() if block == "number"]
+    assert f"In the block “Number” ({number}), " in sentence, "without the modulus"
     modulus = "a level of 2 Pa·s was presented as the modulus, to which the number 10 was assigned."
     assert words.count(modulus) == 1
 

@@ -71,7 +71,11 @@ def not_testable(match: re.Match[str], told: Told) -> bool:
 def same_position(match: re.Match[str], told: Told) -> bool:
     """Check that a setting has been in this position in all orders."""
     orders = told.results["orders"]["b"]
-    names = [f"{one['delay_ms']:g} ms" for one in told.block["settings"]]
+    delays = [one["delay_ms"] for one in told.block["settings"]]
+    names = [
+        f"{one['delay_ms']:g} ms" + (f" ({one['condition']})" if delays.count(one["delay_ms"]) > 1 else "")
+        for one in told.block["settings"]
+    ]
     names = names if told.block["kind"] == "delays" else told.block["names"]
     codes = {one["code"] for name, one in zip(names, told.block["settings"], strict=True) if name == match[1]}
     counts = dict(zip(orders["codes"], orders["positions"][int(match[2]) - 1], strict=True))

@@ -94,7 +94,18 @@ def settings_presented(match: re.Match[str], told: Told) -> bool:
 def presentations(match: re.Match[str], told: Told) -> bool:
     """Check how often a participant rated a setting."""
     fewest_, most = told.block["presentations"]
-    return match[1] == (f"{most}" if fewest_ == most else f"{fewest_} to {most}")
+    if most == 2:
+        return match[1] == ("twice" if fewest_ == most else "once or twice")
+    return match[1] == (f"{most} times" if fewest_ == most else f"{fewest_} to {most} times")
+
+
+def sessions_attended(match: re.Match[str], told: Told) -> bool:
+    """Check the number of sessions of each participant."""
+    rows = told.study.participants[told.study.participants["counted"]]
+    counts = [len(of_person) for _, of_person in rows.groupby("participant")]
+    if min(counts) == max(counts):
+        return count(match[1]) == max(counts)
+    return match[1] == f"{min(counts)} to {max(counts)}"
 
 
 def groups(match: re.Match[str], told: Told) -> bool:
@@ -244,7 +255,8 @@ METHODS: Final[Sequence[tuple[str, Check]]] = (
      r"statements? after each presentation\.", settings_presented),
     (r"Several conditions have a delay of .*; they are treated as repeated presentations of one delay\.",
      when(lambda told: bool(told.block["replicated_ms"]))),
-    (r"Each participant rated each \w+ (\d+(?: to \d+)?) times\.", presentations),
+    (r"Each participant rated each \w+ (once or twice|twice|\d+(?: to \d+)? times)\.", presentations),
+    (rf"Each participant attended ({N}|\d+ to \d+) sessions?\.", sessions_attended),
     (r"The tests use the median of these answers(; the detection threshold is estimated from all individual "
      r"answers)?\.",
      lambda match, told: told.block["presentations"][1] > 1

@@ -132,7 +132,7 @@ def test_a_hypothesis_says_which_delays_set_its_sides_apart(
             " The scale ranges from 0 to 100.",
         ),
         ({"measure": "age", "form": "load", "blocks": ("x", "y")}, "value", None, ""),
-        ({"measure": "raw", "blocks": ("x", "y")}, "value", (-5.0, 5.5), " The scale ranges from -5 to 5.5."),
+        ({"measure": "raw", "blocks": ("x", "y")}, "value", (-5.0, 5.5), " The scale ranges from −5 to 5.5."),
     ],
 )
 def test_the_unit_or_scale_of_a_hypothesis_is_that_of_its_measure(

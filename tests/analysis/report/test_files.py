@@ -167,7 +167,7 @@ def test_the_page_has_its_sections_in_order_without_the_figures_of_the_first_pag
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     def section(name: str) -> Any:
-        return lambda *given: [write_report.heading(2, name), write_report.paragraph(",".join(map(shown, given)))]
+        return lambda *given, **_: [write_report.heading(2, name), write_report.paragraph(",".join(map(shown, given)))]
 
     def shown(value: Any) -> str:
         if isinstance(value, list):

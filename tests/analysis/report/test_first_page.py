@@ -269,8 +269,12 @@ def test_a_form_has_a_card_only_if_it_says_more_than_a_hypothesis(blocks: str, p
             Numbers("Raw", None, True, (
                 (f"{AFTER}Thick oil, session 2", {"P1": 2.0}), (f"{AT_THE_START} of session 1", {"P1": 1.0}),
             )),
-            "The mean Raw score was 2.00 after “Thick oil” in session 2 and 1.00 at the start of session 1 (95 % "
-            "confidence intervals, n = 1).",
+            "The mean Raw score was 2.00 after “Thick oil” in session 2 and 1.00 at the start of session 1 (n = 1).",
+        ),
+        (
+            Numbers("Real", (1.0, 5.0), False, (("Oil", {"P1": 3.0, "P2": 3.0}),)),
+            "The mean of “Real” was 3.00 for oil on a scale from 1 to 5 (n = 2; no confidence interval because all "
+            "values are equal).",
         ),
         (
             Numbers("Warm", (1.0, 7.0), False, (("L1", {"P1": 2.0, "P2": 6.0}), ("Utrecht-L2", {"P2": 3, "P1": 1}))),

@@ -119,7 +119,8 @@ def lost_trials() -> Iterator[str]:
     people = DELAYS.participants.assign(missing=lost, counted=[False, True])
     levels: Any = (SimpleNamespace(id="b", title="Tracks"),)
     some = replace(DELAYS, levels=levels, participants=people, protocol={"limits": {MISSING_PERCENT: 12.5}})
-    none = replace(some, participants=people[1:], protocol={})
+    measured = pd.DataFrame({"counted": [True], "valid": [True]})
+    none = replace(some, participants=people[1:], protocol={}, intervals=measured)
     yield from (text_of(sections._missing_trials_part(one)) for one in (some, none, replace(none, levels=())))
     yield methods._missing_trials_sentence(none)
 
@@ -188,6 +189,7 @@ def planned() -> Iterator[str]:
         yield text_of(sections.planned_section(rules))
         rules.left_out = kept
         yield text_of(sections.planned_section(rules)).rpartition("AK ")[2]
+        yield text_of(sections.planned_section(rules, sealed=True)).rpartition("AK ")[2]
     yield f"{[*sections.planned_section(None)]}"
 
 

@@ -199,7 +199,7 @@ def test_the_settings_versions_and_hashes_of_a_report_are_listed(monkeypatch: py
         binding=True, alpha_words=lambda: "0.04", equivalence_bound=0.5, primary=("warm", "thick")
     )
     asked: Any = SimpleNamespace(folder=Path("nowhere"))
-    results: Any = SimpleNamespace(decided=decided, seed=731)
+    results: Any = SimpleNamespace(decided=decided, seed=731, blocks=("a",))
     lines = list(page_lines("".join(write_report._reproduction_sentences(asked, results))))
     assert lines[:12] == [
         "Reproducing this report", "Setting | Value", "Analysis decided before the first session | yes", "Alpha | 0.04",
@@ -215,6 +215,9 @@ def test_the_settings_versions_and_hashes_of_a_report_are_listed(monkeypatch: py
         "Analysis decided before the first session | no; all results are exploratory",
         "Equivalence bound for statements | none", "Primary statements | none",
     ]  # fmt: skip
+    results.blocks = ()
+    lines = list(page_lines("".join(write_report._reproduction_sentences(asked, results))))
+    assert lines[3:5] == ["Alpha | 0.04", "Seed of the analysis | 731"]
 
 
 def test_an_unreadable_place_leaves_nothing(small: Results, tmp_path: Path) -> None:

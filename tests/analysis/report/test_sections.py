@@ -98,11 +98,11 @@ def test_the_limits_are_those_of_each_block_and_each_task(monkeypatch: pytest.Mo
         "Block A (liquids): no answers are included yet.",
         "Block B presents only one liquid, so its ratings are not compared.",
         "Block C (liquids): the trend and the pairs were not computed because few.",
-        f"Block C (liquids): the tests for “Warm” {reach}",
+        f"Block C (liquids): the test for “Warm” {reach}",
         "Block C (liquids): “Thick” and “Calm” could not be tested (alike).",
         "Block C (liquids): Thin was in position 1 for all participants, so its effect cannot be distinguished from "
         "the effect of that position.",
-        f"Block D (liquids): the tests for “Thick” {reach}",
+        f"Block D (liquids): the test for “Thick” {reach}",
         "Block E (delays): to show that a mean answer stays within ±1 point of that at 0 ms, a study needs",
         "Block E (delays): in 1 of 1 comparison with 0 ms (one for each statement and delay), the data show neither",
         "Pitch has limits.",
@@ -455,6 +455,7 @@ def test_questions_have_their_own_scores_answers_and_figures() -> None:
             questions=[SimpleNamespace(where=SimpleNamespace(id=q.where), id=q.item) for q in questions]
         ),
         estimator=None,
+        levels=(),
     )
     results = results_of(questions=questions, scores=scores)
     drawn = [png(f"question-{name}", "end") for name in ("end-new", "end-old", "start-old")]
@@ -503,9 +504,11 @@ def test_a_form_is_said_to_follow_each_block_only_if_it_follows_all_main_blocks(
     assert sections.place_title(form, made) == title
 
 
-@pytest.mark.parametrize(("summary", "shown"), [("settings", False), ("mean", True)])
+@pytest.mark.parametrize(
+    ("summary", "shown", "modulus"), [("settings", False, None), ("mean", True, None), ("geometric mean", True, 8.0)]
+)
 def test_answers_in_a_block_of_levels_are_shown_unless_starting_levels_differ(
-    summary: Any, shown: bool, monkeypatch: pytest.MonkeyPatch
+    summary: Any, shown: bool, modulus: float | None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(
         sections, "level_section", lambda level, _drawn, estimator: [f"<p>{level.block} {estimator}</p>"]
@@ -519,10 +522,14 @@ def test_answers_in_a_block_of_levels_are_shown_unless_starting_levels_differ(
     oil = GroupAnswers("L1", "Oil", spread(9, 4.0))
     questions = (asked("b", "size", "distribution", oil, is_form=False),)
     placed = SimpleNamespace(where=SimpleNamespace(id="b"), id="size")
-    of_study: Any = SimpleNamespace(others=SimpleNamespace(questions=[placed]), estimator="kalman")
+    blocks = [SimpleNamespace(id=name, design=SimpleNamespace(first=modulus)) for name in "cb"]
+    of_study: Any = SimpleNamespace(
+        others=SimpleNamespace(questions=[placed]), estimator="kalman", levels=blocks if modulus else blocks[:1]
+    )
     lines = lines_of(sections.question_section("b", of_study, results_of(questions=questions, levels=levels), ()))
     table = ["Condition | n | missing | median | quartiles | range", "Oil | 9 | 8 | 4.0 | 3.0 – 6.0 | 0.5 – 9.5"]
-    assert lines == ["Title b: levels", "Answers", "How size?", *(table if shown else []), "b kalman"]
+    note = ["The counts include the answers to the modulus."] if modulus else []
+    assert lines == ["Title b: levels", "Answers", "How size?", *note, *(table if shown else []), "b kalman"]
 
 
 def test_groups_are_compared_only_in_their_block_and_tested_only_by_hypotheses(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -159,6 +159,20 @@ def test_missing_trials_are_those_of_included_sessions() -> None:
     assert methods_module._missing_trials_sentence(study).startswith("5 of 50 main trials were lost because ")
 
 
+@pytest.mark.parametrize(
+    ("valid", "sentence"),
+    [
+        ([True, None], "All interval trials in the main blocks met the limits for valid trials."),
+        ([None, None], "Whether interval trials met the limits for valid trials was not measured."),
+    ],
+)
+def test_trials_meet_the_limits_only_if_these_were_measured(valid: list[bool | None], sentence: str) -> None:
+    participants = pd.DataFrame({"counted": [True], "missing": [SimpleNamespace(asked=30, count=0)]})
+    intervals = pd.DataFrame({"counted": [True, True, False], "valid": pd.array([*valid, True], dtype="boolean")})
+    study: Any = SimpleNamespace(levels=["block"], participants=participants, intervals=intervals)
+    assert methods_module._missing_trials_sentence(study) == sentence
+
+
 @pytest.mark.slow
 def test_a_part_of_a_section_that_fails_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     def fail(*_: Any) -> str:

@@ -10,9 +10,13 @@ import pytest
 from study_app.analysis.data import study_tables
 from study_app.analysis.data.blocks import OtherQuestions, PlacedQuestion, PlacedScore, QuestionPlace, Setting
 from study_app.analysis.data.study_tables import load_study, pool_sites
+from study_app.analysis.evaluate import evaluate
 from study_app.analysis.export_study import export
 from study_app.analysis.planning.preregistration import FILE, Commitment, commitment_lines, deviations
+from study_app.analysis.report.methods import methods
+from study_app.analysis.report.sections import limits
 from study_app.analysis.report.write_report import report
+from study_app.analysis.report.write_report import tests as rows_of_tests
 from study_app.errors import StoreError
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store.exclusions import Exclusion, exclude
@@ -70,7 +74,7 @@ def test_codes_of_sealed_sites_are_never_pooled(sealed: Path, tmp_path: Path) ->
     assert (rows["code"].str.partition("-")[0] == rows["participant"].str.partition("-")[0]).all()
     report(sealed, tmp_path, failed=pytest.fail)
     page = read(tmp_path)
-    assert "Each site has its own key" in page
+    assert "Each site has its own codes" in page
     for condition in ("light_oil", "delay_75"):
         assert condition not in page
 
@@ -85,6 +89,29 @@ def test_a_study_is_sealed_until_the_last_key_is_open(sealed: Path, tmp_path: Pa
     export(tmp_path / "pooled", tmp_path / "out")
     (table,) = (tmp_path / "out").glob("*trials*.csv")
     assert "force_mean_n" not in table.read_text("utf-8").splitlines()[0]
+
+
+def test_conditions_of_sealed_sites_are_not_counted_or_compared_across_sites(sealed: Path, tmp_path: Path) -> None:
+    merge_sites(_copied(sealed, tmp_path), tmp_path / "pooled")
+    unblind(tmp_path / "pooled/sites/B", "AK", "closed")
+    half = load_study(tmp_path / "pooled")
+    results = evaluate(half, recordings=False)
+    assert [half.setting_count(block) for block in half.blocks] == [3, 7]
+    assert rows_of_tests(results) == []
+    assert not any(block.incomplete for block in results.blocks)
+    text = methods(half, results)
+    assert "at the sites A and B, each in all conditions." in text
+    assert "three conditions were presented" in text
+    assert "seven conditions were presented" in text
+    key, *sentences = limits(half, results)
+    assert key.startswith(
+        "The key of A is sealed (the key of B is open): conditions appear as codes, and the report shows only counts. "
+    )
+    assert (
+        "Each site has its own codes, which cannot be matched with those of other sites until the keys of all sites "
+        "are open, so conditions are not counted or compared across sites."
+    ) in sentences
+    assert not any("could not be tested" in sentence or "sessions" in sentence for sentence in sentences)
 
 
 def test_a_site_whose_folder_is_missing_is_not_left_out(sealed: Path, tmp_path: Path) -> None:
