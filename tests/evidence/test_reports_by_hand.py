@@ -200,6 +200,14 @@ def test_reports() -> None:
     assert differing[:3] == []  # pytest would take minutes to compare the long lines of both lists
 
 
+@pytest.mark.parametrize(
+    ("spin_us", "notes"), [(0.0, []), (0.75, ["spinning for 0.75 µs before each deadline used 3.1% of one core"])]
+)
+def test_a_spin_before_deadlines_is_reported_however_short(spin_us: float, notes: list[str]) -> None:
+    report = timing_evidence(replace(TIMED, spin_us=spin_us, spun_share=0.031)).text
+    assert [line for line in report.splitlines() if "spinning" in line] == notes
+
+
 def marks(axes: Axes, marker: str) -> list[tuple[float, float]]:
     """Return the places of a kind of mark."""
     return [pytest.approx(xy) for line in axes.lines if line.get_marker() == marker for xy in line.get_xydata()]
