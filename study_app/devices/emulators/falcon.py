@@ -195,8 +195,9 @@ class EmulatedBackend(usb.backend.IBackend):  # type: ignore[misc]
 
     def release_interface(self, dev_handle: _Handle, intf: int) -> None:
         emulator = self._connected_emulator(dev_handle)
-        if self._claims.pop(id(emulator), None) is None:
+        if self._claims.get(id(emulator)) is not dev_handle:
             _raise_for_code(constants.ERROR_NOT_FOUND)
+        del self._claims[id(emulator)]
 
     def is_kernel_driver_active(self, dev_handle: _Handle, intf: int) -> bool:
         return self._connected_emulator(dev_handle).faults.is_on("kernel_driver")
