@@ -219,6 +219,26 @@ def test_asking_whether_it_runs_does_not_undo_its_homing() -> None:
     assert not is_running(transport)  # a reply that waits does not make a dead Falcon run
 
 
+def test_the_hand_pulls_a_homed_grip_again_for_each_program_that_claims_the_bridge() -> None:
+    emulator, transport = falcon(running=True)
+    configure(transport)
+
+    def moves_in_second() -> list[bool]:
+        """Return whether the hand moves after each of ten packets, 0.1 s apart."""
+        moves = []
+        for _ in range(10):
+            assert is_running(transport)
+            transport.pause(0.1)
+            moves.append(emulator.moving)
+        return moves
+
+    assert any(moves_in_second() + moves_in_second() + moves_in_second())
+    assert (emulator.homed, any(moves_in_second())) == (ALL_HOMED, False)
+    transport.reopen()
+    configure(transport)
+    assert any(moves_in_second())
+
+
 def test_the_event_character_and_the_timer_are_the_round_trip() -> None:
     emulator, transport = falcon(running=True)
     configure(transport)
