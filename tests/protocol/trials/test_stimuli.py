@@ -34,6 +34,19 @@ def test_the_comparison_of_a_level(keys: dict[str, str], standard: float | None,
     assert stimulus(**keys).level_between(standard, comparison) == level
 
 
+@pytest.mark.parametrize(
+    ("keys", "low", "high", "ratio"),
+    [
+        ({"spacing": "log"}, -1.0, 0.5, 10**1.5),
+        ({"spacing": "linear"}, 0.2, 0.5, 2.5),
+        ({"spacing": "linear"}, 0.0, 0.5, np.inf),
+        ({"spacing": "linear"}, -0.2, 0.5, np.inf),
+    ],
+)
+def test_the_ratio_of_two_levels(keys: dict[str, str], low: float, high: float, ratio: float) -> None:
+    assert stimulus(**keys).ratio(low, high) == pytest.approx(ratio)
+
+
 amplitudes, frequencies, leads = st.floats(1, 100), st.floats(0.2, 5), st.floats(0.1, 5)
 
 
