@@ -47,6 +47,21 @@ def test_only_a_weber_fraction_has_no_unit(level, unit):
     assert replace(plan, stimulus=stimulus).unit == unit
 
 
+def test_catch_and_noise_trials_have_no_place_among_the_trials_and_no_interval():
+    """Levels are 0.02 to 0.6; two of the observers nearly always notice 0.6, the last one only by chance or a lapse."""
+    plan = plan_of(study('kind = "constant", repetitions = 9', design="yesno", block=", catch = { share = 0.1 }"))
+    answered = plan.answers(np.log10([0.03, 0.05, 40.0]), np.random.default_rng(4))
+    for answers, level in ((answered.catch, math.log10(0.6)), (answered.noise, -math.inf)):
+        assert answers.levels.shape == answers.successes.shape
+        assert answers.successes.shape[0] == 3
+        assert answers.successes.shape[1] > 0
+        assert np.unique(answers.levels).tolist() == [level]
+        assert np.unique([answers.towards, answers.before]).tolist() == [0.0]
+        assert np.unique(answers.done).tolist() == [0.5]
+    notices = answered.catch.successes.mean(axis=1)
+    assert min(notices[:2]) > 0.7 > notices[2]
+
+
 @pytest.mark.slow
 def test_estimates_are_unbiased_and_as_precise_as_measured():
     plan = plan_of(study())  # 60 trials, a Weber fraction of 0.2: standard deviation 26 ± 3 %, coverage 98 ± 3 %
