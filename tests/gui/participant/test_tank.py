@@ -12,6 +12,7 @@ from PySide6.QtGui import QColor, QPaintEvent, QRegion
 from PySide6.QtWidgets import QApplication
 
 from study_app.gui.participant.tank.captions import Captions
+from study_app.gui.participant.tank.glass import _blur_image, brightness
 from study_app.gui.participant.tank.layers import OnsetPatch
 from study_app.gui.participant.tank_widget import TankWidget
 from study_app.protocol.wording.languages import words
@@ -236,3 +237,25 @@ def test_the_hint_counts_the_seconds_until_a_person_may_or_must_go_on(qtbot: Any
         parts = Captions(task_page(task), wording).parts(view(elapsed_s=elapsed_s, reached=5).task, hint_text)
         assert (parts["hint"].state, parts["count"].state) == (text, (5, 12))
     assert Captions(task_page(reach()), wording).parts(None)["count"].state == (0, 12)
+
+
+def test_a_blur_spreads_each_cell_evenly_over_its_neighbours_and_repeats_the_edges() -> None:
+    image = np.zeros((5, 6))
+    image[2, 3] = 9.0
+    spread = np.zeros((5, 6))
+    spread[1:4, 2:5] = 1.0
+    assert _blur_image(image) == pytest.approx(spread)
+    assert _blur_image(np.full((4, 3), 0.7)) == pytest.approx(np.full((4, 3), 0.7))
+    corner = np.zeros((4, 5))
+    corner[0, 0] = 9.0
+    assert _blur_image(corner)[:3, :3] == pytest.approx(np.array([[4.0, 2.0, 0.0], [2.0, 1.0, 0.0], [0.0, 0.0, 0.0]]))
+    wide = np.zeros((5, 5))
+    wide[2, 2] = 25.0
+    assert _blur_image(wide, radius=2) == pytest.approx(np.ones((5, 5)))
+
+
+def test_the_light_on_the_floor_is_dark_on_average_with_bright_lines() -> None:
+    light = brightness()
+    assert light.shape == (320, 512)
+    assert (light.min(), light.max()) == (0.0, 1.0)
+    assert 0.05 < light.mean() < 0.3
