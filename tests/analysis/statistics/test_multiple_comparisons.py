@@ -42,6 +42,28 @@ def row_of(levels: list[float], people: int) -> pd.Series:
     return measures.aggregate(frame, {"L1": people}, ["L1"], ["a"]).iloc[0]
 
 
+def test_a_setting_that_was_not_presented_has_no_missing_answers() -> None:
+    answers = pd.DataFrame(
+        {
+            "participant": ["P1", "P2", "P2", "P3"],
+            "code": "L1",
+            "item": ["a", "a", "b", "a"],
+            "response": pd.array([6, None, 2, 5], dtype="Int64"),
+            "cannot_judge": [False, True, False, False],
+        }
+    )
+    table = measures.aggregate(answers, {"L1": 7}, ["L2", "L1"], ["b", "a"], {"L1": 4})
+    counted = ["code", "item", "participants", "presented", "presented_excluded", "n", "cannot_judge", "missing"]
+    assert table[counted].to_numpy().tolist() == [
+        ["L2", "b", 0, 0, 0, 0, 0, 0],
+        ["L2", "a", 0, 0, 0, 0, 0, 0],
+        ["L1", "b", 1, 7, 4, 1, 0, 6],
+        ["L1", "a", 2, 7, 4, 2, 1, 4],
+    ]
+    assert table["median"].tolist() == pytest.approx([np.nan, np.nan, 2, 5.5], nan_ok=True)
+    assert table["agree_percent"].tolist() == pytest.approx([np.nan, np.nan, 0, 100], nan_ok=True)
+
+
 def shares(row: pd.Series) -> tuple[float, float, float]:
     low = row["count_1"] + row["count_2"] + row["count_3"]
     return 100 * low / row["n"], 100 * row["count_4"] / row["n"], row["agree_percent"]
