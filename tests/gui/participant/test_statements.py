@@ -12,6 +12,7 @@ from PySide6.QtWidgets import QApplication
 
 from study_app.gui.widgets.accessible import HeadingLabel
 from study_app.session.transitions.events import Chosen, ItemShown, Submitted
+from tests.gui.drawn import drawn_by
 from tests.gui.participant.driver import KEY, Participant, name_of, tap, told_of
 from tests.gui.small import DUTCH_LABELS, LABELS, questionnaire
 
@@ -155,6 +156,17 @@ def test_all_is_mirrored_but_the_order_of_the_scale_and_the_keys_that_go_along_i
     assert there.page.button.geometry().left() < 60 < here.page.button.geometry().left()
     there.press(KEY.Key_Right, KEY.Key_Right, KEY.Key_Space)
     assert values(there) == [2]
+
+
+def test_numbers_and_statements_grow_with_the_text_of_the_page(opening: Opening) -> None:
+    heights, scales = list[list[float]](), list[float]()
+    for text_scale in (1.0, 2.0):
+        seen = opening(questionnaire(("It is thick.", "It is warm.")), FULL, text_scale=text_scale)
+        ink = {drawn.text: drawn.ink.height() for drawn in drawn_by(seen.window)}
+        heights.append([ink[text] for text in ("1", "It is thick.", "2", "It is warm.")])
+        scales.append(seen.question(2).sizes.text)
+    assert scales[1] > 1.3 * scales[0]
+    assert heights[1] == pytest.approx([scales[1] / scales[0] * height for height in heights[0]], rel=0.08)
 
 
 @pytest.mark.parametrize(
