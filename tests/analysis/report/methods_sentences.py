@@ -314,13 +314,16 @@ METHODS: Final[Sequence[tuple[str, Check]]] = (
      r"of the others \(McNemar's exact test within participants, one-sided, with p values Holm-adjusted across the "
      r"liquids\)\.", when(lambda told: told.block["named"] is not None)),
     (r"Trends across delays were tested with a sign-flip permutation test on the participants' rank correlations "
-     r"between answers and delays \(.*; (one-sided in the direction stated (?:before the first session|by the "
+     r"between answers and delays \((?:.*; )?(one-sided in the direction stated (?:before the first session|by the "
      r"protocol)|two-sided|one-sided if a direction was stated (?:before the first session|by the protocol), "
      r"otherwise two-sided)\), with p values adjusted (by .*)\.", trends_tested),
     (r"If a statement showed a trend, the longest delay was dropped and the rank correlations were tested again, "
      r"until no trend remained\.", when(lambda told: bool(told.block["trends"]))),
-    (r"At every step, a trend required p ≤ alpha divided by the number of statements\.",
-     when(lambda told: bool(told.block["trends"]))),
+    (r"At every step, a trend required p ≤ alpha( divided by the number of (?:statements|primary or of exploratory "
+     r"statements, respectively))?\.", lambda match, told: match[1] == {
+         (1, 1): None, (1, 2): " divided by the number of statements",
+     }.get((len({one["primary"] for one in told.block["trends"]}), min(len(told.block["trends"]), 2)),
+           " divided by the number of primary or of exploratory statements, respectively")),
     (r"The shortest delay with a trend is an upper bound for the shortest noticeable delay\.",
      when(lambda told: bool(told.block["trends"]))),
     (rf"Each delay was compared with {R} ms using two one-sided t tests on paired differences, with equivalence "
