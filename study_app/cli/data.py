@@ -162,7 +162,9 @@ def unblind(results: Path, by: str, reason: str) -> None:
 @PARTICIPANT
 @SESSION
 @click.option("--trial", type=WholeNumber(1), help="Exclude only this trial; default: the whole session.")
-@click.option("--rule", metavar="RULE", default="", help="A planned exclusion rule that the session meets; this is checked.")
+@click.option(
+    "--rule", metavar="RULE", default="", help="A planned exclusion rule that the session meets; this is checked."
+)
 @BY
 @REASON
 def exclude(results: Path, participant: str, session: int, trial: int | None, rule: str, by: str, reason: str) -> None:

@@ -39,7 +39,7 @@ _LINE_PT: Final = 8.5
 _Draw: TypeAlias = Callable[[PlacedQuestion, QuestionResult, Look], Sheet]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class _QuestionFigure:
     """A kind of figure: its drawing function and the sentence of its caption.
 
@@ -114,9 +114,9 @@ def draw_distribution(question: PlacedQuestion, result: QuestionResult, look: Lo
 
 
 _DISTRIBUTION: Final = _QuestionFigure(
-    "distribution",
-    draw_distribution,
-    "Each dot is one answer; the line shows the median and the band the interquartile range.",
+    id="distribution",
+    draw=draw_distribution,
+    caption="Each dot is one answer; the line shows the median and the band the interquartile range.",
 )
 
 
@@ -143,10 +143,10 @@ def draw_options(question: PlacedQuestion, result: QuestionResult, look: Look) -
 
 
 _OPTIONS: Final = _QuestionFigure(
-    "counts",
-    draw_options,
-    "Bars show the number of participants who chose each option; grey bars show the number who answered.",
-    "Bars show the number of answers with each option; grey bars show the total number of answers.",
+    id="counts",
+    draw=draw_options,
+    caption="Bars show the number of participants who chose each option; grey bars show the number who answered.",
+    repeated="Bars show the number of answers with each option; grey bars show the total number of answers.",
 )
 
 
@@ -200,9 +200,9 @@ def _draw_legend(sheet: Sheet, names: list[str], colours: list[str]) -> None:
 
 
 _RATINGS: Final = _QuestionFigure(
-    "rating",
-    draw_ratings,
-    "Each bar shows the proportion of answers at each point of the scale; labels show the number of answers.",
+    id="rating",
+    draw=draw_ratings,
+    caption="Each bar shows the proportion of answers at each point of the scale; labels show the number of answers.",
 )
 
 

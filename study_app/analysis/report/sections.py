@@ -125,8 +125,8 @@ def _general_sentences(study: Study, results: Results) -> Iterator[str]:
             yield "Until unblinding, each participant has a separate set of codes, so conditions cannot be compared."
         if study.sites:
             yield (
-                "Each site has its own codes, which cannot be matched with those of other sites until the keys of all "
-                "sites are open, so conditions are not counted or compared across sites."
+                "Codes differ between sites until all keys are open, so conditions are not counted or compared across "
+                "sites."
             )
     if study.simulated:
         yield "The participants were SIMULATED, so this report is not evidence about people."

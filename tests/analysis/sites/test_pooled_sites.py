@@ -74,7 +74,7 @@ def test_codes_of_sealed_sites_are_never_pooled(sealed: Path, tmp_path: Path) ->
     assert (rows["code"].str.partition("-")[0] == rows["participant"].str.partition("-")[0]).all()
     report(sealed, tmp_path, failed=pytest.fail)
     page = read(tmp_path)
-    assert "Each site has its own codes" in page
+    assert "Codes differ between sites until all keys are open" in page
     for condition in ("light_oil", "delay_75"):
         assert condition not in page
 
@@ -108,9 +108,9 @@ def test_conditions_of_sealed_sites_are_not_counted_or_compared_across_sites(sea
         "The key of A is sealed (the key of B is open): conditions appear as codes, and the report shows only counts. "
     )
     assert (
-        "Each site has its own codes, which cannot be matched with those of other sites until the keys of all sites "
-        "are open, so conditions are not counted or compared across sites."
-    ) in sentences
+        "Codes differ between sites until all keys are open, so conditions are not counted or compared across sites."
+        in sentences
+    )
     assert not any("could not be tested" in sentence or "sessions" in sentence for sentence in sentences)
 
 
