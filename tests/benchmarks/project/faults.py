@@ -545,7 +545,10 @@ def judge_fault(folder: Path, temporary: Path, name: str) -> dict[str, Any]:
 def check_types(copy: Path) -> bool:
     """Return whether mypy reports something in a copy of the program; a condition `False` alone is not reported."""
     command = [sys.executable, "-m", "mypy", "--no-warn-unreachable", "--no-error-summary"]
-    return subprocess.run(command, check=False, cwd=copy, stdout=subprocess.DEVNULL).returncode != 0
+    completed = subprocess.run(command, check=False, cwd=copy, capture_output=True, text=True)
+    if completed.returncode > 1:
+        raise RuntimeError(f"mypy did not run in {copy}: {completed.stdout}{completed.stderr}")
+    return completed.returncode == 1
 
 
 @cache
