@@ -539,14 +539,14 @@ def _statement(study: Study, contrast: Contrast) -> Item | None:
     return next((item for block in blocks for item in block.items if item.id == contrast.measure), None)
 
 
-def inclusion_words(contrasts: Iterable[Contrast]) -> str:
-    """Return a sentence on which participants are compared, for power analysis, preregistration and report."""
+def inclusion_words(contrasts: Iterable[Contrast], *, in_report: bool = False) -> str:
+    """Return sentences on which participants are compared, for power analysis, preregistration and report."""
     beyond = any(contrast.measure == "threshold" for contrast in contrasts)
-    return (
+    included = (
         "Participants are included if both of their values are available"
-        f"{', even if a threshold lies outside the range of levels' * beyond}. The report lists the excluded "
-        "participants and the reasons."
+        f"{', even if a threshold lies outside the range of levels' * beyond}."
     )
+    return included if in_report else f"{included} The report lists the excluded participants and the reasons."
 
 
 def bound_as_tested(bound: float, *, ratio: bool) -> float:
@@ -801,7 +801,7 @@ def contrast_section(results: Results) -> Iterator[str]:
         f"sample, and a t test corrected for skewness. The verdict depends on this value{_holm_words(contrasts)}. The "
         f"last two tests do not assume normal distributions, so normality is not tested. "
         f"{_UNADJUSTED * (len(contrasts) > 1)}{_BAYES} {_WEIGHTED * weighted}"
-        f"{inclusion_words(contrast.contrast for contrast in contrasts)}",
+        f"{inclusion_words((contrast.contrast for contrast in contrasts), in_report=True)}",
         "soft",
     )
     if bounds:

@@ -25,7 +25,7 @@ from study_app.errors import AnalysisError
 from study_app.protocol.blocks import Block, block_titles, display_language
 from study_app.protocol.descriptions import describe, limit_rows, number_range
 from study_app.protocol.load import parse, protocol_hash, source_bytes
-from study_app.protocol.model import SPENDINGS, Analysis, Contrast, Protocol
+from study_app.protocol.model import OF_LEVELS, SPENDINGS, Analysis, Contrast, Protocol
 from study_app.protocol.orders import block_orders_by_group, variants
 from study_app.protocol.participants import fewest_participants
 from study_app.protocol.source import text_in
@@ -144,11 +144,11 @@ def hypotheses(protocol: Protocol, language: str) -> Iterator[str]:
         sides = "two-sided" if contrast.expected is None else "one-sided"
         weights_note = " Participants are weighted as in the group mean." if contrast.measure == "threshold" else ""
         yield (
-            f"Hypothesis: {described}. We test it with a {sides} {test}, using one value per "
-            f"participant.{weights_note} We also use a bootstrap that includes one hypothetical participant as extreme "
-            "as the most extreme participant in the sample (Gaffke 2005), and a t test corrected for skewness (Hall "
-            f"1992). The p value is the largest of the three, Holm-adjusted across all "
-            f"hypotheses of this kind.{_equivalence_sentences(protocol, contrast)}"
+            f"Hypothesis: {described}. We test it with a {sides} {test}, using one value per participant"
+            f"{_reduction_words(protocol, contrast)}.{weights_note} We also use a bootstrap that includes one "
+            "hypothetical participant as extreme as the most extreme participant in the sample (Gaffke 2005), and a t "
+            "test corrected for skewness (Hall 1992). The p value is the largest of the three, Holm-adjusted across "
+            f"all hypotheses of this kind.{_equivalence_sentences(protocol, contrast)}"
         )
     if protocol.analysis is not None and protocol.analysis.contrasts:
         yield inclusion_words(protocol.analysis.contrasts)
@@ -161,6 +161,16 @@ def hypotheses(protocol: Protocol, language: str) -> Iterator[str]:
         titled_value = published.model_copy(update={"block": _title(protocol, published.block)})
         stimulus = stimuli.get(published.block)
         yield f"Published value for comparison, block {titled_value.described(stimulus.unit if stimulus else '')}."
+
+
+def _reduction_words(protocol: Protocol, contrast: Contrast) -> str:
+    """Return how several answers or estimates of a participant are reduced to one value; "" for a single estimate."""
+    if contrast.measure in OF_LEVELS:
+        blocks = [protocol.blocks[name] for name in contrast.blocks]
+        is_averaged = any(block.stimulus is not None and len(protocol.standards_of(block)) > 1 for block in blocks)
+        return " (the mean over the standards)" if is_averaged and contrast.measure != "exponent" else ""
+    reduced = "median" if protocol.compares_statement(contrast) else "mean"
+    return f" (the {reduced} of repeated answers)"
 
 
 def _equivalence_sentences(protocol: Protocol, contrast: Contrast) -> str:

@@ -155,9 +155,23 @@ def compare_hypotheses(compared: Compared, trials: pd.DataFrame, study: Numbers)
     others = [max(one["p_bootstrap"], one["p_skewed"]) for one in reported]
     ps = adjusted([max(own["p"], p) for own, p in zip(tested, others, strict=True)])
     for number, (own, p) in enumerate(zip(tested, ps, strict=True)):
-        own |= {"p_adjusted": p, "members": len(contrasts)}
+        own.update(p_adjusted=p, members=len(contrasts), **_limits(contrasts, number, study["analysis"]))
         compared.check(f"results.contrasts.{number}", own, 1e-4)
         compared.rows[tuple(rows.loc[number, ["block", "question", "item", "comparison"]])] = own
+
+
+def _limits(contrasts: Sequence[Numbers], number: int, analysis: Numbers) -> Numbers:
+    """Return the largest difference of a person, and how many people include one of each minority that matters."""
+    contrast, bounds = contrasts[number], sum("bound" in contrast for contrast in contrasts)
+    is_statement = contrast["measure"] not in ("threshold", "exponent", "d_prime", "pse") and "form" not in contrast
+    limits = {"largest": 6} if is_statement else {}
+    if "bound" in contrast:
+        minority = min(0.2, contrast["bound"] / 6) if is_statement else 0.2
+        people = 1
+        while (1 - minority) ** people > analysis.get("alpha", 0.05) / bounds:
+            people += 1
+        limits["fewest"] = people
+    return limits
 
 
 def _tested(compared: Compared, contrast: Numbers, trials: pd.DataFrame) -> Numbers:

@@ -171,9 +171,10 @@ def test_the_preregistration_states_only_what_is_tested(study: Study) -> None:
     text = preregistration(parse(FILE.encode(), "line.toml"), "hash")
     assert "- Hypothesis: both score differs between water and honey in block “First”." in text
     assert (
-        "- We describe the answers to the questions other than statements in block “First” and block “Second” and do "
-        "not test them except in the hypotheses above." in text
+        "- We describe the answers to the questions in block “First” and block “Second”, but do not test them except "
+        "in the hypotheses above." in text
     )
+    assert text.count("participant (the mean of repeated answers).") == 4
     assert "Friedman" not in text
     assert "agreement" not in text.partition("## The protocol in words")[0]
 

@@ -109,16 +109,14 @@ def bayes_factor(match: re.Match[str], told: Told) -> bool:
 def contrast_values(told: Told, one: Mapping[str, Any]) -> np.ndarray:
     """Return the differences of each participant's median answers under two conditions; of all, between groups."""
     rows = told.study.responses[told.study.responses["item"] == one["contrast"]["measure"]].dropna(subset=["response"])
-    delays = {it["code"]: it["delay_ms"] for it in told.block["settings"]}
-    if told.block["kind"] == "delays":
+    if one["contrast"]["conditions"] is None and told.block["kind"] == "delays":  # replicates are pooled
+        delays = {setting["code"]: setting["delay_ms"] for setting in told.block["settings"]}
         rows = rows.assign(code=[f"{delays[code]:g}" for code in rows["code"]])
     medians = rows.astype({"response": float}).groupby(["participant", "code"])["response"].median().unstack()
     if one["contrast"]["conditions"] is None:
         return medians.mean(axis=1).dropna().to_numpy()  # type: ignore[no-any-return]
     codes = {it["condition"]: it["code"] for it in told.block["settings"]}
     first, second = (codes[condition] for condition in one["contrast"]["conditions"])
-    if told.block["kind"] == "delays":
-        first, second = f"{delays[first]:g}", f"{delays[second]:g}"
     return (medians[first] - medians[second]).dropna().to_numpy()  # type: ignore[no-any-return]
 
 

@@ -269,7 +269,8 @@ METHODS: Final[Sequence[tuple[str, Check]]] = (
     (r"(?:Hypothesis (\d+)|The hypothesis) \((.*)\) was tested with a (one-sided|two-sided) (.*)\.", hypothesis),
     (r"Comparisons between groups used the degrees of freedom of the smaller group \(Hsu 1938\)\.",
      when(lambda told: any(one["contrast"]["groups"] for one in told.contrasts))),
-    (r"Each participant contributed one value to each comparison\.", when(lambda told: bool(told.contrasts))),
+    (r"Each participant contributed one value to each comparison( \([a-z ,“”\w]+\))?\.",
+     when(lambda told: bool(told.contrasts))),
     (r"In addition to the t test, we used a bootstrap that includes one hypothetical participant as extreme as the "
      r"most extreme participant in the sample \(Gaffke 2005\), and a t test corrected for skewness "
      r"\(Hall 1992\)\.", when(lambda told: bool(told.contrasts))),
