@@ -21,6 +21,7 @@ from tests.compiled import needs_servo
 
 pytestmark = pytest.mark.slow
 
+RELEASED = Path(__file__).parents[1] / "store" / "releases" / "0.2" / "demo"
 Finished = subprocess.CompletedProcess[str]
 Run = Callable[..., Finished]
 
@@ -152,9 +153,27 @@ def test_help_lists_every_command_once_under_its_heading_with_its_whole_sentence
 @pytest.fixture
 def released(tmp_path: Path, liquid_study: Run) -> Path:
     """Results of version 0.2, upgraded."""
-    study = shutil.copytree(Path(__file__).parents[1] / "store" / "releases" / "0.2" / "demo", tmp_path / "demo")
+    study = shutil.copytree(RELEASED, tmp_path / "demo")
     assert liquid_study("upgrade", str(study)).returncode == 0
     return study
+
+
+def test_a_second_upgrade_reports_that_nothing_is_left(tmp_path: Path, liquid_study: Run) -> None:
+    study = shutil.copytree(RELEASED, tmp_path / "demo")
+    first, second = (liquid_study("upgrade", str(study)) for _ in range(2))
+    files = [Path(line) for line in first.stdout.splitlines()]
+    assert files
+    assert all(file.is_file() and file.is_relative_to(study) for file in files)
+    assert (second.returncode, second.stdout) == (0, f"{study}: nothing to upgrade\n")
+
+
+@pytest.mark.parametrize(("command", "only_moving"), [("run", False), ("rehearse", True)])
+def test_the_help_of_a_command_lists_the_devices_that_it_accepts(
+    liquid_study: Run, command: str, only_moving: bool
+) -> None:
+    shown = " ".join(liquid_study(command, "--help").stdout.split())
+    (listed,) = re.findall(r"--device NAME (.*?); see liquid-study devices\.", shown)
+    assert ("scripted" in listed, "falcon:SERIAL" in listed) == (True, not only_moving)
 
 
 def test_verify_says_last_what_concerns_sharing(liquid_study: Run, released: Path) -> None:
