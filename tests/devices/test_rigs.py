@@ -1,12 +1,13 @@
 """A device together with its servo, and the names of devices: what is handed on, in which order, and what is said."""
 
+from dataclasses import replace
 from random import Random
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
-from study_app.devices import rig
+from study_app.devices import registry, rig
 from study_app.devices.descriptor import DeviceOption, OpenRequest
 from study_app.devices.registry import all_devices, check_options, descriptor_of, list_devices, title_of
 from study_app.devices.rig import Rig, RigSettings, open_rig, study_settings
@@ -123,6 +124,17 @@ def test_devices_are_listed_with_the_mouse_first_and_simulated_ones_last() -> No
     assert labels["scripted"] == f"{descriptor_of('scripted').title} (simulated)"
     with pytest.raises(DeviceNotFound, match=r"^device 'mouse:7' is not known; choose one of: mouse, "):
         descriptor_of("mouse:7")
+
+
+def test_a_device_that_needs_an_argument_is_not_listed_by_its_name_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    bridge = replace(descriptor_of("scripted"), name="bridge", argument="HOST", argument_required=True)
+    listed = list_devices()
+    monkeypatch.setattr(registry, "all_devices", lambda: (bridge, *all_devices()))
+    monkeypatch.setattr(registry, "DEVICES", {**registry.DEVICES, "bridge": bridge})
+    assert list_devices() == listed
+    assert descriptor_of("bridge:lab-7") is bridge
+    with pytest.raises(DeviceNotFound, match=r"^device 'bridge' needs an argument .* specify it as bridge:HOST$"):
+        descriptor_of("bridge")
 
 
 def test_an_option_that_a_device_lacks_is_named_with_the_devices_that_have_it() -> None:
