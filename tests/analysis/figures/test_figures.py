@@ -23,6 +23,7 @@ from study_app.analysis.report import first_page, study_figures
 from study_app.analysis.statistics.outcome import Interval
 from study_app.analysis.statistics.thresholds import Threshold
 from study_app.errors import AnalysisError
+from study_app.protocol.participants import EACH_GROUP
 from tests.analysis import made_up
 from tests.analysis.conftest import HIDDEN, Results, twelve
 
@@ -220,6 +221,25 @@ def test_the_numbers_of_a_figure_have_the_group_after_each_participant(
     made = replace(made, participants=made.participants.assign(group=groups))
     rows = pd.DataFrame({"code": ["L1", "L2"], "participant": ["B", "A"], "group": ["x", "y"], "value": [5, 7]})
     assert page_layout.tab_separated(made, rows[columns]).replace("\t", " ").splitlines() == lines
+
+
+@pytest.mark.parametrize(
+    ("shown", "split", "marks"),
+    [
+        ("simulated", "", [("SIMULATED participants", style.WARN, style.WARN_GROUND)]),
+        ("pilot", EACH_GROUP, [("PILOT", style.WARN, style.WARN_GROUND)]),
+        ("blinded", "", [("Blinded: conditions appear as codes", style.SEALED, style.SEALED_GROUND)]),
+        ("", "experts", [("Only experts", style.SEALED, style.SEALED_GROUND)]),
+    ],
+)
+def test_figures_are_marked_with_what_limits_their_meaning(
+    shown: str, split: str, marks: list[tuple[str, str, str]]
+) -> None:
+    study = made_up.study(made_up.liquids(1), [("A", 1, "L1", (4, 4))])
+    participants = study.participants.assign(simulated=shown == "simulated", pilot=shown == "pilot")
+    settings = () if shown == "blinded" else study.settings
+    study = replace(study, participants=participants, split=split, settings=settings)
+    assert [(mark.words, mark.ink, mark.ground) for mark in study_marks(study)] == marks
 
 
 def test_a_picture_has_its_own_title_participants_and_files(monkeypatch: pytest.MonkeyPatch) -> None:
