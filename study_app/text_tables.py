@@ -132,7 +132,7 @@ def decimal_sign_of(lines: Iterable[Line], places: Collection[int]) -> str:
 
 def number_in(field: str, decimal_sign: str = ".") -> float | None:
     """Return the finite number in a field, or None."""
-    plain = field if decimal_sign == "." else field.replace(decimal_sign, ".")
+    plain = field.replace(decimal_sign, ".")
     if _NUMBER.fullmatch(plain) is None:
         return None
     return value if math.isfinite(value := float(plain)) else None
