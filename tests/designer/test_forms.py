@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 import shiboken6
 from PySide6.QtCore import QEvent, QPoint, QPointF, Qt
-from PySide6.QtGui import QFocusEvent, QKeySequence, QTextCursor
+from PySide6.QtGui import QFocusEvent, QFontMetricsF, QKeySequence, QTextCursor
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
     QAbstractButton,
@@ -27,9 +27,10 @@ from study_app.designer.form.card import FormCard
 from study_app.designer.form.fields import SENTENCE_EDGE_PX, TypedSentence, TypedText
 from study_app.designer.form.special import Compared, Hypothesis
 from study_app.designer.new_study_page import Questions, TemplateQuestion, template_choice
-from study_app.designer.parts import FIELD_PX
+from study_app.designer.parts import FIELD_PX, SEGMENT_PX, Segments
 from study_app.designer.problems import problem_rows
 from study_app.designer.window import focus_stops
+from study_app.gui.theme import font
 from study_app.gui.widgets.boxes import vbox
 from study_app.gui.widgets.controls import IconButton
 from tests.gui.walk import settle
@@ -300,13 +301,16 @@ def test_the_wheel_over_a_list_or_a_text_leaves_keyboard_and_value(designer: Any
     assert designer.keyboard is designer.place.form.head.id
 
 
-def test_the_name_of_an_incomplete_language_is_whole(designer: Any) -> None:
+def test_an_incomplete_language_is_marked_with_its_whole_name(designer: Any) -> None:
     designer.open("kitchen", "study", width=1920)
     designer.editing.handle_request(ChangeLanguage("add", "fr"))
     designer.editing.make_step("Change", Set((*ITEMS, 0, "text"), {"en": "Honey", "fr": "Honey"}))
     QApplication.processEvents()
-    row = designer.field("study", "languages").rows[-1]
-    assert "French" in [label.text() for label in row.findChildren(QLabel)]
+    rows = designer.field("study", "languages").rows
+    assert "French" in [label.text() for label in rows[-1].findChildren(QLabel)]
+    assert rows[-1].accessibleName().startswith("French, ")
+    assert {row.property("role") for row in rows} == {"entry"}
+    assert [row.property("state") for row in rows] == [*[""] * (len(rows) - 1), "refused"]
 
 
 @pytest.mark.parametrize("row", [("scales", "agreement", "labels"), (*ITEMS, 0, "text")])
@@ -540,6 +544,25 @@ def test_a_sentence_grows_as_its_field_becomes_narrower_up_to_its_lines(qtbot: A
         sentence.resize(round(fraction * text_px), sentence.height())
         assert sentence.height() == max(FIELD_PX, lines * line_px + SENTENCE_EDGE_PX), fraction
         assert (sentence.verticalScrollBarPolicy() == is_high) == scrolls, fraction
+
+
+def test_a_segment_has_room_for_its_text_in_bold_and_9_px_on_each_side(qtbot: Any) -> None:
+    segments = Segments("Order")
+    qtbot.addWidget(segments)
+    segments.show_values([("drawn", "Drawn"), ("fixed", "Fixed for all")], "drawn")
+    hints = [button.sizeHint() for button in segments.buttons]
+    bold = QFontMetricsF(font("label", weight=600))
+    text_px = [round(bold.horizontalAdvance(text)) for text in ("Drawn", "Fixed for all")]
+    assert [hint.width() for hint in hints] == [width + 9 + 9 for width in text_px]
+    assert {hint.height() for hint in hints} == {SEGMENT_PX}
+
+
+def test_a_sentence_never_scrolls_sideways(qtbot: Any) -> None:
+    sentence = TypedSentence("Description, English")
+    qtbot.addWidget(sentence)
+    across = sentence.horizontalScrollBar()
+    across.setRange(2, 30)  # as Qt does for a caret after a trailing space
+    assert (across.minimum(), across.maximum()) == (0, 0)
 
 
 def test_undo_in_a_text_undoes_the_step_of_the_study(designer: Any) -> None:
