@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from study_app.devices.emulators import inverse3_service
+from study_app.devices.emulators import inverse3_service, inverse3_stream
 from study_app.devices.emulators.inverse3 import EmulatedInverse3
 from study_app.devices.emulators.inverse3_service import Service
 from study_app.devices.registry import open_device
@@ -271,3 +271,15 @@ def test_a_position_far_away_is_rejected_while_the_force_fades_and_the_servo_end
     assert sizes_n[-1] == np.linalg.norm(service.force_n) == 0.0
     with pytest.raises(ServoFault, match="sent no usable data for 50 ms"):
         servo.check()
+
+
+def test_the_emulated_device_becomes_idle_100_ms_after_the_last_command() -> None:
+    service, time_ns = Service(tremor_m=0.0), np.array([5_000_000_000])
+    service.follow_clock(int(time_ns.ctypes.data))
+    inverse3_stream.advance_handle(service.state)
+    inverse3_stream.apply_force(service.state, 1.0, 2.0, 3.0)
+    for pause_ms, force_n in ((100, (1.0, 3.0, -2.0)), (101, (0.0, 0.0, 0.0))):
+        time_ns += pause_ms * 1_000_000
+        inverse3_stream.advance_handle(service.state)
+        assert service.force_n == force_n, pause_ms
+        assert service.state.last_ns == time_ns[0]
