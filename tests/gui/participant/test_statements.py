@@ -158,6 +158,14 @@ def test_all_is_mirrored_but_the_order_of_the_scale_and_the_keys_that_go_along_i
     assert values(there) == [2]
 
 
+@pytest.mark.parametrize(("judge", "has_column"), [(None, False), ("Cannot judge", True)])
+def test_only_a_page_that_asks_it_has_a_column_for_cannot_judge(
+    opening: Opening, judge: str | None, has_column: bool
+) -> None:
+    sizes = opening(questionnaire(cannot_judge=judge), FULL).question(1).sizes
+    assert (sizes.judge_width > 0.0, sizes.judge_gap > 0.0) == (has_column, has_column)
+
+
 def test_numbers_and_statements_grow_with_the_text_of_the_page(opening: Opening) -> None:
     heights, scales = list[list[float]](), list[float]()
     for text_scale in (1.0, 2.0):
