@@ -435,7 +435,7 @@ class Contrast(Table):
     def _check_sides(self) -> Self:
         if len(self.blocks) == 2 and self.conditions is not None:
             raise invalid("specify two blocks, or two conditions of one block", "conditions")
-        if self.form is not None and (self.conditions is not None or self.measure in OF_LEVELS):
+        if self.form is not None and (self.conditions is not None or self.is_of_levels):
             raise invalid("if form is specified, compare its questions or scores between blocks or groups", "form")
         if self.groups is None and self.within is None:
             raise invalid("specify two blocks, or one block and two conditions, or one block and two groups", "blocks")
@@ -463,6 +463,11 @@ class Contrast(Table):
         return self.groups is not None and self.within is not None
 
     @property
+    def is_of_levels(self) -> bool:
+        """Whether the measure is estimated in a block with a design, and is not an answer or a score."""
+        return self.measure in OF_LEVELS
+
+    @property
     def largest_difference(self) -> int:
         """The largest possible difference if the measure is agreement with a statement."""
         return (POINTS - 1) * (2 if self.is_interaction else 1)
@@ -473,9 +478,7 @@ class Contrast(Table):
         if self.form is not None:
             return f"“{self.measure}” ({self.form})"
         words = {"d_prime": "sensitivity (d′)", "pse": "point of subjective equality"}
-        return (
-            words.get(self.measure, self.measure) if self.measure in OF_LEVELS else f"agreement with “{self.measure}”"
-        )
+        return words.get(self.measure, self.measure) if self.is_of_levels else f"agreement with “{self.measure}”"
 
     def effect_words(self, within: tuple[str, str] | None = None, measure: str = "", block: str = "") -> str:
         """Return the compared quantity as text: the measure, or in an interaction the difference in the measure.
@@ -583,7 +586,7 @@ class ExclusionRule(Table):
 
 
 Spending: TypeAlias = Literal["obrien-fleming", "pocock"]
-SPENDINGS: Final[Mapping[Spending, str]] = {"obrien-fleming": "O'Brien–Fleming", "pocock": "Pocock"}
+SPENDINGS: Final[Mapping[str, str]] = {"obrien-fleming": "O'Brien–Fleming", "pocock": "Pocock"}
 """The name of each alpha spending function."""
 
 
@@ -860,8 +863,7 @@ class Protocol(Sessions, Table):
 
     def measure_words(self, contrast: Contrast) -> str:
         """Return the measure of a contrast in words: "threshold", "agreement with “thick”", "“roughness”"."""
-        is_question = contrast.form is None and contrast.measure not in OF_LEVELS
-        if is_question and not self.compares_statement(contrast):
+        if contrast.form is None and not contrast.is_of_levels and not self.compares_statement(contrast):
             return f"“{contrast.measure}”"
         return contrast.measure_words
 

@@ -12,7 +12,7 @@ from typing import Any, Final, Literal, Self, TypeAlias, get_args
 from study_app.analysis.wording import significant
 from study_app.errors import AnalysisError
 from study_app.protocol.blocks import Compared, Phase, block_titles, display_language
-from study_app.protocol.model import SPENDINGS, Analysis, Contrast, Protocol, Published, Spending
+from study_app.protocol.model import SPENDINGS, Analysis, Contrast, Protocol, Published
 from study_app.protocol.participants import RecordedSessions
 from study_app.protocol.presented import link_descriptions
 from study_app.protocol.questionnaires import Instrument, Score
@@ -389,7 +389,7 @@ class Decided:
     falling: tuple[str, ...]
     noticed: str | None
     looks: tuple[int, ...] = ()
-    spending: Spending = "obrien-fleming"
+    spending: str = "obrien-fleming"
     look: int | None = None
     planned_alpha: float | None = None
     trends: Literal["ranks", "slopes"] = "ranks"

@@ -25,7 +25,7 @@ from study_app.errors import AnalysisError
 from study_app.protocol.blocks import Block, block_titles, display_language
 from study_app.protocol.descriptions import describe, limit_rows, number_range
 from study_app.protocol.load import parse, protocol_hash, source_bytes
-from study_app.protocol.model import OF_LEVELS, SPENDINGS, Analysis, Contrast, Protocol
+from study_app.protocol.model import SPENDINGS, Analysis, Contrast, Protocol
 from study_app.protocol.orders import block_orders_by_group, variants
 from study_app.protocol.participants import fewest_participants
 from study_app.protocol.source import text_in
@@ -165,7 +165,7 @@ def hypotheses(protocol: Protocol, language: str) -> Iterator[str]:
 
 def _reduction_words(protocol: Protocol, contrast: Contrast) -> str:
     """Return how several answers or estimates of a participant are reduced to one value; "" for a single estimate."""
-    if contrast.measure in OF_LEVELS:
+    if contrast.is_of_levels:
         blocks = [protocol.blocks[name] for name in contrast.blocks]
         is_averaged = any(block.stimulus is not None and len(protocol.standards_of(block)) > 1 for block in blocks)
         return " (the mean over the standards)" if is_averaged and contrast.measure != "exponent" else ""

@@ -26,7 +26,7 @@ from study_app.analysis.statistics.outcome import FEW, SIDES, doubled_ranks, fal
 from study_app.analysis.wording import listed
 from study_app.errors import AnalysisError
 from study_app.protocol.blocks import Block, display_language
-from study_app.protocol.model import OF_LEVELS, Contrast, Protocol
+from study_app.protocol.model import Contrast, Protocol
 from study_app.protocol.participants import LAPSE_POINTS, SimulatedParticipants, compared_kinds
 from study_app.protocol.questions import POINTS, Question
 from study_app.protocol.simulated import OPINIONS, TrialFeatures, rater, simulate_ratings
@@ -152,7 +152,7 @@ def question_contrasts(protocol: Protocol) -> tuple[Contrast, ...]:
     return tuple(
         contrast
         for contrast in (() if protocol.analysis is None else protocol.analysis.contrasts)
-        if contrast.measure not in OF_LEVELS and not protocol.compares_statement(contrast)
+        if not contrast.is_of_levels and not protocol.compares_statement(contrast)
     )
 
 

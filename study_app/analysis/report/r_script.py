@@ -11,7 +11,6 @@ from study_app.analysis.data.blocks import Block
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.export.table_files import credit_lines
 from study_app.analysis.results import ContrastResult, Results
-from study_app.protocol.model import OF_LEVELS
 
 _LEVEL_TABLES: Final = {"exponent": "exponents", "d_prime": "thresholds", "pse": "settings"}
 """The exported table of each measure of levels that weights all participants equally."""
@@ -42,7 +41,7 @@ def _hypothesis_in_r(study: Study, result: ContrastResult) -> str:
         if question.id == contrast.measure and question.where.id in (contrast.form or contrast.blocks)
     }
     table, codes, skipped = "responses", [""] * len(sides), ""
-    if contrast.measure in OF_LEVELS:
+    if contrast.is_of_levels:
         table = _LEVEL_TABLES.get(contrast.measure, "")
         skipped = "" if table else "thresholds are weighted by their precision"
     elif statement_blocks:

@@ -19,7 +19,7 @@ import numpy as np
 from scipy.special import expit
 from scipy.stats import binomtest
 
-from study_app.analysis.data import Array, Block, Decided, Spending
+from study_app.analysis.data import SPENDINGS, Array, Block, Decided
 from study_app.analysis.evaluate import evaluate_block
 from study_app.analysis.findings import (
     FOUND,
@@ -285,7 +285,7 @@ class Cell:
     extent: _Extent
     participants: int
     looks: tuple[int, ...] = ()
-    spending: Spending = "obrien-fleming"
+    spending: str = "obrien-fleming"
 
     @property
     def name(self) -> str:
@@ -581,7 +581,7 @@ _Count: TypeAlias = Callable[[int, int, int], tuple[Rate, ...]]
 def cells(sizes: Sequence[int] = _SIZES) -> tuple[Cell, ...]:
     """Return every kind of study with every generator and size, and null studies with planned looks."""
     all_cells = [Cell(generator, extent, n) for generator in GENERATORS for extent in EXTENTS for n in sizes]
-    planned_looks = [Cell("ordinal probit", "empty", _LOOKS[-1], _LOOKS, spending) for spending in get_args(Spending)]
+    planned_looks = [Cell("ordinal probit", "empty", _LOOKS[-1], _LOOKS, spending) for spending in SPENDINGS]
     return (*all_cells, *planned_looks)
 
 
