@@ -704,9 +704,10 @@ def contrast_methods(results: Results) -> Iterator[str]:
     if not contrasts:
         return
     yield from _tests_used(contrasts)
-    reductions = f" ({listed(list(_reductions(results)))})".replace(" ()", "")
+    reductions = list(_reductions(results))
+    reductions_note = f" ({listed(reductions)})" if reductions else ""
     yield (
-        f"Each participant contributed one value to each comparison{reductions}. In addition to the t test, "
+        f"Each participant contributed one value to each comparison{reductions_note}. In addition to the t test, "
         "we used a bootstrap that includes one hypothetical participant as extreme as the most extreme participant in "
         "the sample (Gaffke 2005), and a t test corrected for skewness (Hall 1992). The reported p value is the "
         f"largest of the three{_holm_words(contrasts)}."
