@@ -237,13 +237,16 @@ def _check_bound(protocol: Protocol, contrast: Contrast, place: Path) -> Iterato
 
 
 def _check_scales(protocol: Protocol, contrast: Contrast, place: Path) -> Iterator[Fault]:
-    """Check that two blocks measure the answer to a question after trials on the same scale."""
-    questionnaires = () if contrast.form else filter(None, map(protocol.questionnaire_of, contrast.blocks))
-    scales = {
+    """Check that two blocks measure the answer to a question after trials, or a score, on the same scale."""
+    questionnaires = [] if contrast.form else [*filter(None, map(protocol.questionnaire_of, contrast.blocks))]
+    scales: set[object] = {
         (item.kind_id, item.bounds(asked.context(protocol.scales, protocol.study.languages[0])))
         for asked in questionnaires
         for item in asked.items
         if item.id == contrast.measure
+    }
+    scales |= {
+        asked.scores[contrast.measure].model_dump_json() for asked in questionnaires if contrast.measure in asked.scores
     }
     if len(scales) > 1:
         message = f"the two blocks measure {contrast.measure} on different scales"

@@ -217,6 +217,22 @@ groups ="""
         parse(text.encode(), "line.toml")
 
 
+@pytest.mark.parametrize(("combine", "is_refused"), [("sum", False), ("mean", True)])
+def test_two_blocks_are_compared_by_a_score_only_if_it_is_computed_alike(combine: str, is_refused: bool) -> None:
+    """The second block has the same questions in another questionnaire."""
+    before, after = FILE.split("[questionnaires.after]")
+    questions, blocks = after.split("[blocks.first]")
+    other = f"[questionnaires.other]{questions}".replace('combine = "sum"', f'combine = "{combine}"')
+    blocks = blocks.replace('["water"]\nquestionnaire = "after"', '["water"]\nquestionnaire = "other"')
+    text = f"{before}[questionnaires.after]{questions}{other}[blocks.first]{blocks}"
+    text = text.replace('measure = "warm", blocks', 'measure = "both", blocks')
+    if is_refused:
+        with pytest.raises(ProtocolError, match="the two blocks measure both on different scales"):
+            parse(text.encode(), "line.toml")
+    else:
+        assert parse(text.encode(), "line.toml").blocks["second"].questionnaire == "other"
+
+
 def test_only_statements_have_agreement() -> None:
     protocol = parse(FILE.encode(), "line.toml")
     slider = Contrast(measure="thick", blocks=("first",), conditions=("honey", "water"))
