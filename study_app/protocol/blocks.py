@@ -42,6 +42,19 @@ class Criterion(Table):
             raise invalid(f"{self.right} of {self.of} answers cannot be correct: choose at most {self.of}", "right")
         return self
 
+    def condition_text(self, verb: str = "are") -> str:
+        """Return when the block ends as a clause; ``verb`` is "are" or "were"."""
+        if self.right == self.of:
+            answers = "1 answer" if self.of == 1 else f"{self.of} answers in a row"
+            return f"as soon as {answers} {'is' if (self.of, verb) == (1, 'are') else verb} correct"
+        return f"as soon as {self.right} of the last {self.of} answers {verb} correct"
+
+    @property
+    def missed_text(self) -> str:
+        """What happens if the criterion is not met, as a clause."""
+        end = "ends" if self.missed == "end" else "continues after the last trial"
+        return f"if this never happens, the session {end}"
+
 
 class Catch(Table):
     """Easy trials among the others: participants who answer many of them incorrectly are not attending to the task."""
@@ -183,6 +196,9 @@ class Block(Table):
         if content == "a design" and len(self.conditions) < 2:
             message = "the block has one condition, but its design compares at least two"
             raise invalid(message, "conditions", "add another condition")
+        if content == "a design" and self.standard is None:
+            hint = f'write standard = "{self.conditions[0]}", or the condition with which the others are compared'
+            raise invalid("is missing", "standard", hint, use=("standard", self.conditions[0]))
         if content == "a design" and self.standard not in self.conditions:
             raise invalid("must be one of the block's conditions", "standard", use=("standard", self.conditions[0]))
         return self

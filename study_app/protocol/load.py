@@ -264,14 +264,19 @@ def read_document(source: bytes, name: str) -> tuple[dict[str, Any], Places]:
     try:
         document: dict[str, Any] = frozen(tomllib.loads(text))
     except tomllib.TOMLDecodeError as error:  # its message contains the position
-        sentence = re.sub(r" \(at .*\)$", "", str(error))
+        sentence, hint = re.sub(r" \(at .*\)$", "", str(error)), ""
         place = re.search(r"\(at line (\d+), column (\d+)\)", str(error))
         line, column = (int(place[1]), int(place[2])) if place else (text.count("\n") + 1, 1)
+        if declared := re.fullmatch(r"Cannot declare (\(.*\)) twice", sentence):
+            name = ".".join(re.findall(r"'([^']*)'", declared[1]))
+            sentence, hint = f"[{name}] already exists", "combine the two tables, or rename one"
+            if (first := _line_of_header(text, name)) is not None and first < line:
+                sentence = f"{sentence} (line {first})"
         if sentence == "Cannot overwrite a value":
             key, equals, _ = text.splitlines()[line - 1].partition("=")
             sentence = f"the key {key.strip()} occurs twice in this table" if equals else "a key occurs twice"
         broken = Problem(
-            "file", f"invalid TOML at column {column}: {sentence}", line, hint="see toml.io for the notation"
+            "file", f"invalid TOML at column {column}: {sentence}", line, hint=hint or "see toml.io for the notation"
         )
         raise ProtocolError(name, (broken,)) from error
     except RecursionError as error:
@@ -280,6 +285,13 @@ def read_document(source: bytes, name: str) -> tuple[dict[str, Any], Places]:
     except ValueError as error:  # Python's limit of digits; the message does not contain the position
         raise ProtocolError(name, (Problem("file", "contains a whole number with more than 64 bits"),)) from error
     return document, Places(text)
+
+
+def _line_of_header(text: str, name: str) -> int | None:
+    """Return the line of the first header of a table in a TOML text, or None."""
+    headers = ((number, line.partition("#")[0].strip()) for number, line in enumerate(text.splitlines(), start=1))
+    found = (number for number, line in headers if re.sub(r"[\s\"']", "", line) in (f"[{name}]", f"[[{name}]]"))
+    return next(found, None)
 
 
 def _validate(model: type[_M], document: Mapping[str, Any]) -> tuple[_M | None, list[Fault]]:

@@ -31,7 +31,7 @@ from study_app.ids import file_name_fault
 from study_app.protocol.blocks import Block, Compared, Kind, OrderOfBlocks
 from study_app.protocol.participants.groups import Group, GroupAssignment, Sequences, Sessions, Steps, parts_by_block
 from study_app.protocol.participants.raters import SimulatedParticipants
-from study_app.protocol.quantities import MAX_FORCE_N
+from study_app.protocol.quantities import MAX_FORCE_N, quoted_title, with_article
 from study_app.protocol.questionnaires import Questionnaire
 from study_app.protocol.questions import POINTS, Scale
 from study_app.protocol.source.table import Body as PageBody
@@ -368,7 +368,7 @@ class Published(Table):
     )
     source: Brief = Field(default="", description="The publication that reports the value.")
 
-    def value_words(self, unit: str) -> str:
+    def value_text(self, unit: str) -> str:
         """Return the value with its measure, such as "PSE 3 ms"; ``unit`` is that of the varied parameter."""
         names = {"weber": "Weber fraction", "pse": "PSE"}
         value_unit = unit if self.measure in ("threshold", "pse") else ""
@@ -382,11 +382,13 @@ class Published(Table):
             "" if self.n is None else f", n = {self.n}",
             f", {self.source}" if self.source else "",
         )
-        return f"{self.block}: {self.value_words(unit)}{''.join(details)}"
+        return f"{self.block}: {self.value_text(unit)}{''.join(details)}"
 
 
 OF_LEVELS: Final = ("threshold", "exponent", "d_prime", "pse")
 """The measures of blocks with levels that contrasts can compare."""
+MEAN_SETTING: Final = "mean setting"
+"""The measure `pse` of a block in which participants set the level without a standard."""
 
 
 class Contrast(Table):
@@ -438,7 +440,9 @@ class Contrast(Table):
         if self.form is not None and (self.conditions is not None or self.is_of_levels):
             raise invalid("if form is specified, compare its questions or scores between blocks or groups", "form")
         if self.groups is None and self.within is None:
-            raise invalid("specify two blocks, or one block and two conditions, or one block and two groups", "blocks")
+            hint = "to compare two standards, use a separate block for each" * self.is_of_levels
+            message = "specify two blocks, or one block and two conditions, or one block and two groups"
+            raise invalid(message, "blocks", hint)
         for first, second in filter(None, (self.groups, self.within)):
             if first == second:
                 raise invalid(f'compares "{first}" with itself', "blocks")
@@ -473,20 +477,20 @@ class Contrast(Table):
         return (POINTS - 1) * (2 if self.is_interaction else 1)
 
     @property
-    def measure_words(self) -> str:
-        """The measure in words: "threshold", "agreement with “thick”"; see also `Protocol.measure_words`."""
+    def measure_text(self) -> str:
+        """The measure in words: "threshold", "agreement with “thick”"; see also `Protocol.measure_text`."""
         if self.form is not None:
             return f"“{self.measure}” ({self.form})"
         words = {"d_prime": "sensitivity (d′)", "pse": "point of subjective equality"}
         return words.get(self.measure, self.measure) if self.is_of_levels else f"agreement with “{self.measure}”"
 
-    def effect_words(self, within: tuple[str, str] | None = None, measure: str = "", block: str = "") -> str:
+    def effect_text(self, within: tuple[str, str] | None = None, measure: str = "", block: str = "") -> str:
         """Return the compared quantity as text: the measure, or in an interaction the difference in the measure.
 
         ``within`` are the names of the two blocks or conditions, ``measure`` is the name of the measure and ``block``
         that of a single block; by default, IDs are used.
         """
-        measure = measure or self.measure_words
+        measure = measure or self.measure_text
         if self.groups is None or self.within is None:
             return measure
         block_text = "" if len(self.blocks) == 2 else f" in {quoted_title(block) or f'block {self.blocks[0]}'}"
@@ -512,7 +516,7 @@ class Contrast(Table):
         measure: str = "",
         block: str = "",
     ) -> str:
-        """Return the hypothesis as a sentence; ``names`` are those of the two sides, for others see `effect_words`."""
+        """Return the hypothesis as a sentence; ``names`` are those of the two sides, for others see `effect_text`."""
         first, second = map(quoted_title, names or self.compared)
         block_name = quoted_title(block) or f"block {self.blocks[0]}"
         where = "" if len(self.blocks) == 2 or self.is_interaction else f" in {block_name}"
@@ -520,12 +524,8 @@ class Contrast(Table):
         joint = "and" if self.expected is None else "than in"
         bound = "" if self.bound is None else f", with an equivalence bound of {self.bound:g}"
         kind = " (interaction)" if self.is_interaction else ""
-        return f"{self.effect_words(within, measure, block)} {verb} {first} {joint} {second}{kind}{where}{bound}"
-
-
-def quoted_title(name: str) -> str:
-    """Return a title of several words in quotation marks, so that a sentence can contain it."""
-    return f"“{name}”" if " " in name and not name.startswith("“") and not name.endswith(")") else name
+        subject = with_article(self.effect_text(within, measure, block))
+        return f"{subject} {verb} {first} {joint} {second}{kind}{where}{bound}"
 
 
 BELOW_CHANCE_P: Final = 0.001
@@ -660,12 +660,12 @@ class Analysis(Table):
         *,
         units: Mapping[str, str],
         statements: bool,
-        measure_words: Callable[[Contrast], str],
+        measure_text: Callable[[Contrast], str],
     ) -> Iterator[tuple[str, str]]:
         """Yield a row for each decision.
 
         ``named_by`` states which item names each condition; ``units`` maps blocks to the unit of the varied parameter;
-        ``measure_words`` returns the measure of a hypothesis in words.
+        ``measure_text`` returns the measure of a hypothesis in words.
 
         Decisions about statements are omitted unless the study tests ``statements``.
         """
@@ -682,7 +682,7 @@ class Analysis(Table):
             yield "Precision", f"half-width of the 95 % confidence interval for the group mean: {width}"
         yield from (("Proposes exclusion", rule.words) for rule in self.exclusions)
         for contrast in self.contrasts:
-            yield "Hypothesis", contrast.described(measure=measure_words(contrast))
+            yield "Hypothesis", contrast.described(measure=measure_text(contrast))
         yield from (("Published", value.described(units.get(value.block, ""))) for value in self.published)
 
     def _statement_decisions(self, named_by: Sequence[str]) -> Iterator[tuple[str, str]]:
@@ -861,11 +861,20 @@ class Protocol(Sessions, Table):
         questionnaires = () if contrast.form else filter(None, map(self.questionnaire_of, contrast.blocks))
         return any(item.id == contrast.measure for asked in questionnaires for item in asked.statements)
 
-    def measure_words(self, contrast: Contrast) -> str:
-        """Return the measure of a contrast in words: "threshold", "agreement with “thick”", "“roughness”"."""
+    def measure_text(self, contrast: Contrast) -> str:
+        """Return the measure of a contrast in words: "threshold", "agreement with “thick”", "“roughness”".
+
+        A threshold can be a point of subjective equality, see `Stimulus.has_pse`; without a standard, `pse` is the mean
+        setting.
+        """
         if contrast.form is None and not contrast.is_of_levels and not self.compares_statement(contrast):
             return f"“{contrast.measure}”"
-        return contrast.measure_words
+        block = self.blocks[contrast.blocks[0]]
+        if contrast.measure == "threshold" and block.stimulus is not None:
+            return self.stimulus_of(block).threshold_term(self.design_of(block))
+        if contrast.measure == "pse" and block.design is not None and self.design_of(block).intervals == 1:
+            return MEAN_SETTING
+        return contrast.measure_text
 
     def measures_of(self, block: Block) -> tuple[str, ...]:
         """Return the measures of `OF_LEVELS` that the answers of a block with a design determine.

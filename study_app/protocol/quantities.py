@@ -107,7 +107,7 @@ def can_vary(name: str) -> bool:
     )
 
 
-def quantity_words(name: str) -> str:
+def quantity_text(name: str) -> str:
     """Return the name of a quantity for use within a sentence, such as "viscosity" or "wake scaling"."""
     parameter = quantity(name)
     effect = NAMED.get(_table_name(parameter.name))
@@ -115,7 +115,7 @@ def quantity_words(name: str) -> str:
     return label.lower()
 
 
-def liquid_words(liquid: Mapping[str, Any]) -> str:
+def liquid_text(liquid: Mapping[str, Any]) -> str:
     """Return the text on a liquid's density, effects and parameters other than defaults, from its JSON table."""
     damping, viscosity, effects = liquid["drag"].get("damping_nspm"), liquid.get("viscosity_pa_s"), liquid["effects"]
     phrases = [f"{liquid['density_kg_m3']:g} kg/m³"] if damping is None else [f"damping {damping:g} N·s/m at the hand"]
@@ -161,3 +161,16 @@ def _parameter_texts(table: str, values: Mapping[str, Any], defaults: Any = None
 
 def _table_name(name: str) -> str:
     return name.partition(".")[0]
+
+
+_COUNTABLE = ("exponent", "mean setting", "point of subjective equality", "threshold")
+
+
+def with_article(measure: str) -> str:
+    """Return a measure as the subject of a sentence: "the threshold", but "sensitivity (d′)"."""
+    return f"the {measure}" if measure.startswith(_COUNTABLE) or " score" in measure else measure
+
+
+def quoted_title(name: str) -> str:
+    """Return a title of several words in quotation marks, so that a sentence can contain it."""
+    return f"“{name}”" if " " in name and not name.startswith("“") and not name.endswith(")") else name

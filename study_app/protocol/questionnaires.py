@@ -127,6 +127,13 @@ class Questionnaire(Table):
         """The IDs of the items whose answers are numbers, and the names of the scores."""
         return (*(item.id for item in self.items if item.value_type != "text"), *self.scores)
 
+    def ranges(self, scales: Mapping[str, Scale], language: str) -> dict[str, float]:
+        """Return the difference between the largest and the smallest value of each limited `numeric_measures`."""
+        context = self.context(scales, language)
+        bounds = {item.id: item.bounds(context) for item in self.items}
+        ends = bounds | {name: score.range_of(bounds) for name, score in self.scores.items()}
+        return {name: pair[1] - pair[0] for name, pair in ends.items() if pair is not None}
+
     def item(self, item_id: str) -> Question:
         """Return the item with an ID; raise KeyError if there is none."""
         return self._items_by_id[item_id]

@@ -46,7 +46,10 @@ class Scale(Table):
     @field_validator("labels", mode="before")
     @classmethod
     def _check_label_counts(cls, labels: Any) -> Any:
-        """Reject a language with fewer labels than another one."""
+        """Reject labels without a language, and a language with fewer labels than another one."""
+        if isinstance(labels, tuple):
+            hint = "write labels.en = […], or labels in the study's languages"
+            raise invalid("must be a table with an array for each language, not an array", hint=hint)
         items = labels.items() if isinstance(labels, Mapping) else ()
         tuples = {code: texts for code, texts in items if isinstance(texts, tuple)}
         count = max(map(len, tuples.values()), default=0)
@@ -425,13 +428,13 @@ class NumberView(ItemView):
 
     def simulated(self, opinion: float, draw: Draw) -> Value:
         """Return a number within its bounds, or within 0 to 100 without bounds."""
-        least = self.least if self.least is not None else min(0.0, self.most if self.most is not None else 0.0)
-        most = self.most if self.most is not None else least + 100.0
+        minimum = self.least if self.least is not None else min(0.0, self.most if self.most is not None else 0.0)
+        maximum = self.most if self.most is not None else minimum + 100.0
         fraction = min(1.0, max(0.0, (opinion - 1) / (_OPINION_POINTS - 1)))
-        number = least + fraction * (most - least)
+        number = minimum + fraction * (maximum - minimum)
         if self.whole:
-            return min(math.floor(most), max(math.ceil(least), round(number)))
-        return plain_number(min(most, max(least, round(number, 3))))
+            return min(math.floor(maximum), max(math.ceil(minimum), round(number)))
+        return plain_number(min(maximum, max(minimum, round(number, 3))))
 
 
 class Number(Question):
@@ -455,8 +458,8 @@ class Number(Question):
     @model_validator(mode="after")
     def _check_range(self) -> Self:
         if self.least is not None and self.most is not None:
-            least = math.ceil(self.least) if self.whole else self.least
-            if self.most < least:
+            minimum = math.ceil(self.least) if self.whole else self.least
+            if self.most < minimum:
                 raise invalid(f"{self.most:g} is less than from = {self.least:g}", "to")
         return self
 
@@ -468,9 +471,9 @@ class Number(Question):
     def problem(self, answer: Value, context: Context) -> str | None:
         if isinstance(answer, int | float) and self.view(0, context).permits(answer):
             return None
-        least = "" if self.least is None else " above 0" if self.least == POSITIVE else f" from {self.least:g}"
-        most = "" if self.most is None else f" to {self.most:g}"
-        return f"answer {answer} is not permitted: specify a {'whole ' if self.whole else ''}number{least}{most}"
+        minimum = "" if self.least is None else " above 0" if self.least == POSITIVE else f" from {self.least:g}"
+        maximum = "" if self.most is None else f" to {self.most:g}"
+        return f"answer {answer} is not permitted: specify a {'whole ' if self.whole else ''}number{minimum}{maximum}"
 
     def bounds(self, context: Context) -> tuple[float, float] | None:
         return None if self.least is None or self.most is None else (self.least, self.most)
@@ -570,7 +573,7 @@ class TextView(ItemView):
 
 
 class Text(Question):
-    """A free text."""
+    """A free-text answer."""
 
     widget: ClassVar[str] = "text"
     measure: ClassVar[str] = "texts"

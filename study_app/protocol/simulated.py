@@ -57,8 +57,8 @@ class TrialFeatures:
     speed_rms_mps
         Root mean square of the hand's (estimated, not differenced) speed [m/s].
     push_share
-        Share, 0 to 1, of the force's power along the motion: Σ of positive F·v over Σ |F·v|. It is 0 for pure drag,
-        and larger for a wake that carries the hand.
+        Proportion, 0 to 1, of the force's power along the motion: Σ of positive F·v over Σ |F·v|. It is 0 for pure
+        drag, and larger for a wake that carries the hand.
     roughness_n
         Root mean square of the change of the force from one tick to the next [N].
     delay_s

@@ -116,7 +116,7 @@ def damping(force_n: Vectors, moved: Motion) -> tuple[float, float] | None:
 
 
 def sent_share(sent_n: Vectors, model_n: Vectors) -> float | None:
-    """Return the share of the model force that was sent, Σ F_sent·F_model / Σ |F_model|²; None without force.
+    """Return the proportion of the model force that was sent, Σ F_sent·F_model / Σ |F_model|²; None without force.
 
     Parameters
     ----------

@@ -38,8 +38,8 @@ class Sensitivity:
     Attributes
     ----------
     d_prime : float
-        Under ``model``. Below chance, it is minus the d′ of a share equally far above chance, so that the mean over
-        observers who guess is 0.
+        Under ``model``. Below chance, it is minus the d′ of a proportion equally far above chance, so that the mean
+        over observers who guess is 0.
     criterion : float or None
         c of yes–no and of two-interval forced choice, k of the differencing model of same–different; else None.
     variance : float or None
@@ -58,7 +58,7 @@ class Sensitivity:
 
 
 def rate(count: float, n: float) -> float:
-    """Return the share ``count`` of ``n`` with the log-linear correction: (count + ½)/(n + 1)."""
+    """Return the proportion ``count`` of ``n`` with the log-linear correction: (count + ½)/(n + 1)."""
     return (count + 0.5) / (n + 1.0)
 
 
@@ -96,8 +96,8 @@ def yes_no(hits: float, signals: float, false_alarms: float, noises: float) -> S
     high, low = rate(hits, signals), rate(false_alarms, noises)
     z_high, z_low = NORMAL.inv_cdf(high), NORMAL.inv_cdf(low)
     variance = sum(
-        share * (1 - share) / (n * NORMAL.pdf(z) ** 2)
-        for share, n, z in ((high, signals, z_high), (low, noises, z_low))
+        proportion * (1 - proportion) / (n * NORMAL.pdf(z) ** 2)
+        for proportion, n, z in ((high, signals, z_high), (low, noises, z_low))
     )
     return Sensitivity(d_prime=z_high - z_low, criterion=-0.5 * (z_high + z_low), variance=variance)
 
@@ -153,7 +153,7 @@ def same_different(hits: float, differents: float, false_alarms: float, sames: f
     if not differents or not sames:
         return None
     high, low = rate(hits, differents), rate(false_alarms, sames)
-    k, k_of_fewer = (-math.sqrt(2.0) * NORMAL.inv_cdf(share / 2.0) for share in (low, min(low, high)))
+    k, k_of_fewer = (-math.sqrt(2.0) * NORMAL.inv_cdf(proportion / 2.0) for proportion in (low, min(low, high)))
     distance = _inverse(partial(different_rate, k=k_of_fewer), max(low, high))
     differencing = distance if high >= low else 0.0 - distance
     unbiased = NORMAL.cdf(0.5 * (NORMAL.inv_cdf(high) - NORMAL.inv_cdf(low)))
@@ -175,8 +175,8 @@ def rating(noise: ArrayLike, signal: ArrayLike) -> Sensitivity | None:
     Parameters
     ----------
     noise, signal : array
-        The ratings of the lowest level and of another level. AUC is the Mann–Whitney share of pairs in which the
-        signal is rated higher; ties count half, and the share has the log-linear correction.
+        The ratings of the lowest level and of another level. AUC is the Mann–Whitney proportion of pairs in which the
+        signal is rated higher; ties count half, and the proportion has the log-linear correction.
     """
     low, high = np.sort(np.asarray(noise, float)), np.asarray(signal, float)
     if not low.size or not high.size:

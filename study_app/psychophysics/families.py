@@ -83,5 +83,5 @@ def success(
 
 def level_at(family: Family, percent: float, threshold: float, width: float, guess: float, lapse: float) -> float:
     """Return the level u at which ψ is ``percent``; NaN if ψ never reaches it."""
-    share = (percent / 100.0 - guess) / (1.0 - guess - lapse)
-    return threshold + width * position(family, share) if 0.0 < share < 1.0 else math.nan
+    proportion = (percent / 100.0 - guess) / (1.0 - guess - lapse)
+    return threshold + width * position(family, proportion) if 0.0 < proportion < 1.0 else math.nan

@@ -10,12 +10,12 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
-from typing import Final, NamedTuple
+from typing import Final, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from study_app.psychophysics.families import CLIP, Family, success
+from study_app.psychophysics.families import CLIP, Family, Floats, success
 
 Values = tuple[float, ...]
 
@@ -27,9 +27,29 @@ FREE_GUESSES: Final[Values] = (0.01, 0.02, 0.05, 0.1, 0.2, 0.3)
 """Guess rates of the grid if noise trials determine the guess rate."""
 
 
+JND_WIDTH: Final = 0.205
+"""The just-noticeable difference, from 50 to 75 % of the rise of a cumulative normal, as a proportion of its width."""
 _OUTER_SHARE: Final = 0.05
 _OPEN_MASS: Final = 0.005
-"""The largest posterior mass in the outer share of the grid at which an interval's end is not open. [choice]"""
+"""The largest posterior mass in the outer part of the grid at which an interval's end is not open. [choice]"""
+
+
+DecadeKind: TypeAlias = Literal["constant", "threshold", "jnd"]
+"""What a change of a threshold by a decade is in u.
+
+constant: 1, because u is the logarithm of a level; threshold: proportional to the threshold, because u is the level;
+jnd: proportional to the just-noticeable difference, for a point of subjective equality, whose distance from zero does
+not affect how precisely levels are compared.
+"""
+
+
+def decade_in_u(kind: DecadeKind, threshold: ArrayLike, width: float) -> Floats:
+    """Return the change of each threshold that corresponds to a decade; all numbers are in u."""
+    thresholds = np.asarray(threshold, float)
+    if kind == "constant":
+        return np.ones(thresholds.shape)
+    sizes = np.abs(thresholds) if kind == "threshold" else np.full(thresholds.shape, JND_WIDTH * width)
+    return math.log(10) * sizes
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,11 +70,10 @@ class Grid:
         The lapse rates and their prior weights.
     guesses : tuple of float or None
         Guess rates, of equal prior weight; None: the guess rate equals the lapse rate.
-    session_sd : tuple of float
-        Standard deviation of a person's threshold between sessions: a constant part [u], and a part relative to the
-        threshold.
-    log : bool
-        Whether u is the logarithm of a level.
+    session_sd : float
+        Standard deviation of a person's threshold between sessions [decades].
+    decade : DecadeKind
+        What a change of the threshold by a decade is in u.
     """
 
     family: Family
@@ -64,8 +83,8 @@ class Grid:
     lapses: Values
     lapse_prior: Values
     guesses: Values | None
-    session_sd: tuple[float, float] = (0.0, 0.0)
-    log: bool = True
+    session_sd: float = 0.0
+    decade: DecadeKind = "constant"
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -140,7 +159,7 @@ class Posterior:
     def interval(self) -> tuple[float, float]:
         """The equal-tailed 95 % interval of the person's threshold [u], widened by `session_sd`."""
         middle, session_reach = self.threshold, Z_95 * self.session_sd
-        below, above = (math.hypot(self.quantile(share) - middle, session_reach) for share in (0.025, 0.975))
+        below, above = (math.hypot(self.quantile(proportion) - middle, session_reach) for proportion in (0.025, 0.975))
         return middle - below, middle + above
 
     @property
@@ -150,10 +169,14 @@ class Posterior:
         return bool(self.marginal[:outer].sum() > _OPEN_MASS), bool(self.marginal[-outer:].sum() > _OPEN_MASS)
 
     @cached_property
+    def decade(self) -> float:
+        """The change of the person's threshold [u] that corresponds to a decade."""
+        return float(decade_in_u(self.grid.decade, self.threshold, self.others.width))
+
+    @cached_property
     def session_sd(self) -> float:
         """The standard deviation of the person's threshold between sessions [u]."""
-        constant, share = self.grid.session_sd
-        return math.hypot(constant, share * self.threshold)
+        return self.grid.session_sd * self.decade
 
     @property
     def variance(self) -> float:
@@ -201,9 +224,7 @@ def fit(levels: ArrayLike, successes: ArrayLike, failures: ArrayLike, grid: Grid
     grid : Grid
         The cells and their prior.
     """
-    _, *logarithms = tables(
-        replace(grid, width_prior=None, session_sd=(0.0, 0.0)), tuple(np.asarray(levels, float).tolist())
-    )
+    _, *logarithms = tables(replace(grid, width_prior=None, session_sd=0.0), tuple(np.asarray(levels, float).tolist()))
     return posterior(grid, [log_likelihood(successes, failures, *logarithms)])
 
 
@@ -236,7 +257,7 @@ def tables(grid: Grid, levels: Values) -> tuple[NDArray[np.float64], ...]:
 
 
 ALIKE: Final = 0.6
-"""Share of the standard deviation of log widths that is between people of a group; the rest is common. [choice]"""
+"""Proportion of the standard deviation of log widths that is between people of a group; the rest is common. [choice]"""
 _APART: Final = (0.05, 0.1, 0.2)
 """Standard deviations of the thresholds of people of one group [range of thresholds]. [choice]"""
 MEAN_LAPSE: Final = 0.03

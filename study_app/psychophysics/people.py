@@ -39,7 +39,7 @@ class Person(NamedTuple):
     width : float
         Width of the psychometric function, relative to that of an observer whose d′ is proportional to the level.
     lapse : float
-        Share of random answers; with k alternatives, one in k of them is correct.
+        Proportion of random answers; with k alternatives, one in k of them is correct.
     criterion, repeats : float
         Preference for the first interval, and for the last answer [SD of the decision].
     change : float
@@ -53,7 +53,7 @@ class Person(NamedTuple):
     change: float = 1.0
 
     def lapse_rate(self, answers: int) -> float:
-        """Return the share of wrong answers at any level, if one of ``answers`` possible answers is correct."""
+        """Return the proportion of wrong answers at any level, if one of ``answers`` possible answers is correct."""
         return self.lapse * (1.0 - 1.0 / answers)
 
     def relative_threshold(self, done: float) -> float:
@@ -140,6 +140,8 @@ class Expected:
         Standard deviation of the estimate's error, in u, for each kind; infinite if nothing is measured.
     threshold : float
         Approximate threshold, as a level; or the assumed d′, d_a or exponent.
+    decade : float
+        Change of the threshold, in u, that corresponds to a decade.
     shared : mapping of str to float
         For each kind, the variance of a group's mean due to the common width and lapse rate, multiplied by the number
         of people, because it is about inversely proportional to that number.
@@ -151,6 +153,7 @@ class Expected:
     halves: Mapping[str, Sequence[float]]
     spreads: Mapping[str, float]
     threshold: float
+    decade: float
     shared: Mapping[str, float] = field(default_factory=dict)
 
     @property
@@ -187,7 +190,7 @@ class Expected:
         if participants < 2:
             return math.inf
         log = self.spacing == "log"
-        between = math.log10(BETWEEN_PEOPLE) if log else self.threshold * math.log(BETWEEN_PEOPLE)
+        between = math.log10(BETWEEN_PEOPLE) * self.decade
         fewer, t = self.trials / (trials or self.trials), student_975(participants - 1)
         halves = [
             math.hypot(
@@ -197,7 +200,9 @@ class Expected:
             for kind, spread in self.spreads.items()
         ]
         half = float(np.median(halves)) / math.sqrt(participants)
-        return 10.0**half - 1.0 if log else half / self.threshold
+        if log:
+            return float(10.0**half) - 1.0
+        return half / abs(self.threshold) if self.threshold else math.inf
 
     def participants_for(self, precision: float, most: int = 1000) -> int | None:
         """Return the fewest participants for a relative half width of ``precision``; None: more than ``most``."""

@@ -1,6 +1,6 @@
 """The fit to the answers of one person, corrected for preferences and for a change of the threshold over the trials.
 
-A preference for one of two intervals or for the last answer, and a changing threshold, reduce the share of correct
+A preference for one of two intervals or for the last answer, and a changing threshold, reduce the proportion of correct
 answers. Both are estimated from the answers, and their effects are removed from the posterior.
 """
 
@@ -96,12 +96,10 @@ class PersonAnswers(NamedTuple):
             shifts, parts = new_shifts, _likelihoods(self, new_shifts, grid)
             fitted = posterior(grid, [reduce(np.add, parts.values())])
         score, information = _time_score(self, fitted, shifts, self.done)
-        decade_u = 1.0 if grid.log else abs(fitted.threshold) * math.log(10)
-        sd, has_changed = math.log10(CHANGE_PRIOR) * decade_u, score**2 > BEYOND_CHANCE**2 * information
+        sd, has_changed = math.log10(CHANGE_PRIOR) * fitted.decade, score**2 > BEYOND_CHANCE**2 * information
         change = score / (information + sd**-2) if sd else 0.0
-        constant, share = grid.session_sd
         if has_changed:
-            grid = replace(grid, session_sd=(math.hypot(constant, change / math.sqrt(12)), share))
+            grid = replace(grid, session_sd=math.hypot(grid.session_sd, change / fitted.decade / math.sqrt(12)))
         return PersonFit(self, shifts, change, has_changed, _posterior(parts, sd * _CHANGES, grid, _CHANGE_WEIGHTS))
 
 
@@ -131,7 +129,7 @@ class PersonFit:
     flat: Posterior
 
     def expected(self, posterior: Posterior) -> Floats:
-        """Return the share of successes in each trial (n,) predicted by the function with all median parameters."""
+        """Return the proportion of successes in each trial (n,), predicted with all median parameters."""
         psi = posterior.success(self.answers.levels)
         return with_preference(psi[self.answers.places], posterior.others.lapse, self.shifts)
 
@@ -145,7 +143,7 @@ class PersonFit:
 
 def _likelihoods(answers: PersonAnswers, shifts: Floats, grid: Grid) -> dict[float, NDArray[np.float64]]:
     """Return the log likelihood of the answers before (−1), at (0) and after (1) the middle trial."""
-    flat = replace(grid, width_prior=None, session_sd=(0.0, 0.0))
+    flat = replace(grid, width_prior=None, session_sd=0.0)
     u, k = tuple(answers.levels.tolist()), len(answers.levels)
     log_likelihoods = dict.fromkeys((-1.0, 0.0, 1.0), np.zeros(grid.shape))
     halves = np.sign(answers.done - 0.5)
@@ -180,9 +178,9 @@ def _shift_cells(values: NDArray[np.float64], cells: float) -> NDArray[np.float6
     if not cells:
         return values
     whole = math.floor(cells)
-    share = cells - whole
+    proportion = cells - whole
     neighbours = values[np.clip(np.arange(len(values) + 1) + whole, 0, len(values) - 1)]
-    return np.asarray(neighbours[:-1] * (1.0 - share) + neighbours[1:] * share, float)
+    return np.asarray(neighbours[:-1] * (1.0 - proportion) + neighbours[1:] * proportion, float)
 
 
 def _time_score(answers: PersonAnswers, fitted: Posterior, shifts: Floats, course: Floats) -> tuple[float, float]:
@@ -276,10 +274,14 @@ def _preferences(answers: PersonAnswers, fitted: Posterior) -> Floats:
     predictors, weights = np.column_stack([constant, answers.before]), np.zeros(2)
     for _ in range(_SCORING_STEPS):
         decision = chosen * (evidence + predictors @ weights)
-        share = np.clip(lapse + (1.0 - 2.0 * lapse) * np.interp(decision, z, of_z), CLIP, 1.0 - CLIP)
+        proportion = np.clip(lapse + (1.0 - 2.0 * lapse) * np.interp(decision, z, of_z), CLIP, 1.0 - CLIP)
         slope = (1.0 - 2.0 * lapse) * np.exp(-0.5 * decision**2) / math.sqrt(2 * math.pi)
-        information = (predictors.T * (slope**2 / (share * (1.0 - share)))) @ predictors + np.eye(2) / PREFERENCE_SD**2
-        weights += np.linalg.solve(information, predictors.T @ (chosen * slope / share) - weights / PREFERENCE_SD**2)
+        information = (predictors.T * (slope**2 / (proportion * (1.0 - proportion)))) @ predictors + np.eye(
+            2
+        ) / PREFERENCE_SD**2
+        weights += np.linalg.solve(
+            information, predictors.T @ (chosen * slope / proportion) - weights / PREFERENCE_SD**2
+        )
     return np.asarray(first * np.round(predictors @ weights / _PREFERENCE_STEP) * _PREFERENCE_STEP + 0.0, float)
 
 

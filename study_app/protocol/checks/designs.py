@@ -26,7 +26,7 @@ from study_app.protocol.trials.stimuli import DELAY, OF_CONDITION, OF_LINK, Stim
 _LEAST_MS: Final = 1e-3
 """Smallest difference between two times that counts as different [ms]: a thousandth of a tick. [choice]"""
 _LEAST_SHARE: Final = 1e-6
-"""Smallest difference between two other numbers that counts as different, as a share of the standard. [choice]"""
+"""Smallest difference between two other numbers that counts as different, as a proportion of the standard. [choice]"""
 
 
 def check_kinds(document: Mapping[str, Any]) -> Iterator[Fault]:
@@ -207,6 +207,12 @@ def _check_contrast(protocol: Protocol, contrast: Contrast, place: Path) -> Iter
                 f"{contrast.measure} is a {kinds[contrast.measure]}, but hypotheses compare numbers",
                 "choose a statement, rating, slider, number or score",
             )
+        elif "threshold" in known and contrast.measure in _other_terms(protocol, block):
+            yield Fault(
+                (*place, "measure"),
+                f'is "{contrast.measure}", but block "{name}" measures it as its threshold',
+                'measure = "threshold"',
+            )
         elif contrast.measure not in known:
             yield unknown_name(
                 (*place, "measure"), f'block "{name}" does not measure {contrast.measure}', contrast.measure, known
@@ -219,6 +225,14 @@ def _check_contrast(protocol: Protocol, contrast: Contrast, place: Path) -> Iter
         if contrast.conditions is not None and block.design is not None:
             message = f"block {name} has one result for all its conditions, because it has a design"
             yield Fault((*place, "conditions"), message, "compare two blocks instead")
+
+
+def _other_terms(protocol: Protocol, block: Block) -> tuple[str, ...]:
+    """Return the terms that people use for the threshold of a block with a stimulus."""
+    stimulus = protocol.stimulus_of(block)
+    if stimulus.has_pse(protocol.design_of(block)):
+        return ("pse",)
+    return {"weber": ("weber", "jnd"), "difference": ("jnd",)}.get(stimulus.level_kind, ())
 
 
 def _check_bound(protocol: Protocol, contrast: Contrast, place: Path) -> Iterator[Fault]:

@@ -38,7 +38,7 @@ from study_app.protocol.trials.stimuli import OF_LINK, Stimulated, Stimulus
 from study_app.protocol.trials.tasks import Stroke
 
 _LEAST_SHARE: Final = 0.99
-"""Smallest share of a damper's force that the velocity estimator must pass."""
+"""Smallest proportion of a damper's force that the velocity estimator must pass."""
 LIMIT_J: Final = 0.5e-3
 """Returned energy up to which a late force is delivered [J]; measured in docs/late-force.md."""
 _MAX_NAMED: Final = 4
@@ -79,12 +79,12 @@ def _check_estimator_lag(protocol: Protocol) -> Iterator[Fault]:
         laws = {liquid.drag.law for scene in scenes for liquid in scene.liquids}
         if not isinstance(task, Follow) or "linear" not in laws:
             continue
-        if (share := passed_share(velocity, rate_hz, task.frequency_hz)) < _LEAST_SHARE:
+        if (proportion := passed_share(velocity, rate_hz, task.frequency_hz)) < _LEAST_SHARE:
             most_hz = _round_down(fastest_hz(velocity, rate_hz, _LEAST_SHARE), 1)
             yield Fault(
                 ("tasks", name, "frequency_hz"),
-                f"at {task.frequency_hz:g} Hz the velocity estimator passes only {100 * share:.1f} % of a damper's "
-                "force",
+                f"at {task.frequency_hz:g} Hz the velocity estimator passes only {100 * proportion:.1f} % of a "
+                "damper's force",
                 f"choose at most {most_hz:g} Hz, where it passes {100 * _LEAST_SHARE:g} %",
             )
 
@@ -290,7 +290,7 @@ def passed_share(velocity: Velocity, rate_hz: float, frequency_hz: float) -> flo
 
 
 def fastest_hz(velocity: Velocity, rate_hz: float, share: float) -> float:
-    """Return the highest frequency up to 20 Hz at which an estimator passes at least this share [Hz, to 1 mHz]."""
+    """Return the highest frequency up to 20 Hz at which an estimator passes at least this proportion [Hz, to 1 mHz]."""
     mhz = range(1, 20_000)
     return (
         bisect_left(mhz, True, key=lambda frequency_mhz: passed_share(velocity, rate_hz, frequency_mhz / 1000) < share)
@@ -299,7 +299,7 @@ def fastest_hz(velocity: Velocity, rate_hz: float, share: float) -> float:
 
 
 def check_returned_energy(protocol: Protocol) -> Iterator[Fault]:
-    """Yield faults of blocks with levels in a paced task whose delayed force returns too much energy."""
+    """Yield a fault for each block with levels and a paced task if its delayed force returns too much energy."""
     blocks_and_strokes = (
         (block, task.fastest_stroke(protocol.device.workspace_m))
         for block in protocol.blocks.values()

@@ -7,6 +7,8 @@ from study_app.protocol.descriptions.protocol_text import (
     limit_label,
     limit_rows,
     number_range,
+    shows_feedback,
+    trials_text,
 )
 
 __all__ = [
@@ -18,4 +20,6 @@ __all__ = [
     "limit_label",
     "limit_rows",
     "number_range",
+    "shows_feedback",
+    "trials_text",
 ]

@@ -13,13 +13,13 @@ from study_app.haptics.model.scene import Scene
 from study_app.haptics.model.slope_limits import slope_limit, steady_force
 from study_app.number_text import capitalised, counted
 from study_app.protocol.model import Block, Condition, Limits, Protocol
-from study_app.protocol.orders.balance import block_order_words, planned_participants
+from study_app.protocol.orders.balance import block_order_text, planned_participants
 from study_app.protocol.orders.block_orders import block_codes, order_of, orders_of
 from study_app.protocol.orders.durations import Variant, expected_duration_s, variants
 from study_app.protocol.orders.tracks import tracks_of
 from study_app.protocol.presented.presentation import link_descriptions
 from study_app.protocol.presented.presented_levels import FASTER, highest_damping
-from study_app.protocol.quantities import liquid_words
+from study_app.protocol.quantities import liquid_text
 from study_app.protocol.questionnaires import Instrument
 from study_app.protocol.questions import Context, Question
 from study_app.protocol.randomization.sequences import row_count
@@ -63,7 +63,7 @@ def describe(protocol: Protocol, delay_ticks: int = ASSUMED_TICKS, without_force
                 recognised,
                 units=units,
                 statements=bool(protocol.blocks_with_statements),
-                measure_words=protocol.measure_words,
+                measure_text=protocol.measure_text,
             )
         )
     people = protocol.simulated_participants
@@ -118,7 +118,8 @@ def _head_lines(protocol: Protocol, language: str) -> Iterable[str]:
     ball_mm = scene.body.diameter_m * 1000
     sessions = [variant.protocol for variant in variants(protocol)]
     counts = [orders_of(session).answers for session in sessions]
-    answers = f"up to {max(counts)}" if any(map(_has_conditional_items, sessions)) else number_range(counts)
+    has_fewer = any(map(_has_conditional_items, sessions)) or any(map(_can_end_early, sessions))
+    answers = f"up to {max(counts)}" if has_fewer else number_range(counts)
     description = " ".join(study.description.split())
     rows = [
         *([("Description", description)] if description else ()),
@@ -128,7 +129,7 @@ def _head_lines(protocol: Protocol, language: str) -> Iterable[str]:
         *(("Group", f"{name}, share {group.share}") for name, group in protocol.groups.items()),
         ("Answers", f"{answers} per {'session' if protocol.sessions_differ else 'participant'}"),
         ("Blinding", _BLINDINGS[study.blinding]),
-        ("Expected duration", _duration_words(*map(expected_duration_s, sessions))),
+        ("Expected duration", _session_duration_text(*sessions)),
         ("Force limit", f"{device.force_limit_n:g} N"),
         ("Servo", f"{device.rate_hz:g} Hz"),
         ("Tank", f"{sizes} mm in the hand frame, {scene.scale:g} times as large in the scene"),
@@ -139,16 +140,46 @@ def _head_lines(protocol: Protocol, language: str) -> Iterable[str]:
 
 def number_range(numbers: Sequence[float], digits: str = "") -> str:
     """Return the range of numbers as text, "4 to 8", or a single number if both ends have the same text."""
-    least, largest = f"{min(numbers):{digits}}", f"{max(numbers):{digits}}"
-    return least if least == largest else f"{least} to {largest}"
+    minimum, largest = f"{min(numbers):{digits}}", f"{max(numbers):{digits}}"
+    return minimum if minimum == largest else f"{minimum} to {largest}"
 
 
-def _duration_words(*durations_s: float) -> str:
-    """Return the range of expected durations as text: "about 4 min", "about 2 to 3 min", "less than 1 min"."""
+def _duration_text(*durations_s: float, at_most: bool = False) -> str:
+    """Return the range of expected durations as text: "about 4 min", "about 2 to 3 min", "less than 1 min".
+
+    Durations that are upper limits (``at_most``) become "up to about 4 min".
+    """
     minutes = [round(duration_s / 60) for duration_s in durations_s]
     if max(minutes) == 0:
         return "less than 1 min"
-    return f"up to about {max(minutes)} min" if 0 in minutes else f"about {number_range(minutes)} min"
+    return f"up to about {max(minutes)} min" if at_most or 0 in minutes else f"about {number_range(minutes)} min"
+
+
+def _session_duration_text(*sessions: Protocol) -> str:
+    """Return the expected duration of sessions, as an upper limit if blocks can end early."""
+    return _duration_text(*map(expected_duration_s, sessions), at_most=any(map(_can_end_early, sessions)))
+
+
+def _can_end_early(protocol: Protocol) -> bool:
+    return any(_can_block_end_early(protocol, block) for block in protocol.blocks_in_order)
+
+
+def _can_block_end_early(protocol: Protocol, block: Block) -> bool:
+    """Whether answers can make a block shorter than its number of trials."""
+    return block.until is not None or (block.stimulus is not None and protocol.method_of(block).can_end_early)
+
+
+def shows_feedback(protocol: Protocol, block: Block) -> bool:
+    """Return whether participants see after each trial of a block whether their answer was correct."""
+    if block.design is None:
+        return False
+    design, stimulus = protocol.design_of(block), protocol.stimulus_of(block) if block.stimulus else None
+    return design.can_be_correct(stimulus) and design.shows_feedback(block.phase == "practice")
+
+
+def trials_text(protocol: Protocol, block: Block) -> str:
+    """Return the number of trials of a block: "80 trials", or "at most 80 trials" if it can end early."""
+    return "at most " * _can_block_end_early(protocol, block) + counted(order_of(protocol, block).trials, "trial")
 
 
 def _has_conditional_items(protocol: Protocol) -> bool:
@@ -161,11 +192,8 @@ def _session_lines(variant: Variant, planned: int | None, language: str) -> Iter
     protocol, title = variant.protocol, "Session"
     if variant.name:
         answers = counted(orders_of(protocol).answers, "answer")
-        at_most = "up to " if _has_conditional_items(protocol) else ""
-        title = (
-            f"{variant.name[0].upper()}{variant.name[1:]} ({_duration_words(expected_duration_s(protocol))}, "
-            f"{at_most}{answers})"
-        )
+        at_most = "up to " if _has_conditional_items(protocol) or _can_end_early(protocol) else ""
+        title = f"{variant.name[0].upper()}{variant.name[1:]} ({_session_duration_text(protocol)}, {at_most}{answers})"
     rows: list[tuple[str, str, str]] = []
     kind: str
     for number, step in enumerate(protocol.steps, start=1):
@@ -175,12 +203,12 @@ def _session_lines(variant: Variant, planned: int | None, language: str) -> Iter
             kind, description = "form", f"{step}: {counted(len(protocol.forms[step].items), 'question')}"
         else:
             block = protocol.blocks[step]
-            kind, trials = f"{block.phase} trials", counted(order_of(protocol, block).trials, "trial")
+            kind, trials = f"{block.phase} trials", trials_text(protocol, block)
             description = f"{protocol.text(block.title, language)}: {trials}"
         rows.append((f"{number:>2}", kind, description))
     if len(protocol.main_blocks) < 2:
         return _titled_lines(title, rows)
-    order = block_order_words(protocol, planned, in_group=variant.group is not None)
+    order = block_order_text(protocol, planned, in_group=variant.group is not None)
     return (*_titled_lines(title, rows), f"  Block order: {order}")
 
 
@@ -191,7 +219,8 @@ def _block_lines(protocol: Protocol, block: Block, language: str, delay_ticks: i
     unit = "condition" if block.design is None else "comparison"
     times = f"each {unit} {block.repetitions} times" if block.repetitions > 1 else ""
     rows = [
-        ("Trials", ", ".join(filter(None, (counted(trials, "trial"), times, _order_text(block))))),
+        ("Trials", ", ".join(filter(None, (trials_text(protocol, block), times, _order_text(block))))),
+        *([("Ends early", f"{until.condition_text()}; {until.missed_text}")] if (until := block.until) else []),
         *_assignment_and_break_rows(protocol, block, language),
         ("Shown as", protocol.text(block.setting_label, language) + (" 1, 2, …" if trials > 1 else "")),
         ("Recorded as", ", ".join(block_codes(protocol, block))),
@@ -201,7 +230,10 @@ def _block_lines(protocol: Protocol, block: Block, language: str, delay_ticks: i
     ]
     if block.design is not None:
         rows += _design_rows(protocol, block, delay_ticks)
-        rows.append(("Duration", _duration_words(expected_duration_s(protocol, block.id))))
+        if shows_feedback(protocol, block):
+            rows.append(("Feedback", "after every trial"))
+        at_most = _can_block_end_early(protocol, block)
+        rows.append(("Duration", _duration_text(expected_duration_s(protocol, block.id), at_most=at_most)))
     rows.append(("Task", protocol.tasks[block.task].summary))
     if block.design is None and questionnaire is None:
         rows.append(("Questions", "none"))
@@ -243,12 +275,14 @@ def _design_rows(protocol: Protocol, block: Block, delay_ticks: int) -> Iterator
     if isinstance(method, Constant):
         target_text = f": {counted(len(levels), 'level')}, {counted(method.repetitions, 'presentation')} each"
     trials = slots[0] * method.tracks
+    at_most = "at most " * method.can_end_early
     tracks = "" if method.tracks == 1 else f" in {method.tracks} tracks"
     yield (
         "Levels",
         f"{name} {number_range(levels, '.3g')}{f' {unit}' if unit and stimulus.level_kind != 'weber' else ''} "
-        f"({method.kind}{target_text}), {trials} trials{per_standard}{tracks}",
+        f"({method.kind}{target_text}), {at_most}{trials} trials{per_standard}{tracks}",
     )
+    yield from (row for row in method.track_rules(stimulus).items() if row[0] != "Tracks")
     if (modulus := design.first) is not None:
         yield (
             "Modulus",
@@ -335,7 +369,7 @@ def _liquid_rows(protocol: Protocol) -> list[tuple[str, ...]]:
     rows: list[tuple[str, ...]] = []
     for name in protocol.liquids:
         body = protocol.liquids[name].model_dump(mode="json").get("body")
-        description = liquid_words(resolve(protocol.scene_of(name)).liquids[0].model_dump(mode="json") | {"body": body})
+        description = liquid_text(resolve(protocol.scene_of(name)).liquids[0].model_dump(mode="json") | {"body": body})
         rows.append((name, description if name in used else f"{description}; not used in any condition"))
     return rows
 

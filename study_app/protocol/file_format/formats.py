@@ -91,7 +91,12 @@ def relax_schema(schema: dict[str, Any]) -> None:
         node["required"] = [key for key in node["required"] if key not in keys]
     questions = schema["$defs"]["Questionnaire"]
     questions["if"] = {"not": {"required": ["instrument"]}}
-    questions["then"] = {"required": questions.pop("required")}
+    statement = {"type": "object", "not": {"required": ["kind"]}}
+    questions["then"] = {
+        "required": questions.pop("required"),
+        "if": {"properties": {"items": {"contains": statement}}, "required": ["items"]},
+        "then": {"required": ["scale"]},
+    }
 
 
 def _add_defaults(table: Any, **defaults: Any) -> Any:

@@ -204,7 +204,7 @@ def planned_participants(protocol: Protocol, group: str | None) -> int | None:
 def block_orders_by_group(protocol: Protocol) -> dict[str, str]:
     """Return the order of the main blocks by group; a single entry "" if groups do not differ or do not exist."""
     orders_by_group = {
-        variant.group or "": block_order_words(
+        variant.group or "": block_order_text(
             variant.protocol, planned_participants(protocol, variant.group), in_group=variant.group is not None
         )
         for variant in variants(protocol)
@@ -213,7 +213,7 @@ def block_orders_by_group(protocol: Protocol) -> dict[str, str]:
     return {"": next(iter(orders_by_group.values()))} if len({*orders_by_group.values()}) == 1 else orders_by_group
 
 
-def block_order_words(protocol: Protocol, planned: int | None, *, in_group: bool = False) -> str:
+def block_order_text(protocol: Protocol, planned: int | None, *, in_group: bool = False) -> str:
     """Return the order of a session's main blocks and its balance for ``planned`` participants, as text.
 
     ``protocol`` is that of the session; with ``in_group`` the planned participants are those of one group.

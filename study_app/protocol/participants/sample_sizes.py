@@ -4,11 +4,11 @@ import math
 from typing import Final
 
 _LARGEST_MINORITY: Final = 1 / 5
-"""The largest minority that the sample has to represent, however wide the bound, as a share of the population."""
+"""The largest minority that the sample has to represent, however wide the bound, as a proportion of the population."""
 
 
 def smallest_minority(bound: float, largest: float | None) -> float:
-    """Return the share of people who can shift the mean by the bound, at most `_LARGEST_MINORITY`.
+    """Return the proportion of people who can shift the mean by the bound, at most `_LARGEST_MINORITY`.
 
     Each of them differs by ``largest``; None means that differences are unlimited, so that any minority could do so.
     """

@@ -27,9 +27,9 @@ def link_descriptions(delay_ms: float = 0.0, jitter_ms: float = 0.0, loss: float
 
 
 def link_seed(schedule_seed: int, participant: str, trial: int, attempt: int, interval: int | None) -> int:
-    """Return the seed of the force's jitter and loss in an attempt at a trial, or in one of its intervals."""
-    draw = stream(schedule_seed, f"force link/{participant}/{trial}/{attempt}/{interval or 1}")
-    return int(draw.random() * 2**32)
+    """Return the seed for the force link's jitter and packet loss in one attempt at a trial, or in one interval."""
+    random_stream = stream(schedule_seed, f"force link/{participant}/{trial}/{attempt}/{interval or 1}")
+    return int(random_stream.random() * 2**32)
 
 
 def longest_delay_s(protocol: Protocol, block: Block) -> float:

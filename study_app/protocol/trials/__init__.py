@@ -1,6 +1,14 @@
 """Trials: their designs, stimuli, methods and tasks, and what their intervals present."""
 
-from study_app.protocol.trials.designs import DESIGN_KINDS, ORDINALS, Design, ForcedChoice, Reply, default_design
+from study_app.protocol.trials.designs import (
+    COMPARISON_CHOSEN,
+    DESIGN_KINDS,
+    ORDINALS,
+    Design,
+    ForcedChoice,
+    Reply,
+    default_design,
+)
 from study_app.protocol.trials.methods import (
     METHOD_KINDS,
     Adjusting,
@@ -30,6 +38,7 @@ from study_app.protocol.trials.tasks import TASK_KINDS, AnyTask, Explore, Follow
 
 __all__ = [
     "ANALYSIS_LAPSES",
+    "COMPARISON_CHOSEN",
     "DELAY",
     "DELAYS",
     "DESIGN_KINDS",

@@ -31,6 +31,8 @@ Model: TypeAlias = Literal["differencing", "independent"]
 ANSWER_S: Final = 6.0
 _CHOICE_S: Final = 2.0
 """Time to answer a statement, and to choose an interval [s], for the expected duration. [choice]"""
+COMPARISON_CHOSEN: Final = "comparison chosen"
+"""The name of a success if no answer is correct."""
 ORDINALS: Final = ("first", "second", "third", "fourth")
 
 
@@ -155,9 +157,9 @@ class Design(Table):
         return self.has_correct_answer and not (is_value and self.asks_for_more)
 
     def success_of(self, stimulus: Varied | None) -> str:
-        """Return the name of a success: "correct", "yes", or "comparison chosen" if no answer is correct."""
+        """Return the name of a success: "correct", "yes", or `COMPARISON_CHOSEN` if no answer is correct."""
         has_no_correct_answer = self.has_correct_answer and not self.can_be_correct(stimulus)
-        return "comparison chosen" if has_no_correct_answer else self.success_name
+        return COMPARISON_CHOSEN if has_no_correct_answer else self.success_name
 
     def arrangement_text(self, arrangement: int) -> str:
         """Return an arrangement for the journal: S for the standard, C for the comparison, such as "SC"."""
@@ -214,16 +216,20 @@ def _odd_one_arrangements(count: int, *, odd_value: bool) -> tuple[_Arrangement,
 class ForcedChoice(Design):
     """The answer is the interval that contained the comparison.
 
-    Green & Swets 1966, Signal Detection Theory and Psychophysics: an observer at chance is correct in 1/m.
+    Green & Swets 1966, Signal Detection Theory and Psychophysics: an observer who guesses is correct in 1/m of the
+    trials with m intervals.
     """
 
     kind: Literal["2ifc", "3ifc", "4ifc"] = "2ifc"
-    wording: ClassVar = "forced_choice"
     asks_for_more: ClassVar = True
     paper_name = property(lambda self: f"{('two', 'three', 'four')[self.intervals - 2]}-interval forced choice")
     answers = property(lambda self: ORDINALS[: self.intervals])
     arrangements = property(lambda self: _odd_one_arrangements(int(self.kind[0]), odd_value=True))
     guess_rate = property(lambda self: 1 / self.intervals)
+
+    @property
+    def wording(self) -> str:
+        return "forced_choice" if self.intervals == 2 else "forced_choice_of_many"
 
     def correct(self, arrangement: int) -> str:
         return ORDINALS[self.arrangements[arrangement].index(True)]
@@ -343,7 +349,7 @@ class _JudgementDesign(Design):
 
 
 class Rated(_JudgementDesign):
-    """How much was it? Each level is rated on a scale."""
+    """How strong was it? Each level is rated on a scale."""
 
     kind: Literal["rating"] = "rating"
     scale: Id = Field(description="The scale for the answer.")

@@ -9,7 +9,7 @@ import math
 from abc import abstractmethod
 from bisect import bisect_left
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import reduce
 from itertools import count
@@ -45,6 +45,14 @@ from study_app.psychophysics.families import Family, Floats
 from study_app.psychophysics.grid import fit
 
 TrackOrder: TypeAlias = Literal["interleaved", "blocked"]
+TrackRule: TypeAlias = Literal["Tracks", "First level", "Steps", "Stopping rule"]
+_RULE_PHRASES: Final[Mapping[TrackRule, str]] = {
+    "Tracks": "in {}",
+    "First level": "starting at {}",
+    "Steps": "with steps {}",
+    "Stopping rule": "each ending {}",
+}
+"""How a sentence states each rule."""
 Answer: TypeAlias = tuple[float, bool]
 """The level of a comparison, and whether the answer was a success."""
 
@@ -106,6 +114,19 @@ class Method(Table):
         return 0.0
 
     @property
+    def can_end_early(self) -> bool:
+        """Whether a track may have fewer comparisons than `presentations`."""
+        return type(self).ended is not Method.ended
+
+    def track_rules(self, stimulus: Stimulus) -> dict[TrackRule, str]:
+        """Return the rules of adaptive tracks as text, such as their first levels; empty without such rules."""
+        return {}
+
+    def track_phrase(self, stimulus: Stimulus) -> str:
+        """Return the rules of adaptive tracks as a participial phrase; "" without such rules."""
+        return ", ".join(_RULE_PHRASES[rule].format(text) for rule, text in self.track_rules(stimulus).items())
+
+    @property
     def paper_name(self) -> str:
         """Its name in publications, with the source."""
         return self.kind
@@ -143,9 +164,9 @@ class Method(Table):
         return iter(())
 
     def target(self, guess: float | None, success: str) -> str | None:
-        """Return the targeted share of successes as text, such as "correct"; None without a target.
+        """Return the targeted proportion of successes as text, such as "correct"; None without a target.
 
-        ``guess`` is the share of successes by guessing, 0 if no answer is correct; None: a free parameter.
+        ``guess`` is the proportion of successes by guessing, 0 if no answer is correct; None: a free parameter.
         """
         return None
 
@@ -209,14 +230,62 @@ class _Adaptive(Method):
         if self.trials % self.tracks:
             message = f"{self.trials} trials cannot be divided among {self.tracks} tracks"
             yield "trials", message, f"choose a multiple of {self.tracks}"
-        least, most = stimulus.levels
-        first_levels = self.begin if isinstance(self.begin, tuple) else () if self.begin is None else (self.begin,)
-        hint = f"specify one level per track, from {least:g} to {most:g}"
+        minimum, maximum = stimulus.levels
+        first_levels = self.first_levels(stimulus)
+        hint = f"specify one level per track, from {minimum:g} to {maximum:g}"
         if isinstance(self.begin, tuple) and len(first_levels) != self.tracks:
             yield "begin", f"{counted(len(first_levels), 'level')} for {counted(self.tracks, 'track')}", hint
         for level in first_levels:
-            if not least <= level <= most:
+            if not minimum <= level <= maximum:
                 yield "begin", f"{level:g} is outside the stimulus's levels", hint
+
+    @property
+    def can_end_early(self) -> bool:
+        return self.stopping_rule != ""
+
+    @property
+    def stopping_rule(self) -> str:
+        """When a track ends early, as text such as "after 10 reversals"; "" if it never does."""
+        return ""
+
+    def track_rules(self, stimulus: Stimulus) -> dict[TrackRule, str]:
+        number = "one track" if self.tracks == 1 else f"{self.tracks} {self.order} tracks"
+        at_most, each = "at most " * self.can_end_early, " per standard" * (len(stimulus.standards) > 1)
+        rules: dict[TrackRule, str] = {
+            "Tracks": f"{number} of {at_most}{counted(self.presentations(stimulus), 'comparison')}{each}"
+        }
+        if first_levels := self.first_levels(stimulus):
+            unit = "" if stimulus.level_kind == "weber" else f" {stimulus.unit}".rstrip()
+            *others, last = (f"{level:g}{unit}" for level in first_levels)
+            rules["First level"] = f"{', '.join(others)} and {last}" if others else last
+        if steps := self.steps_text(stimulus):
+            rules["Steps"] = steps
+        if rule := self.stopping_rule:
+            rules["Stopping rule"] = rule
+        return rules
+
+    def steps_text(self, stimulus: Stimulus) -> str:
+        """Return the sizes of the steps up and down; "" without steps of fixed sizes."""
+        return ""
+
+    def first_levels(self, stimulus: Stimulus) -> tuple[float, ...]:
+        """Return the first level of each track, or one level if it is the same; empty if it is computed."""
+        return self.begin if isinstance(self.begin, tuple) else () if self.begin is None else (self.begin,)
+
+    def warnings(self) -> Iterator[tuple[str, str]]:
+        presentations = self.trials // self.tracks
+        for key, fewest in self._fewest_answers_to_stop():
+            if fewest >= presentations:
+                yield (
+                    f"stop.{key}",
+                    f"a track has at most {counted(presentations, 'comparison')} and needs at least {fewest} to end "
+                    "early, so this rule has no effect; choose a smaller number, or more trials",
+                )
+                return
+
+    def _fewest_answers_to_stop(self) -> Iterator[tuple[str, int]]:
+        """Yield, for each key of the stopping rule, the smallest number of answers that can satisfy it."""
+        return iter(())
 
     def first(self, track: int) -> float | None:
         """Return the stated first level of a track (from 1); None for the method's own one."""
@@ -234,7 +303,7 @@ _LOG_STEP: Final = "with logarithmic spacing a step must be a factor greater tha
 _DEFAULT_STEPS: Final = 40
 """Default number of steps from the smallest level to the largest."""
 _START_SHARE: Final = 0.125
-"""Greatest distance of a start from an end, as a share of the range; a fixed start would permit counting steps."""
+"""Greatest distance of a start from an end, as a proportion of the range; a fixed start would permit counting steps."""
 _ROUNDING: Final = 1e-9
 
 
@@ -319,8 +388,8 @@ class Adjusting:
     def moved(self, place: int, steps: int) -> int:
         """Return the place after a number of steps, at most an end of the range."""
         ends = [(end - self.stimulus.coordinate(self.start)) / self.step for end in self.stimulus.domain]
-        least, most = math.floor(min(ends) + _ROUNDING), math.ceil(max(ends) - _ROUNDING)
-        return min(max(place + steps, least), most)
+        minimum, maximum = math.floor(min(ends) + _ROUNDING), math.ceil(max(ends) - _ROUNDING)
+        return min(max(place + steps, minimum), maximum)
 
     def level(self, place: int) -> float:
         if place == 0:
@@ -390,7 +459,7 @@ class Precision(Table):
 
 
 class QuestPlus(_Adaptive):
-    """The level whose answer is expected to reduce the uncertainty about the threshold most."""
+    """The level at which an answer is expected to reduce the uncertainty about the threshold most."""
 
     kind: Literal["questplus"] = "questplus"
     learn: Literal["threshold", "all"] = Field(
@@ -427,6 +496,19 @@ class QuestPlus(_Adaptive):
     def paper_name(self) -> str:
         parameters, source = ("the threshold", "; Prins 2013") if self.learn == "threshold" else ("all parameters", "")
         return f"QUEST+, which minimises the expected entropy of {parameters} (Watson 2017{source})"
+
+    @property
+    def stopping_rule(self) -> str:
+        if self.stop is None:
+            return ""
+        return (
+            f"after at least {counted(self.stop.after, 'answer')}, once the upper end of the threshold's 95 % interval "
+            f"is at most {self.stop.ratio:g} times the lower end"
+        )
+
+    def _fewest_answers_to_stop(self) -> Iterator[tuple[str, int]]:
+        if self.stop is not None:
+            yield "after", self.stop.after
 
     def target(self, guess: float | None, success: str) -> str | None:
         return None if guess is None else f"threshold at {50 * (1 + guess):.3g} % {success}"
@@ -502,7 +584,7 @@ class Reversals(Table):
 
 
 class UpDown(_Adaptive):
-    """One step down after consecutive successes, one step up after each failure."""
+    """One step down after a set number of consecutive successes, one step up after each failure."""
 
     kind: Literal["updown"] = "updown"
     rule: Literal["1down1up", "2down1up", "3down1up", "4down1up"] = Field(
@@ -532,7 +614,32 @@ class UpDown(_Adaptive):
         if stimulus.spacing == "log" and self.step_up is not None and self.step_up <= 1:
             yield "step_up", f"is {self.step_up:g}, but {_LOG_STEP}", "choose a factor such as 1.4"
 
+    @property
+    def stopping_rule(self) -> str:
+        if self.stop is None:
+            return ""
+        at_least = "" if self.stop.after == 1 else f" and at least {counted(self.stop.after, 'answer')}"
+        return f"after {counted(self.stop.reversals, 'reversal')}{at_least}"
+
+    def first_levels(self, stimulus: Stimulus) -> tuple[float, ...]:
+        return super().first_levels(stimulus) or (stimulus.levels[1],)
+
+    def steps_text(self, stimulus: Stimulus) -> str:
+        staircase = self.staircase(stimulus, 1)
+        up, down = staircase.step_up, staircase.ratio * staircase.step_up
+        if stimulus.spacing == "log":
+            return f"up by a factor of {10**up:.3g} and down by a factor of {10**down:.3g}"
+        unit = "" if stimulus.level_kind == "weber" else f" {stimulus.unit}".rstrip()
+        return f"up by {up:.3g}{unit} and down by {down:.3g}{unit}"
+
+    def _fewest_answers_to_stop(self) -> Iterator[tuple[str, int]]:
+        if self.stop is not None:
+            yield "after", self.stop.after
+            pairs, single = divmod(self.stop.reversals + 1, 2)  # moves alternate: one failure, then a row of successes
+            yield "reversals", pairs * (int(self.rule[0]) + 1) + single
+
     def warnings(self) -> Iterator[tuple[str, str]]:
+        yield from super().warnings()
         successes = int(self.rule[0])
         if self.ratio is not None and self.ratio != RATIOS[successes]:
             own_percent, published_percent = (

@@ -15,11 +15,11 @@ from pydantic.json_schema import SkipJsonSchema
 
 from study_app.haptics.model.ranges import later, within
 from study_app.haptics.model.scene import ForceLink
-from study_app.protocol.quantities import quantity, quantity_words
+from study_app.protocol.quantities import quantity, quantity_text
 from study_app.protocol.source.table import Id, Table, invalid
 from study_app.protocol.trials.designs import Design
 from study_app.psychophysics.families import Family, Floats
-from study_app.psychophysics.grid import FREE_GUESSES, Grid, Values, evenly, geometric, lapse_prior
+from study_app.psychophysics.grid import FREE_GUESSES, DecadeKind, Grid, Values, evenly, geometric, lapse_prior
 
 _Level = TypeVar("_Level", float, Floats)
 """A level or value, or an array of them."""
@@ -107,10 +107,10 @@ class Condition(Table):
 def _spaced_levels(low: float, high: float, log: bool, count: int) -> tuple[float, ...]:
     if count == 1:
         return (high,)
-    shares = [number / (count - 1) for number in range(count)]
+    proportions = [number / (count - 1) for number in range(count)]
     if not log:
-        return tuple(low + (high - low) * share for share in shares)
-    inner = (math.exp(math.log(low) + math.log(high / low) * share) for share in shares[1:-1])
+        return tuple(low + (high - low) * proportion for proportion in proportions)
+    inner = (math.exp(math.log(low) + math.log(high / low) * proportion) for proportion in proportions[1:-1])
     return (low, *inner, high)
 
 
@@ -137,7 +137,8 @@ SESSION_SD: Final = 0.049
 """Standard deviation of a person's threshold between sessions [decades]; interval [0.034, 0.077].
 
 Estimated from six observers of Jäkel & Wichmann 2006 (J. Vision 6:13) between series of 400 trials
-(``tests/benchmarks/analysis/people.py --spread``).
+(``tests/benchmarks/analysis/people.py --spread``). A point of subjective equality is assumed to vary by
+the same proportion of the just-noticeable difference. [choice]
 """
 _MARGIN_DECADES: Final = 0.4
 _MARGIN_SPANS: Final = 0.25
@@ -205,7 +206,7 @@ class Stimulus(Table):
     @property
     def quantity(self) -> str:
         """The name of the varied quantity within a sentence; raises KeyError if there is none."""
-        return quantity_words(self.vary)
+        return quantity_text(self.vary)
 
     @property
     def unit(self) -> str:
@@ -265,12 +266,29 @@ class Stimulus(Table):
         return self.level_kind != "value"
 
     def rises(self, design: Design) -> bool:
-        """Return whether the share of successes increases with the level, so that there is a threshold.
+        """Return whether the proportion of successes increases with the level, so that there is a threshold.
 
         It does not if levels are values and the question is for the odd or the repeated interval, because differences
         are noticed both above and below the standard.
         """
         return design.adaptive and (self._is_relative or not design.has_standard or design.asks_for_more)
+
+    def has_pse(self, design: Design) -> bool:
+        """Return whether the threshold is a point of subjective equality (PSE): the level chosen in half of the trials.
+
+        The levels are values above and below a standard, and the question is which one is stronger.
+        """
+        return not self._is_relative and design.has_standard and self.rises(design)
+
+    def threshold_term(self, design: Design) -> str:
+        """Return the term for the estimated level."""
+        return "point of subjective equality" if self.has_pse(design) else "threshold"
+
+    def decade_kind(self, design: Design) -> DecadeKind:
+        """Return what a change of the threshold by a decade is in u."""
+        if self.has_pse(design):
+            return "jnd"
+        return "constant" if self.spacing == "log" else "threshold"
 
     def assumed(self, design: Design) -> Assumed:
         """Return the default assumptions about the psychometric function."""
@@ -304,7 +322,7 @@ class Stimulus(Table):
         The thresholds of the ``sessions`` vary about the person's threshold, which is estimated, by `SESSION_SD`.
         """
         low, high = self.domain
-        log, session_sd = self.spacing == "log", SESSION_SD / math.sqrt(sessions)
+        log = self.spacing == "log"
         margin = _MARGIN_DECADES if log else _MARGIN_SPANS * (high - low)
         narrowest, widest = assumed.widths
         low_width, high_width = _ANALYSIS_WIDTHS if log else (0.3 * narrowest, 1.4 * widest)
@@ -316,8 +334,8 @@ class Stimulus(Table):
             lapses=ANALYSIS_LAPSES,
             lapse_prior=lapse_prior(ANALYSIS_LAPSES),
             guesses=self.guesses(design),
-            session_sd=(session_sd, 0.0) if log else (0.0, session_sd * math.log(10)),
-            log=log,
+            session_sd=SESSION_SD / math.sqrt(sessions),
+            decade=self.decade_kind(design),
         )
 
     @model_validator(mode="after")

@@ -1,4 +1,7 @@
-"""Warnings about a valid protocol, such as withheld forces, imprecise thresholds and untranslated texts."""
+"""Warnings about a valid protocol, such as withheld forces, imprecise thresholds and untranslated texts.
+
+Reading order: delayed_force, expected_precision, group_names, question_warnings, untranslated; study_warnings.
+"""
 
 from study_app.protocol.warnings.delayed_force import WITHHELD_PERCENT, Entry, longest_delay_ms, stored_table
 from study_app.protocol.warnings.expected_precision import (

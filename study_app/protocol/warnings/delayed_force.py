@@ -1,7 +1,7 @@
 """Warnings about delayed forces that the passivity controller withholds in part.
 
-The withheld shares are in ``delayed_force.csv`` in this folder; ``evidence.stability.force_delay`` measured them with
-the servo's own tick.
+The withheld proportions are in ``delayed_force.csv`` in this folder; ``evidence.stability.force_delay`` measured them
+with the servo's own tick.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class Entry(NamedTuple):
 
     The grip in ``hand`` is "light", "middle" or "firm"; the force is delayed by ``delay_ms`` in addition to the
     device's delay. ``left_percent`` is the RMS of the force sent relative to that of the requested force,
-    ``withheld_percent`` the share of the force that is withheld, as in a trial.
+    ``withheld_percent`` the proportion of the force that is withheld, as in a trial.
     """
 
     liquid: str

@@ -15,7 +15,7 @@ from typing import ClassVar, Final, TypeAlias
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import Protocol
@@ -27,8 +27,17 @@ from study_app.protocol.trials.stimuli import LINEAR_WIDTH, WIDTH_PRIOR, Stimulu
 from study_app.psychophysics.adaptive import Answers, Observers
 from study_app.psychophysics.detection import NORMAL, rating
 from study_app.psychophysics.families import Floats
-from study_app.psychophysics.grid import Z_95, Posterior, group_priors
-from study_app.psychophysics.people import ALONE, ASSUMED, ESTIMATE_NOISE, KINDS, Estimates, Expected, Person
+from study_app.psychophysics.grid import Z_95, Posterior, decade_in_u, group_priors
+from study_app.psychophysics.people import (
+    ALONE,
+    ASSUMED,
+    BETWEEN_PEOPLE,
+    ESTIMATE_NOISE,
+    KINDS,
+    Estimates,
+    Expected,
+    Person,
+)
 
 PRECISION: Final = "Expected precision"
 """The label of `precision_rows` and the heading of the tables of ``power``."""
@@ -134,11 +143,11 @@ class RatingPlan:
         """Return the d_a that the report would estimate for observers who use all scale points about equally often.
 
         A rating is the number of criteria that a normal observation exceeds. The criteria divide a normal distribution
-        with the mean and the standard deviation of both levels' observations at `value` into equal shares.
+        with the mean and the standard deviation of both levels' observations at `value` into equal parts.
         """
         spread = math.sqrt(1.0 + (self.value / 2.0) ** 2)
-        shares = [point / self.points for point in range(1, self.points)]
-        criteria = [self.value / 2.0 + spread * NORMAL.inv_cdf(share) for share in shares]
+        proportions = [point / self.points for point in range(1, self.points)]
+        criteria = [self.value / 2.0 + spread * NORMAL.inv_cdf(proportion) for proportion in proportions]
         values = []
         for d_a in truth:
             lowest, level = (np.searchsorted(criteria, random.normal(mean, 1.0, self.trials)) for mean in (0.0, d_a))
@@ -186,6 +195,7 @@ def expected_mean(plan: MeanPlan) -> Expected:
         halves={"": [Z_95 * spread]},
         spreads={"": spread},
         threshold=plan.value,
+        decade=plan.value * math.log(10),
     )
 
 
@@ -234,7 +244,6 @@ class ThresholdPlan:
     clipping: Clipping | None = None
 
     per: ClassVar[str] = " per standard"
-    estimated: ClassVar[str] = "thresholds"
     words: ClassVar[str] = ""
     trials = property(lambda self: self.method.presentations(self.stimulus) * self.method.tracks)
     """The greatest number of comparisons with each standard."""
@@ -252,6 +261,16 @@ class ThresholdPlan:
     def two_intervals(self) -> bool:
         """Whether one of two intervals is correct, so that participants may prefer one."""
         return self.design.kind == "2ifc" and self.design.can_be_correct(self.stimulus)
+
+    @property
+    def has_pse(self) -> bool:
+        """Whether thresholds are points of subjective equality."""
+        return self.stimulus.has_pse(self.design)
+
+    @property
+    def estimated(self) -> str:
+        """The estimated quantity, as a plural noun."""
+        return "points of subjective equality" if self.has_pse else "thresholds"
 
     @property
     def kinds(self) -> Mapping[str, Person]:
@@ -290,6 +309,29 @@ class ThresholdPlan:
         with np.errstate(divide="ignore"):  # a level of 0 has the logarithm −∞
             return np.log10(np.maximum(clipped, 0.0)) if log else clipped
 
+    @property
+    def width(self) -> float:
+        """The width of a typical observer's function [u]."""
+        prior = self.method.assumed(self.stimulus, self.design).width_prior
+        return LINEAR_WIDTH if prior == WIDTH_PRIOR else prior[0]
+
+    @property
+    def value(self) -> float:
+        """The level in the middle of the range."""
+        return self.stimulus.level_of(sum(self.stimulus.domain) / 2)
+
+    @property
+    def between_people(self) -> float:
+        """The standard deviation between people, of the natural logarithm of a threshold or relative to `value`."""
+        middle = sum(self.stimulus.domain) / 2
+        if self.stimulus.spacing == "log":
+            return math.log10(BETWEEN_PEOPLE) * float(self.decade(middle)) * math.log(10)
+        return math.log10(BETWEEN_PEOPLE) * float(self.decade(middle)) / abs(middle) if middle else math.inf
+
+    def decade(self, threshold: ArrayLike) -> Floats:
+        """Return the change of each threshold that corresponds to a decade; all numbers are in u."""
+        return decade_in_u(self.stimulus.decade_kind(self.design), threshold, self.width)
+
     def answers(self, thresholds: Floats, random: Generator, people: Sequence[Person] = (ASSUMED,)) -> ObserverAnswers:
         """Return the answers of observers with these thresholds [u]; ``people`` has one entry each, or one for all."""
         stimulus, design = self.stimulus, self.design
@@ -305,11 +347,11 @@ class ThresholdPlan:
         if guess is None:
             guess = lapse if stimulus.guesses(design) is None else _FALSE_ALARMS
         presented = None if self.clipping is None else self.presented
-        moves = np.log10(change) if stimulus.spacing == "log" else thresholds * np.log(change)
+        moves = np.log10(change) * self.decade(thresholds)
         observers = Observers(
             family=assumed.family,
             thresholds=thresholds,
-            width=(LINEAR_WIDTH if assumed.width_prior == WIDTH_PRIOR else assumed.width_prior[0]) * width,
+            width=self.width * width,
             guess=guess,
             lapse=lapse,
             presented=presented,
@@ -430,6 +472,7 @@ def expected(plan: ThresholdPlan) -> Expected:
         halves=dict(zip(kinds, (scaling * np.concatenate(halves, axis=1)).tolist(), strict=True)),
         spreads=dict(zip(kinds, (scaling * np.sqrt(np.mean(variances, axis=0))).tolist(), strict=True)),
         threshold=plan.stimulus.level_of(float(np.median(thresholds))),
+        decade=float(plan.decade(float(np.median(thresholds)))),
         shared=dict(zip(kinds, (scaling**2 * np.mean(shared, axis=0)).tolist(), strict=True)),
     )
 
@@ -462,7 +505,10 @@ def precision_rows(protocol: Protocol, block: Block) -> Iterator[tuple[str, str]
     across = "" if precisions.standards == 1 else " across all standards"
     group = ""
     if people is not None:
-        group = f"; ±{100 * precisions.group_half_width(people):.0f} %{across} for {people} participants"
+        half = precisions.group_half_width(people)
+        has_pse = isinstance(plan, ThresholdPlan) and plan.has_pse
+        group_half = f"{half * abs(precisions.threshold):.2g}{plan.unit}" if has_pse else f"{100 * half:.0f} %"
+        group = f"; ±{group_half}{across} for {people} participants"
     elif precision is not None and (needed := precisions.participants_for(precision)) is not None:
         group = f"; ±{100 * precision:g} %{across} requires {needed} participants"
     yield PRECISION, f"{plan.words}{for_one} for one participant{group} (95 % intervals)"

@@ -27,6 +27,7 @@ from study_app.protocol.trials.stimuli import DELAY, OF_CONDITION, OF_LINK
 from study_app.protocol.warnings.delayed_force import delay_warnings
 from study_app.protocol.warnings.expected_precision import imprecise
 from study_app.protocol.warnings.group_names import suggests_attribute
+from study_app.protocol.warnings.question_warnings import question_warnings
 from study_app.protocol.wording.languages import language_name
 
 _DISCRIMINABLE = 0.39
@@ -57,6 +58,7 @@ def warnings(protocol: Protocol, *, simulates: bool = True, without_force: str =
         *_tasks_without_target(protocol),
         *_recalled_instruments(protocol),
         *_untitled_forms(protocol),
+        *question_warnings(protocol),
         *dict.fromkeys(_shared_titles(protocol)),
     )
 
@@ -185,10 +187,10 @@ def _design_warnings(protocol: Protocol, block: Block, simulates: bool) -> Itera
         for key, sentence in protocol.method_of(block).warnings():
             yield f"methods.{block.method}.{key}: {sentence}"
     if block.catch is not None and not track.catch:
-        share = math.ceil(100 / track.slots) / 100
+        proportion = math.ceil(100 / track.slots) / 100
         yield (
             f"blocks.{block.id}.catch.share: with a share of {block.catch.share:g}, a track of {track.slots} trials "
-            f"does not contain any catch trials; choose {share:g}"
+            f"does not contain any catch trials; choose {proportion:g}"
         )
     if design.feedback == "always" and protocol.study.blinding == "double":
         yield (
@@ -275,7 +277,9 @@ def _analysis_warnings(protocol: Protocol) -> Iterator[str]:
             "false-positive rate above alpha"
         )
     yield from _attribute_groups(protocol)
+    yield from _untested_trends(protocol)
     yield from _too_few_for_equivalence(protocol)
+    yield from _too_few_for_pairs(protocol)
     yield from _different_standards(protocol)
     yield from _block_order_warnings(protocol)
     yield from dict.fromkeys(_repeated_pages(protocol))
@@ -291,6 +295,25 @@ def _attribute_groups(protocol: Protocol) -> Iterator[str]:
                 f"groups.{name}: the name suggests an attribute that participants already have, but groups are "
                 'assigned at random; if participants have it, set study.group_assignment = "pre-existing"'
             )
+
+
+def _untested_trends(protocol: Protocol) -> Iterator[str]:
+    """Yield warnings about trends with the delay in statements that no block asks after several delays."""
+    asked_after_delays = {
+        item.id
+        for block in protocol.blocks_with_statements
+        if protocol.compared_in(block.id) == "delays" and (questionnaire := protocol.questionnaire_of(block.id))
+        for item in questionnaire.statements
+    }
+    analysis = protocol.analysis
+    trends = {} if analysis is None else {"rising": analysis.rising, "falling": analysis.falling}
+    for key, names in trends.items():
+        for name in names:
+            if name not in asked_after_delays:
+                yield (
+                    f"analysis.{key}: the trend in {name} is not tested, because no block that asks it compares "
+                    "delays; to compare two conditions, specify [[analysis.contrasts]]"
+                )
 
 
 def _too_few_for_equivalence(protocol: Protocol) -> Iterator[str]:
@@ -311,6 +334,33 @@ def _too_few_for_equivalence(protocol: Protocol) -> Iterator[str]:
                 f"analysis.contrasts.{number}.bound: equivalence within this bound requires at least {fewest} "
                 f"participants{each}, but {planned} are planned"
             )
+
+
+def _too_few_for_pairs(protocol: Protocol) -> Iterator[str]:
+    """Yield warnings about blocks in which no comparison of two conditions may be significant after Holm's correction.
+
+    The smallest two-sided p of Wilcoxon's signed-rank test is 2^(1 − n).
+    """
+    analysis = protocol.analysis
+    for block in protocol.blocks_with_statements if analysis is not None and analysis.participants is not None else ():
+        if protocol.compared_in(block.id) == "delays" or len(block.conditions) < 2 or analysis is None:
+            continue
+        questionnaire = protocol.questionnaire_of(block.id)
+        statements = [] if questionnaire is None else [item.id for item in questionnaire.statements]
+        primary = [name for name in statements if not analysis.primary or name in analysis.primary]
+        groups = protocol.groups_with(block.id)
+        planned = sum(planned_participants(protocol, group) or 0 for group in groups or (None,))
+        tests = math.comb(len(block.conditions), 2) * len(primary)
+        smallest_p = 2.0 ** (1 - planned)
+        if tests < 2 or smallest_p > analysis.alpha or tests * smallest_p <= analysis.alpha:
+            continue
+        several = "" if len(block.conditions) == 2 else "if all statements differ between conditions, "
+        yield (
+            f"blocks.{block.id}: {several}{tests} comparisons are Holm-corrected, so with {planned} planned "
+            f"participants the smallest possible p is {smallest_p:.2g} × {tests} = {tests * smallest_p:.2g}, which is "
+            f"above {analysis.alpha:g}; at least {math.ceil(1 + math.log2(tests / analysis.alpha))} participants are "
+            "needed"
+        )
 
 
 def _different_standards(protocol: Protocol) -> Iterator[str]:
