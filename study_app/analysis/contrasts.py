@@ -16,7 +16,7 @@ import numpy as np
 import pandas as pd
 
 from study_app import number_text
-from study_app.analysis.data.blocks import Item, PlacedQuestion, PlacedScore
+from study_app.analysis.data.blocks import OF_SESSION, Item, PlacedQuestion, PlacedScore, name_in_sentence
 from study_app.analysis.data.measures import by_participant
 from study_app.analysis.data.study_tables import Study, group_members
 from study_app.analysis.findings.finding import FOUND, HOLM, TESTS, BlockAnswers, verdict
@@ -43,9 +43,10 @@ from study_app.analysis.statistics.equivalence import is_beyond, p_equivalent, p
 from study_app.analysis.statistics.mean_tests import SAME, Means, means_of, p_differs, resamples_for
 from study_app.analysis.statistics.outcome import SIDES, Array, Interval, clopper_pearson, holm
 from study_app.analysis.statistics.thresholds import random_effects_weights
-from study_app.analysis.wording import interval, listed, number, p_equals, p_value, significant
-from study_app.protocol.model import Contrast, quoted_title
+from study_app.analysis.wording import inclusion_text, interval, listed, ms, number, p_equals, p_value, significant
+from study_app.protocol.model import MEAN_SETTING, Contrast
 from study_app.protocol.participants import fewest_participants
+from study_app.protocol.quantities import quoted_title, with_article
 
 _STATISTICS: Final[Mapping[str, tuple[type[LevelStatistic[Any]], str]]] = {
     "threshold": (Thresholds, "threshold"),
@@ -61,7 +62,8 @@ RATIOS: Final = ("threshold", "pse")
 _WEIGHTED: Final = (
     "Thresholds are weighted as in the group mean. If two blocks have the same levels and design, their thresholds "
     "are estimated with a common width of the psychometric function, so their ratio may differ from the ratio of the "
-    "thresholds in the tables. "
+    "thresholds in the tables. The intervals of the means in a hypothesis omit the uncertainty of the width and the "
+    "lapse rate, which the tables include. "
 )
 _SIZES: Final = (
     "Standardised effects give all participants equal weight: d_z is the mean within-participant difference divided "
@@ -190,14 +192,16 @@ def _collect_samples(
     members = group_members(study)
     people = [person for person in study.people if contrast.groups is None or members.get(person) in contrast.groups]
     missing = (
-        f"no {contrast.measure_words}"
+        f"no {contrast.measure_text}"
         if contrast.measure in _STATISTICS
         else f"an answer to {contrast.measure} is missing"
     )
-    names = contrast.conditions or _block_titles(study, contrast)
+    names = _condition_names(study, contrast) or _block_titles(study, contrast)
+    asked = [_question_or_score(study, contrast, contrast.form or contrast.blocks[end]) for end in (0, -1)]
+    hidden = [study.hidden_from(item) if isinstance(item, PlacedQuestion) else set() for item in asked]
     left_out = {
-        person: f"{missing} in {quoted_title(name)}"
-        for side, name in zip(sides[::-1], names[::-1], strict=True)
+        person: f"{f'{contrast.measure} was not shown' if person in unseen else missing} in {quoted_title(name)}"
+        for side, name, unseen in zip(sides[::-1], names[::-1], hidden[::-1], strict=True)
         for person in people
         if person not in side
     }  # fmt: skip
@@ -503,22 +507,39 @@ def _side_names(study: Study, contrast: Contrast) -> tuple[str, str]:
     first, second = _block_titles(study, contrast)
     if first != second and contrast.groups is None:
         return first, second
+    if contrast.groups is None and (names := _condition_names(study, contrast)):
+        return names
     return contrast.words({block.id: block.stimulus.condition for block in study.levels if block.stimulus})
+
+
+def _condition_names(study: Study, contrast: Contrast) -> tuple[str, str] | None:
+    """Return the names of the two conditions within a sentence, as in tables; None for blocks and groups."""
+    if contrast.conditions is None:
+        return None
+    block = next((block for block in study.trial_blocks if block.id == contrast.blocks[0]), None)
+    names = {} if block is None else {
+        setting.condition: ms(setting.delay_ms or 0.0) if block.kind == "delays" else block.name(setting)
+        for setting in block.settings
+    }  # fmt: skip
+    has_replicates = len({*names.values()}) < len(names)
+    first, second = (
+        name if has_replicates else name_in_sentence(names.get(name, name)) for name in contrast.conditions
+    )
+    return first, second
 
 
 def _block_titles(study: Study, contrast: Contrast) -> tuple[str, str]:
     """Return the titles of the first and the last block of a contrast."""
     titles = {question.where.id: question.where.title for question in study.others.questions}
-    titles |= {level.id: level.title for level in study.levels} | {block.id: block.title for block in study.blocks}
+    titles |= {level.id: level.title for level in study.levels}
+    titles |= {block.id: block.title for block in study.trial_blocks}
     first, last = (titles.get(block, block) for block in (contrast.blocks[0], contrast.blocks[-1]))
     return first, last
 
 
 def _within_names(study: Study, contrast: Contrast) -> tuple[str, str] | None:
-    """Return the names of the blocks of an interaction; None for conditions, which have no titles."""
-    if not contrast.is_interaction or contrast.conditions is not None:
-        return None
-    return _block_titles(study, contrast)
+    """Return the names of the blocks or conditions of an interaction; None for other hypotheses."""
+    return (_condition_names(study, contrast) or _block_titles(study, contrast)) if contrast.is_interaction else None
 
 
 def _measure_name(study: Study, contrast: Contrast) -> str:
@@ -529,7 +550,11 @@ def _measure_name(study: Study, contrast: Contrast) -> str:
     if isinstance(asked, PlacedScore):
         return f"{asked.title} score"
     if asked is None:
-        return ""
+        level = next((level for level in study.levels if level.id == contrast.blocks[0]), None)
+        if contrast.measure == "pse" and level is not None and level.design.intervals == 1:
+            return MEAN_SETTING
+        has_pse = contrast.measure == "threshold" and level is not None and level.has_pse
+        return "point of subjective equality" if has_pse else ""
     return f"“{asked.short}”" if contrast.form is None else f"“{asked.short}” ({asked.where.title})"
 
 
@@ -539,23 +564,13 @@ def _statement(study: Study, contrast: Contrast) -> Item | None:
     return next((item for block in blocks for item in block.items if item.id == contrast.measure), None)
 
 
-def inclusion_words(contrasts: Iterable[Contrast], *, in_report: bool = False) -> str:
-    """Return sentences on which participants are compared, for power analysis, preregistration and report."""
-    beyond = any(contrast.measure == "threshold" for contrast in contrasts)
-    included = (
-        "Participants are included if both of their values are available"
-        f"{', even if a threshold lies outside the range of levels' * beyond}."
-    )
-    return included if in_report else f"{included} The report lists the excluded participants and the reasons."
-
-
 def bound_as_tested(bound: float, *, ratio: bool) -> float:
     """Return an equivalence bound on the scale of the test."""
     return abs(math.log(bound)) if ratio else bound
 
 
 def _largest_possible_share(contrast: Contrast, compared: ContrastSamples, *, ratio: bool) -> float | None:
-    """Return the upper confidence limit of the share of participants who differ by more than the bound."""
+    """Return the upper confidence limit of the proportion of participants who differ by more than the bound."""
     if contrast.bound is None or not compared.smallest:
         return None
     if contrast.groups is not None:
@@ -571,7 +586,7 @@ def question(contrast: ContrastResult) -> str:
 
 def answer(contrast: ContrastResult) -> str:
     """Return the result as sentences."""
-    sentences = [f"Not tested: {contrast.note}." if contrast.p_adjusted is None else _difference_words(contrast)]
+    sentences = [f"Not tested: {contrast.note}." if contrast.p_adjusted is None else _difference_text(contrast)]
     kind = "ratio" if contrast.ratio else "difference"
     if contrast.contrast.bound is not None and _lies_beyond(contrast, contrast.contrast.bound):
         subject = "All differences lie" if contrast.interval is None else "The whole confidence interval lies"
@@ -595,7 +610,7 @@ def answer(contrast: ContrastResult) -> str:
     elif contrast.equivalent is not None:
         sentences.append(f"The tests do not show that the mean {kind} lies within the equivalence bounds.")
     if contrast.left_out:
-        sentences.append(f"Excluded: {_left_out_words(contrast)}.")
+        sentences.append(f"Excluded: {_left_out_text(contrast)}.")
     return " ".join(sentences)
 
 
@@ -609,9 +624,9 @@ def _lies_beyond(contrast: ContrastResult, bound: float) -> bool:
     return is_beyond(contrast, reach, 0.05)
 
 
-def _difference_words(contrast: ContrastResult) -> str:
+def _difference_text(contrast: ContrastResult) -> str:
     first, second = map(quoted_title, contrast.compared)
-    quantity, expected = number_text.capitalised(contrast.effect_words), contrast.contrast.expected
+    quantity, expected = number_text.capitalised(with_article(contrast.effect_text)), contrast.contrast.expected
     if contrast.verdict in FOUND:
         side = "higher" if (contrast.effect or 0.0) > (1.0 if contrast.ratio else 0.0) else "lower"
         claim = f"{quantity} was {side} in {first} than in {second}"
@@ -620,24 +635,24 @@ def _difference_words(contrast: ContrastResult) -> str:
     else:
         claim = f"{quantity} was not significantly {expected} in {first} than in {second}"
     decimals = _matching_decimals(contrast)
-    means = listed([mean_words(side, decimals) for side in contrast.sides if side.mean is not None])
+    means = listed([mean_text(side, decimals) for side in contrast.sides if side.mean is not None])
     higher = (
         ""
         if contrast.higher is None
-        else f" It was higher in {first} for {contrast.higher} of {contrast.n} participants{_ties_words(contrast)}."
+        else f" It was higher in {first} for {contrast.higher} of {contrast.n} participants{_ties_text(contrast)}."
     )
     effect = f"mean {'ratio' if contrast.ratio else 'difference'} {number(contrast.effect, decimals)}"
     unadjusted = "unadjusted " * (contrast.members > 1) + "two-sided " * (expected is not None)
     p_kind = "adjusted " * (contrast.members > 1) + "one-sided " * (expected is not None)
-    size = "" if contrast.standardised is None else f", {_effect_size_words(contrast.standardised)}"
+    size = "" if contrast.standardised is None else f", {_effect_size_text(contrast.standardised)}"
     return (
         f"{claim} (means {means}; {effect}, {unadjusted}95 % confidence interval {interval(contrast.interval)}{size}, "
-        f"{p_kind}{p_equals(contrast.p_adjusted or 0.0)}, n = {contrast.n}).{_adjustment_words(contrast)}"
-        f"{higher}{_bayes_words(contrast)}"
+        f"{p_kind}{p_equals(contrast.p_adjusted or 0.0)}, n = {contrast.n}).{_adjustment_text(contrast)}"
+        f"{higher}{_bayes_text(contrast)}"
     )
 
 
-def _adjustment_words(contrast: ContrastResult) -> str:
+def _adjustment_text(contrast: ContrastResult) -> str:
     """Return a sentence with the unadjusted p if only the adjustment raises p above 0.05, otherwise ""."""
     p, adjusted = contrast.largest_p, contrast.p_adjusted
     if contrast.verdict in FOUND or p is None or adjusted is None or not p <= 0.05 < adjusted:
@@ -645,7 +660,7 @@ def _adjustment_words(contrast: ContrastResult) -> str:
     return f" Before the adjustment for {contrast.members} hypotheses, {p_equals(p)}."
 
 
-def _ties_words(contrast: ContrastResult) -> str:
+def _ties_text(contrast: ContrastResult) -> str:
     """Return a clause that counts participants with equal values on both sides, " and equal for 1", or ""."""
     same = 1.0 if contrast.ratio else 0.0
     ties = sum(math.isclose(value, same, abs_tol=1e-12) for value in contrast.differences.values())
@@ -666,17 +681,17 @@ def _matching_decimals(contrast: ContrastResult) -> int:
     return 2
 
 
-def mean_words(side: ContrastSide, decimals: int = 2) -> str:
+def mean_text(side: ContrastSide, decimals: int = 2) -> str:
     """Return the mean of one side with its interval: "0.61 [0.4, 0.82]"."""
     ends = "" if side.low is None or side.high is None else f" [{number(side.low)}, {number(side.high)}]"
     return f"{number(side.mean, decimals)}{ends}"
 
 
-def _effect_size_words(size: EffectSize | None) -> str:
+def _effect_size_text(size: EffectSize | None) -> str:
     return "–" if size is None else f"{size.name} {number(size.value)} {interval(size)}"
 
 
-def _bayes_words(contrast: ContrastResult) -> str:
+def _bayes_text(contrast: ContrastResult) -> str:
     if contrast.bayes_factor is None or contrast.verdict in FOUND:
         return ""
     factor = max(contrast.bayes_factor, 1 / contrast.bayes_factor)
@@ -694,7 +709,7 @@ def t_test_name(contrast: Contrast, *, ratio: bool) -> str:
     return f"two-sample t test{values} with unequal variances" if contrast.groups else f"paired t test{values}"
 
 
-def _holm_words(contrasts: Sequence[ContrastResult]) -> str:
+def _holm_text(contrasts: Sequence[ContrastResult]) -> str:
     return f", Holm-adjusted across {len(contrasts)} hypotheses" if len(contrasts) > 1 else ""
 
 
@@ -710,7 +725,7 @@ def contrast_methods(results: Results) -> Iterator[str]:
         f"Each participant contributed one value to each comparison{reductions_note}. In addition to the t test, "
         "we used a bootstrap that includes one hypothetical participant as extreme as the most extreme participant in "
         "the sample (Gaffke 2005), and a t test corrected for skewness (Hall 1992). The reported p value is the "
-        f"largest of the three{_holm_words(contrasts)}."
+        f"largest of the three{_holm_text(contrasts)}."
     )
     if any(contrast.contrast.measure == "threshold" for contrast in contrasts):
         yield _WEIGHTED.rstrip()
@@ -725,7 +740,7 @@ def contrast_methods(results: Results) -> Iterator[str]:
             "any minority that could shift the mean by as much as the bound."
         )
     if exclusions := {
-        f"{question(contrast)}: {_left_out_words(contrast)}": None for contrast in contrasts if contrast.left_out
+        f"{question(contrast)}: {_left_out_text(contrast)}": None for contrast in contrasts if contrast.left_out
     }:
         yield f"Some participants were excluded from a test because a value was missing ({'; '.join(exclusions)})."
 
@@ -733,9 +748,10 @@ def contrast_methods(results: Results) -> Iterator[str]:
 def _reductions(results: Results) -> Iterator[str]:
     """Yield how several answers or estimates of a participant are reduced to one value, for each kind of measure."""
     of_questions = [result for result in results.contrasts if result.contrast.measure not in _STATISTICS]
-    if any(result.largest is not None for result in of_questions):
+    repeated = {block.id for block in results.blocks if block.presentations[1] > 1}
+    if any(result.largest is not None and repeated & {*result.contrast.blocks} for result in of_questions):
         yield "the median of repeated answers to a statement"
-    if any(result.largest is None for result in of_questions):
+    if any(result.largest is None and _has_repeated_answers(result.contrast, results) for result in of_questions):
         yield "the mean of repeated answers to another question"
     compared = {(block, result.contrast.measure) for result in results.contrasts for block in result.contrast.blocks}
     for level in results.levels:
@@ -743,6 +759,16 @@ def _reductions(results: Results) -> Iterator[str]:
             standards = {getattr(row, "standard", None) for row in statistic.rows_in(level)}
             if (level.block, measure) in compared and len(standards) > 1:
                 yield f"the mean over the standards in {quoted_title(level.title)}"
+
+
+def _has_repeated_answers(contrast: Contrast, results: Results) -> bool:
+    """Return whether anyone answered the question of a contrast, or those of its score, several times in one place."""
+    asked = [question for question in results.questions if question.where in (contrast.form, *contrast.blocks)]
+    return any(
+        int(group.numbers["n"]) > int(group.numbers["participants"]) or OF_SESSION in (group.code or "")
+        for question in asked
+        for group in question.groups
+    )
 
 
 def _tests_used(contrasts: Sequence[ContrastResult]) -> Iterator[str]:
@@ -756,7 +782,7 @@ def _tests_used(contrasts: Sequence[ContrastResult]) -> Iterator[str]:
         yield "Comparisons between groups used the degrees of freedom of the smaller group (Hsu 1938)."
 
 
-def _left_out_words(contrast: ContrastResult) -> str:
+def _left_out_text(contrast: ContrastResult) -> str:
     by_reason: dict[str, list[str]] = {}
     for person, reason in contrast.left_out.items():
         by_reason.setdefault(reason, []).append(person)
@@ -777,7 +803,7 @@ def contrast_section(results: Results) -> Iterator[str]:
     yield heading(2, "Hypotheses")
     yield table_of(
         contrasts,
-        ("Comparison", lambda row: _row_words(results, row, row.comparison)),
+        ("Comparison", lambda row: _row_text(results, row, row.comparison)),
         ("n", lambda row: str(row.n)),
         ("t", lambda row: number(row.statistic)),
         ("df", lambda row: "–" if row.freedom is None else str(row.freedom)),
@@ -795,14 +821,14 @@ def contrast_section(results: Results) -> Iterator[str]:
     )
     weighted = any(contrast.contrast.measure == "threshold" for contrast in contrasts)
     yield paragraph(" ".join(_tests_used(contrasts)), "soft")
-    yield paragraph(_direction_words(kinds), "soft")
+    yield paragraph(_direction_text(kinds), "soft")
     yield paragraph(
         "The column “t-test p” is from the t test alone. The column “p” is the largest p value from the t test, a "
         "bootstrap that includes one hypothetical participant as extreme as the most extreme participant in the "
-        f"sample, and a t test corrected for skewness. The verdict depends on this value{_holm_words(contrasts)}. The "
+        f"sample, and a t test corrected for skewness. The verdict depends on this value{_holm_text(contrasts)}. The "
         f"last two tests do not assume normal distributions, so normality is not tested. "
         f"{_UNADJUSTED * (len(contrasts) > 1)}{_BAYES} {_WEIGHTED * weighted}"
-        f"{inclusion_words((contrast.contrast for contrast in contrasts), in_report=True)}",
+        f"{inclusion_text((contrast.contrast for contrast in contrasts), in_report=True)}",
         "soft",
     )
     if bounds:
@@ -814,13 +840,13 @@ def contrast_section(results: Results) -> Iterator[str]:
             "soft",
         )
     if rows := [contrast for contrast in contrasts if contrast.left_out]:
-        yield bullets([f"{question(row)}: excluded {_left_out_words(row)}." for row in rows])
+        yield bullets([f"{question(row)}: excluded {_left_out_text(row)}." for row in rows])
     sizes = [(row, size) for row in contrasts for size in (row.standardised, row.ordinal) if size is not None]
     if sizes:
         yield heading(3, "Effect sizes")
         yield table_of(
             sizes,
-            ("Comparison", lambda row: _row_words(results, row[0], row[0].comparison)),
+            ("Comparison", lambda row: _row_text(results, row[0], row[0].comparison)),
             ("effect size", lambda row: row[1].name),
             ("value", lambda row: number(row[1].value)),
             *ends_of(lambda row: row[1]),
@@ -851,11 +877,11 @@ def _effect_size_notes(contrasts: Sequence[ContrastResult]) -> str:
     return f"{_SIZES}{logs}{_DELTA * any(contrast.ordinal is not None for contrast in contrasts)}"
 
 
-def _row_words(results: Results, contrast: ContrastResult, sides: str) -> str:
+def _row_text(results: Results, contrast: ContrastResult, sides: str) -> str:
     """Return the name of a row: number of the hypothesis, measure, and the sides compared."""
     positions = (position for position, result in enumerate(results.contrasts, start=1) if result is contrast)
     prefix = f"{next(positions)}. " if len(results.contrasts) > 1 else ""
-    return f"{prefix}{number_text.capitalised(contrast.effect_words)}: {sides}"
+    return f"{prefix}{number_text.capitalised(contrast.effect_text)}: {sides}"
 
 
 class _SideDescription(NamedTuple):
@@ -870,12 +896,12 @@ class _SideDescription(NamedTuple):
 
 def _describe_sides(results: Results, contrast: ContrastResult) -> Iterator[_SideDescription]:
     for side in contrast.sides:
-        name = _row_words(results, contrast, side.name)
+        name = _row_text(results, contrast, side.name)
         yield _SideDescription(
             name=name, values=[*side.values.values()], mean=side.mean, sd=side.sd, standard_error=side.standard_error
         )
     if differences := [*contrast.differences.values()]:
-        name = _row_words(results, contrast, contrast.comparison)
+        name = _row_text(results, contrast, contrast.comparison)
         yield _SideDescription(
             name=name, values=differences, mean=contrast.effect, sd=contrast.sd, standard_error=contrast.standard_error
         )
@@ -884,7 +910,7 @@ def _describe_sides(results: Results, contrast: ContrastResult) -> Iterator[_Sid
 _DIRECTIONS: Final = {"difference": "differences are first minus second", "ratio": "ratios are first divided by second"}
 
 
-def _direction_words(kinds: Sequence[str]) -> str:
+def _direction_text(kinds: Sequence[str]) -> str:
     """Return sentences on the direction of differences and ratios, and on their standard errors."""
     logs = ", or of the mean logarithm for a ratio" * ("ratio" in kinds)
     return (

@@ -12,7 +12,13 @@ from study_app.analysis.data.blocks import Block
 from study_app.analysis.data.motion import Performance, performance
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.findings import all_findings
-from study_app.analysis.findings.finding import BlockAnswers, block_answers, empty_result, summarize_block
+from study_app.analysis.findings.finding import (
+    BlockAnswers,
+    block_answers,
+    empty_result,
+    summarize_block,
+    unrated_results,
+)
 from study_app.analysis.findings.statement_tests import add_gates
 from study_app.analysis.levels.evaluate import level_results
 from study_app.analysis.questions import question_results, score_results
@@ -107,6 +113,8 @@ def _evaluate_study(study: Study, failures: Failures, progress: Progress, *, rec
         contrasts=failures.value("the hypotheses", lambda: contrast_results(study, gated, levels), ()),
         delivered=failures.value("the delivered delays", lambda: _delivery_check(study), ()),
         orders=failures.value("the trial orders", lambda: _order_balance(study), {}),
+        block_orders=failures.value("the block orders", lambda: _block_order_balance(study), None),
+        unrated_blocks=tuple(unrated_results(study.unrated_blocks)),
         seed=SEED,
         questions=failures.value("the answers to other questions", lambda: question_results(study), ()),
         scores=failures.value("the questionnaire scores", lambda: score_results(study), ()),
@@ -150,7 +158,7 @@ def _delivery_check(study: Study) -> tuple[Delivered, ...]:
     """
     counted = study.trials[study.trials["counted"]]
     delivery = []
-    for block in study.blocks:
+    for block in study.trial_blocks:
         rows = counted[counted["block"] == block.id]
         if not block.revealed:
             delivery.append(_measure_delivery(block, None, None, rows))
@@ -179,6 +187,25 @@ def _measure_delivery(block: Block, code: str | None, delay_ms: float | None, ro
     )
 
 
+def _presented_trials(study: Study) -> pd.DataFrame:
+    """Return the last attempt at each main trial of the included sessions, including excluded trials."""
+    included = study.participants.loc[study.participants["counted"], ["participant", "session"]]
+    rows = study.trials[study.trials["phase"] == "main"].merge(included, on=["participant", "session"])
+    return rows.drop_duplicates(["participant", "session", "trial"], keep="last")
+
+
+def _block_order_balance(study: Study) -> Evenness | None:
+    """Return the balance of the block orders as run; None for a fixed order and if sessions differ in their blocks."""
+    if study.protocol.get("study", {}).get("block_order", "fixed") == "fixed":
+        return None
+    rows = _presented_trials(study).sort_values(["participant", "session", "trial"])
+    orders = [list(dict.fromkeys(map(str, of["block"]))) for _, of in rows.groupby(["participant", "session"])]
+    presented = {block for order in orders for block in order}
+    ids = (*(block.id for block in study.trial_blocks), *(level.id for level in study.levels))
+    blocks = tuple(block for block in ids if block in presented)
+    return evenness(blocks, orders) if len(blocks) > 1 and all({*blocks} == {*order} for order in orders) else None
+
+
 def _order_balance(study: Study) -> dict[str, Evenness]:
     """Return the balance of the trial orders as run (block id → counts), including excluded trials.
 
@@ -186,10 +213,7 @@ def _order_balance(study: Study) -> dict[str, Evenness]:
     """
     if study.own_codes or study.has_unmatched_sites:
         return {}
-    included = study.participants.loc[study.participants["counted"], ["participant", "session"]]
-    rows = study.trials[study.trials["phase"] == "main"].merge(included, on=["participant", "session"])
-    rows = rows.drop_duplicates(["participant", "session", "trial"], keep="last")
-    rows = rows.sort_values(["participant", "session", "index"])
+    rows = _presented_trials(study).sort_values(["participant", "session", "index"])
     return {
         block.id: evenness(
             block.codes_as_dealt,
@@ -198,5 +222,5 @@ def _order_balance(study: Study) -> dict[str, Evenness]:
                 for _, session in rows[rows["block"] == block.id].groupby(["participant", "session"])
             ],
         )
-        for block in study.blocks
+        for block in study.trial_blocks
     }

@@ -18,10 +18,10 @@ from study_app.analysis.wording import number, with_d_z
 _T = TypeVar("_T")
 
 LONG = 32
-"""The most characters of a table cell that is not wrapped on screen."""
+"""Maximum number of characters in a table cell that is not wrapped on screen."""
 
 _SHORT = 16
-"""The most characters of a table cell that is not wrapped on paper."""
+"""Maximum number of characters in a table cell that is not wrapped on paper."""
 
 _FOLDED = 12
 """The most rows of a table that is not folded."""
@@ -175,12 +175,12 @@ def _inline_svg(svg: str, caption: str) -> Markup:
         for part in parts[1::2]
     ]
     width = round(_PX_PER_PT * float(size[1])) if (size := _SIZE.search(svg)) else 600
-    share = min(100, round(100 * width / (_PX_PER_PT * _BESIDE_PT)))
+    proportion = min(100, round(100 * width / (_PX_PER_PT * _BESIDE_PT)))
     svg_tag = size[0] if size else ""
     root_tag = re.sub(r' (?:width|height)="[^"]*"', "", svg_tag, count=2)
     label = Markup.escape(caption)
     least_px = math.ceil(_LEAST_LETTERS_PX / SMALL * float(size[1])) if size else 0
-    css = f"width: {width}px; --share: {share}%; --least: {least_px}px"
+    css = f"width: {width}px; --share: {proportion}%; --least: {least_px}px"
     styled_tag = root_tag.replace("<svg ", f'<svg role="img" aria-label="{label}" style="{css}" ', 1)
     return Markup("".join(parts).replace(svg_tag, styled_tag, 1))  # noqa: S704 - matplotlib escapes its texts
 

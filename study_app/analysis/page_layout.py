@@ -287,7 +287,7 @@ def tab_separated(study: Study, table: pd.DataFrame) -> str:
     return table.to_csv(sep="\t", index=False)
 
 
-def sample_words(study: Study, n: int) -> str:
+def sample_text(study: Study, n: int) -> str:
     """Return the last sentence of a caption, on the number of participants."""
     return f"{capitalised(counted(n, 'participant'))}{' (SIMULATED, not people)' if study.simulated else ''}."
 

@@ -225,19 +225,19 @@ def rule_sentences(study: Study, results: Results | None) -> tuple[str, ...]:
     met = Counter(proposal.rule for proposal in proposals(study, results)) if conditions else Counter()
     unmet = Counter(exclusion.rule_or_person for exclusion in unmet_exclusions(study))
     return tuple(
-        f"Planned rule: {condition}. {_met_words(met[rule], is_known=study.revealed or rule not in NEED_KEY)}"
-        f"{_unmet_words(unmet[rule])}"
+        f"Planned rule: {condition}. {_met_text(met[rule], is_known=study.revealed or rule not in NEED_KEY)}"
+        f"{_unmet_text(unmet[rule])}"
         for rule, condition in conditions.items()
     )
 
 
-def _met_words(sessions: int, *, is_known: bool) -> str:
+def _met_text(sessions: int, *, is_known: bool) -> str:
     if not is_known:
         return "The rule is applied after unblinding."
     return f"{capitalised(counted(sessions, 'session')) if sessions else 'No session'} met this rule."
 
 
-def _unmet_words(sessions: int) -> str:
+def _unmet_text(sessions: int) -> str:
     if not sessions:
         return ""
     was, does = ("was", "does") if sessions == 1 else ("were", "do")

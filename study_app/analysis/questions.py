@@ -70,12 +70,12 @@ def _distribution(_question: PlacedQuestion, answers: pd.DataFrame) -> Numbers:
 
 
 def _distribution_cells(_question: PlacedQuestion, numbers: Numbers) -> dict[str, str]:
-    least, most = numbers["smallest"], numbers["largest"]
+    minimum, maximum = numbers["smallest"], numbers["largest"]
     return {
         "n": str(numbers["n"]),
         "missing": str(numbers["missing"]),
         **_quartile_cells(numbers),
-        "range": "–" if least is None else f"{number(least, 1)} – {number(most, 1)}",
+        "range": "–" if minimum is None else f"{number(minimum, 1)} – {number(maximum, 1)}",
     }
 
 

@@ -21,6 +21,7 @@ from study_app.errors import PlugInError
 from study_app.protocol.model import Contrast, Published
 from study_app.protocol.orders import Evenness
 from study_app.protocol.participants import fewest_participants, smallest_minority
+from study_app.protocol.trials import DESIGN_KINDS
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +54,7 @@ class Delivered:
 _T = TypeVar("_T")
 _U = TypeVar("_U")
 Progress: TypeAlias = Callable[[str, float], object]
-"""Called with the current activity and the share done (0 to 1); an exception that it raises ends the evaluation."""
+"""Called with the current activity and the proportion done (0 to 1); if it raises an exception, the evaluation ends."""
 
 
 def report_no_progress(_what: str, _share: float) -> None:
@@ -230,13 +231,13 @@ Summary: TypeAlias = Literal["share", "mean", "geometric mean", "settings"]
 class LevelsResult:
     """The result of a block of levels.
 
-    ``summary`` is the kind of summary of the answers at a level, ``counts`` the counted answers of a share ("correct");
-    ``vary`` is the varied number, ``quantity`` its display name, ``unit`` its unit, ``level_kind`` the kind of level
-    (weber, difference, value), all None if conditions are compared; ``guess_rate`` is the share at chance, ``bounds``
-    are the ends of a scale; with ``own_units`` each participant chose the unit of the estimates, which group intervals
-    leave out; ``statistics`` are the rows of each statistic in `analysis.levels` by its key; ``family`` is the family
-    of psychometric functions; ``adaptive`` means that answers chose the levels; ``device`` are the device's own
-    dynamics, None if they were not measured. Without the key only ``times`` are known.
+    ``summary`` is the kind of summary of the answers at a level, ``counts`` the counted answers of a proportion
+    ("correct"); ``vary`` is the varied number, ``quantity`` its display name, ``unit`` its unit, ``level_kind`` the
+    kind of level (weber, difference, value), all None if conditions are compared; ``guess_rate`` is the proportion at
+    chance, ``bounds`` are the ends of a scale; with ``own_units`` each participant chose the unit of the estimates,
+    which group intervals leave out; ``statistics`` are the rows of each statistic in `analysis.levels` by its key;
+    ``family`` is the family of psychometric functions; ``adaptive`` means that answers chose the levels; ``device`` are
+    the device's own dynamics, None if they were not measured. Without the key only ``times`` are known.
     """
 
     block: str
@@ -259,6 +260,14 @@ class LevelsResult:
     adaptive: bool = False
     published: tuple[Published, ...] = ()
     device: OwnDynamics | None = None
+
+    @property
+    def has_pse(self) -> bool:
+        """Whether thresholds are points of subjective equality (see `Stimulus.has_pse`)."""
+        if self.level_kind != "value":
+            return False
+        design = DESIGN_KINDS[self.design]
+        return design.has_standard and design.asks_for_more
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -286,8 +295,8 @@ class ContrastResult(Outcome):
     participants with a higher value on the first side; None between groups. ``p_bootstrap`` and ``p_skewed`` (t
     corrected for skewness) must also show the difference. ``equivalent`` is whether the effect is shown to lie
     within the study's bound, by ``p_equivalent``, which is corrected over the hypotheses with a bound; None without a
-    bound. ``not_excluded`` is then the upper limit of the 95 % interval of the share of participants that differ by
-    more. ``sides`` are the numbers of those compared, ``sd`` is the standard deviation of the differences within
+    bound. ``not_excluded`` is then the upper limit of the 95 % interval of the proportion of participants that differ
+    by more. ``sides`` are the numbers of those compared, ``sd`` is the standard deviation of the differences within
     participants; ``standardised`` is d_z or g, ``ordinal`` is Cliff's delta of answers to a statement, and
     ``bayes_factor`` the ratio of the likelihoods with and without a difference. ``within_names`` are the names of the
     blocks or conditions of an interaction, ``cells`` the numbers of each group under each of them, group by group,
@@ -346,9 +355,9 @@ class ContrastResult(Outcome):
         return {who: first[who] / second[who] if self.ratio else first[who] - second[who] for who in first}
 
     @property
-    def effect_words(self) -> str:
+    def effect_text(self) -> str:
         """The compared quantity as text, with the titles that participants or operators see."""
-        return self.contrast.effect_words(self.within_names, self.measure_name, self.block_title)
+        return self.contrast.effect_text(self.within_names, self.measure_name, self.block_title)
 
     @property
     def hypothesis(self) -> str:
@@ -366,7 +375,9 @@ class Results:
     """All results of a study; ``failures`` are the parts that could not be computed.
 
     ``questions`` and ``scores`` are the answers to questions other than statements, ``levels`` the blocks of levels,
-    ``contrasts`` the study's hypotheses; JSON omits them if they are empty.
+    ``contrasts`` the study's hypotheses, ``block_orders`` the balance of block orders that differ between participants;
+    JSON omits them if they are empty. ``unrated_blocks`` are the blocks with
+    neither statements nor a design, which have only settings.
     """
 
     decided: Decided
@@ -381,6 +392,13 @@ class Results:
     scores: tuple[ScoreResult, ...] = ()
     levels: tuple[LevelsResult, ...] = ()
     contrasts: tuple[ContrastResult, ...] = ()
+    block_orders: Evenness | None = None
+    unrated_blocks: tuple[BlockResult, ...] = field(default=(), metadata=_NOT_IN_JSON)
+
+    @property
+    def trial_blocks(self) -> tuple[BlockResult, ...]:
+        """The main blocks without a design: those with statements, then the others."""
+        return (*self.blocks, *self.unrated_blocks)
 
 
 SEALED: Final = "computed only after unblinding, because the codes do not show which condition is which"
@@ -406,7 +424,7 @@ VERDICTS_MEAN: Final = (
 
 
 def beyond_phrase(tested: Equivalence) -> str:
-    """Return the number of participants who differ by more than the bound, with the interval of their share."""
+    """Return the number of participants who differ by more than the bound, with the interval of their proportion."""
     if tested.beyond is None:
         return "–"
     ends = tested.beyond.interval
@@ -462,7 +480,7 @@ def presentation_sentences(result: BlockResult) -> tuple[str, ...]:
             f"Several conditions have a delay of {delays}; they are treated as repeated presentations of one delay."
         )
     if most > 1:
-        often = _times_words(fewest, most)
+        often = _times_text(fewest, most)
         has_threshold = result.findings.get("threshold") is not None
         single = "; the detection threshold is estimated from all individual answers" if has_threshold else ""
         lines.append(
@@ -477,7 +495,7 @@ def presentation_sentences(result: BlockResult) -> tuple[str, ...]:
     return tuple(lines)
 
 
-def _times_words(fewest: int, most: int) -> str:
+def _times_text(fewest: int, most: int) -> str:
     """Return "twice", "once or twice", "1 to 3 times"."""
     if most == 2:
         return "twice" if fewest == most else "once or twice"
@@ -491,11 +509,11 @@ def min_sample(alpha: float, bound: float) -> str:
 
 def min_sample_reason(alpha: float, bound: float) -> str:
     """Return a sentence on the minimum number of participants for equivalence of statements, and its reason."""
-    share = smallest_minority(bound, STEPS)
+    proportion = smallest_minority(bound, STEPS)
     return (
         f"{min_sample(alpha, bound)}. A smaller sample has more than a {percent(alpha)} chance of including nobody "
-        f"from a minority of {percent(share)} of the population; if the answers of such a minority differ by "
-        f"{significant(bound / share)} points, they shift the mean by as much as the bound"
+        f"from a minority of {percent(proportion)} of the population; if the answers of such a minority differ by "
+        f"{significant(bound / proportion)} points, they shift the mean by as much as the bound"
     )
 
 
@@ -510,7 +528,7 @@ def test_name(outcome: Outcome) -> str:
     }.get(outcome.test, outcome.test)
 
 
-def method_words(methods: Iterable[str]) -> str:
+def method_text(methods: Iterable[str]) -> str:
     """Return the methods of several tests as text; opposite directions become "in the direction stated for each"."""
     several = dict.fromkeys(methods)
     if len(several) > 1:
@@ -519,16 +537,16 @@ def method_words(methods: Iterable[str]) -> str:
     return "; ".join(several)
 
 
-def incomplete_words(result: BlockResult) -> str:
+def incomplete_answers_sentence(result: BlockResult) -> str:
     """Return a sentence on participants excluded from tests over all settings."""
     statements: dict[str, list[str]] = {}
-    for item, people in result.incomplete.items():
-        for person in people:
-            statements.setdefault(person, []).append(f"“{short_text(result, item)}”")
-    every = len(result.items)
+    for item, participants in result.incomplete.items():
+        for participant in participants:
+            statements.setdefault(participant, []).append(f"“{short_text(result, item)}”")
+    statement_count = len(result.items)
     excluded = [
-        f"{person} ({'all statements' if len(items) == every else listed(items)})"
-        for person, items in sorted(statements.items())
+        f"{participant} ({'all statements' if len(items) == statement_count else listed(items)})"
+        for participant, items in sorted(statements.items())
     ]
     return (
         f"Participants excluded from tests across all {settings_noun(result)}s because an answer is missing: "

@@ -50,7 +50,7 @@ if TYPE_CHECKING:
 Send: TypeAlias = Callable[[Answer], object]
 
 _EVALUATION: Final = 0.7
-"""The evaluation's share of the progress after the first figures; the rest is drawing."""
+"""The evaluation's proportion of the progress after the first figures; the rest is drawing."""
 
 
 def carry_out(order: Order, send: Send, stop: Callable[[], bool]) -> Done:

@@ -4,10 +4,11 @@ Numbers have at most three significant digits, p values three decimals; report.j
 """
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Final, Protocol
 
 from study_app.number_text import MINUS, exact_text
+from study_app.protocol.model import Contrast
 
 _DIGITS: Final = 3
 """Significant digits in sentences and table cells."""
@@ -90,14 +91,14 @@ def interval(ends: Ends | None, decimals: int = 2) -> str:
 
 
 def percent(share: float) -> str:
-    """Return a share in percent with at most `_DIGITS` digits, never rounded to 0 or 100: 90 %, 95.8 %, > 99.9 %."""
+    """Return a percentage with at most `_DIGITS` digits, never rounded to 0 or 100: 90 %, 95.8 %, > 99.9 %."""
     if 0.9995 <= share < 1:
         return "> 99.9 %"
     return "< 0.1 %" if 0 < share < 0.0005 else f"{significant(100 * share)} %"
 
 
 def whole_percent(share: float) -> str:
-    """Return a share in percent without decimals: 0 %, 96 %."""
+    """Return a proportion in percent without decimals: 0 %, 96 %."""
     return f"{share:.0%}".replace("%", " %")
 
 
@@ -114,3 +115,16 @@ def with_group(name: str, group: str) -> str:
 def ms(delay_ms: float) -> str:
     """Return a delay with its unit."""
     return f"{delay_ms:g} ms"
+
+
+def inclusion_text(contrasts: Iterable[Contrast], *, in_report: bool = False) -> str:
+    """Return sentences on which participants are compared, for power analysis, preregistration and report."""
+    tested = list(contrasts)
+    beyond = any(contrast.measure == "threshold" for contrast in tested)
+    kinds = {contrast.within is None for contrast in tested}  # a comparison of groups alone has one value each
+    values = {(): "both of their values are", (False,): "both of their values are", (True,): "their value is"}
+    included = (
+        f"Participants are included if {values.get(tuple(kinds), 'all of their compared values are')} available"
+        f"{', even if a threshold lies outside the range of levels' * beyond}."
+    )
+    return included if in_report else f"{included} The report lists the excluded participants and the reasons."

@@ -165,7 +165,7 @@ class FirstPage:
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """The current activity, the share of all work that is done (0 to 1), and whether it can be stopped."""
+    """The current activity, the proportion of all work that is done (0 to 1), and whether it can be stopped."""
 
     what: str
     share: float

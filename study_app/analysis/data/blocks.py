@@ -27,6 +27,8 @@ KINDS: Final[tuple[Kind, ...]] = get_args(Kind)
 
 _CODE: Final = re.compile(r"([A-Za-z0-9]+-)?[A-Z][0-9]+")
 """A code, which follows the name of the site in merged studies: L1, Utrecht-L1."""
+_WORD: Final = re.compile(r"[a-z]{2}")
+"""The beginning of a name that is capitalised in tables."""
 _DELAY_PREFIX: Final = "D"
 """Delay settings have the codes D1, D2 …, which identify blocks of delays in sealed receipts of earlier versions."""
 
@@ -67,10 +69,10 @@ class Setting:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Block:
-    """A main block with a questionnaire; ``settings`` are in code order or, once known, in condition order.
+    """A main block without a design; ``settings`` are in code order or, once known, in condition order.
 
-    ``kind`` is the kind of comparison recorded in the receipt. ``labels`` are the names of the seven points, lowest
-    first; ``cannot_judge`` is the answer off the scale, or None.
+    ``kind`` is the kind of comparison recorded in the receipt. ``items`` are the statements after each trial.
+    ``labels`` are the names of their seven points, lowest first; ``cannot_judge`` is the answer off the scale, or None.
     """
 
     id: str
@@ -150,7 +152,7 @@ def _setting_of_condition(condition: Mapping[str, Any], code: str, name: str) ->
 
 
 def main_blocks(protocol: Mapping[str, Any], key: Key | None) -> tuple[Block, ...]:
-    """Return the main blocks with questions, in session order, from the protocol in a receipt."""
+    """Return the main blocks without a design, in session order, from the protocol in a receipt."""
     blocks = [
         protocol["blocks"][step]
         for step in RecordedSessions.model_validate(protocol).steps
@@ -159,19 +161,22 @@ def main_blocks(protocol: Mapping[str, Any], key: Key | None) -> tuple[Block, ..
     return tuple(
         _main_block(protocol, block, block_titles(protocol)[block["id"]], key)
         for block in blocks
-        if block["phase"] == "main" and block["questionnaire"] is not None and _statements(protocol, block)
+        if block["phase"] == "main" and "slots" not in block
     )
 
 
 def _statements(protocol: Mapping[str, Any], block: Mapping[str, Any]) -> list[Mapping[str, Any]]:
     """Return the statements of a block's questionnaire, which are the items without a kind."""
+    if block["questionnaire"] is None:
+        return []
     return [item for item in protocol["questionnaires"][block["questionnaire"]]["items"] if "kind" not in item]
 
 
 def _main_block(protocol: Mapping[str, Any], block: Mapping[str, Any], title: str, key: Key | None) -> Block:
-    language = display_language(protocol)
-    questionnaire = protocol["questionnaires"][block["questionnaire"]]
-    scale = protocol["scales"][questionnaire["scale"]]
+    language, statements = display_language(protocol), _statements(protocol, block)
+    scale: Mapping[str, Any] = {"cannot_judge": None, "labels": {language: ()}}
+    if statements:
+        scale = protocol["scales"][protocol["questionnaires"][block["questionnaire"]]["scale"]]
     off_scale = scale["cannot_judge"]
     settings = _block_settings(protocol, block["id"], key)
     kind: Kind = block.get("compares") or ("delays" if block["code_prefix"] == _DELAY_PREFIX else "liquids")
@@ -184,7 +189,7 @@ def _main_block(protocol: Mapping[str, Any], block: Mapping[str, Any], title: st
         settings=settings,
         items=tuple(
             Item(id=item["id"], text=text_in(item["text"], language), short=text_in(item["short"], language))
-            for item in _statements(protocol, block)
+            for item in statements
         ),
         labels=tuple(scale["labels"][language]),
         cannot_judge=None if off_scale is None else text_in(off_scale, language),
@@ -200,9 +205,10 @@ def _block_settings(protocol: Mapping[str, Any], block: str, key: Key | None) ->
 
 
 def setting_name(setting: Setting, others: Sequence[Setting]) -> str:
-    """Return the name of a setting: its code, or its liquid with view and delay if these differ.
+    """Return the name of a setting: its code, or its condition or liquid with view and delay if these differ.
 
-    The track or the condition's ID follows a name that several settings share.
+    A setting has the name of its condition, or of its liquid if other settings have the same liquid. The track or the
+    condition's ID follows a name that several settings share.
     """
     name, (_, is_track, track) = _name_without_track(setting, others), (setting.condition or "").partition("/")
     if sum(_name_without_track(other, others) == name for other in others) < 2:
@@ -215,11 +221,17 @@ def name_in_sentence(name: str) -> str:
     return name if _CODE.fullmatch(name) else name[:1].lower() + name[1:]
 
 
+def _name_of_id(name: str) -> str:
+    """Return an ID as a name in tables: "Light oil", but "a" and "l1", which are not words, unchanged."""
+    words = name.replace("_", " ")
+    return words[:1].upper() + words[1:] if _WORD.match(words) else words
+
+
 def _name_without_track(setting: Setting, others: Sequence[Setting]) -> str:
     if setting.liquid is None or setting.delay_ms is None:
         return setting.code if setting.standard is None else f"Standard {setting.standard}"
-    liquid = setting.liquid.replace("_", " ")
-    name = liquid[:1].upper() + liquid[1:]
+    is_shared = sum(other.liquid == setting.liquid for other in others) > 1
+    name = _name_of_id(setting.liquid if is_shared or setting.condition is None else setting.condition)
     name = f"{name}, {setting.view or 'tank'}" if len({other.view for other in others}) > 1 else name
     name = f"{name}, {setting.delay_ms:g} ms" if len({other.delay_ms for other in others}) > 1 else name
     return f"{name}, {setting.link}" if setting.link else name
@@ -247,7 +259,7 @@ def _ordered_settings(
     return tuple(sorted(settings, key=lambda setting: order.index(setting.condition))), kind
 
 
-def published_words(published: Published, unit: str | None) -> str:
+def published_text(published: Published, unit: str | None) -> str:
     """Return a published value and how it was measured, as text; ``unit`` is that of the varied parameter."""
     details = [
         *([] if published.standard is None else [f"standard {published.standard:g} {unit or ''}".rstrip()]),
@@ -256,7 +268,7 @@ def published_words(published: Published, unit: str | None) -> str:
         *([] if published.n is None else [f"n = {published.n}"]),
     ]
     source = f"{published.source}: " if published.source else ""
-    return f"{source}{published.value_words(unit or '')}" + (f" ({', '.join(details)})" if details else "")
+    return f"{source}{published.value_text(unit or '')}" + (f" ({', '.join(details)})" if details else "")
 
 
 def compared_percent(published: Iterable[Published]) -> float | None:
@@ -285,7 +297,7 @@ class LevelBlock:
 
     ``stimulus`` is the varied quantity, ``method`` the rule for choosing levels: None for a comparison of conditions
     and while the key is sealed. ``published`` are values from other studies for comparison; ``wrong_most`` is the
-    permitted share of incorrect catch trials, None without catch trials.
+    permitted proportion of incorrect catch trials, None without catch trials.
     """
 
     id: str
@@ -315,6 +327,11 @@ class LevelBlock:
         """Whether trials of several standards are interleaved."""
         standards = {setting.standard for setting in self.settings}
         return len(standards) > 1 and self.method is not None and self.method.order == "interleaved"
+
+    @property
+    def has_pse(self) -> bool:
+        """Whether its thresholds are points of subjective equality."""
+        return self.stimulus is not None and self.stimulus.has_pse(self.design)
 
     @property
     def assumed(self) -> Assumed | None:
@@ -413,13 +430,13 @@ class Decided:
         alpha = self.alphas[max(look, 1) - 1]
         return replace(self, alpha=alpha, look=look, planned_alpha=self.alpha) if self.looks else self
 
-    def alpha_words(self) -> str:
+    def alpha_text(self) -> str:
         """Return the planned alpha and the alpha that applies at the current look."""
         if self.planned_alpha is None:
             return f"{self.alpha:g}"
         return f"{self.planned_alpha:g} across all looks, {significant(self.alpha)} at this look"
 
-    def look_words(self, n: int) -> str:
+    def look_text(self, n: int) -> str:
         """Return sentences on the planned look at ``n`` participants; empty if no looks are planned.
 
         An unplanned look is called unplanned, with the error rate of testing after every participant.
@@ -571,6 +588,11 @@ class PlacedQuestion:
     def scale_ends(self) -> tuple[float, float] | None:
         """The ends of its answer scale; None for a number that is entered."""
         return None if self.question.kind_id == "number" else self.bounds
+
+    @property
+    def unit(self) -> str:
+        """The unit of a number that is entered; "" for other answers."""
+        return getattr(self.question.view(0, self.context), "unit", "")
 
     @property
     def cannot_judge(self) -> str | None:

@@ -29,7 +29,7 @@ _CUTOFF_HZ: Final = 10.0
 """Voluntary movement is slower than this; speeds are low-pass filtered (zero-phase Butterworth, total order 4)."""
 
 _PROMINENCE: Final = 0.1
-"""A peak of speed is a submovement if its prominence is at least this share of the reach's highest speed."""
+"""A peak of speed is a submovement if its prominence is at least this proportion of the reach's highest speed."""
 
 _SHORTEST: Final = 32
 """The fewest samples that can be filtered; a shorter reach counts as one submovement."""
@@ -224,7 +224,7 @@ class Performance:
 def performance(study: Study, each: Callable[[int, int], object] = lambda _done, _of: None) -> Performance:
     """Measure the valid trials; ``each`` is called with the number of recordings read and the total."""
     rows = study.trials[study.trials["counted"]]
-    tasks = {block.id: _targets(study.protocol, block) for block in study.blocks}
+    tasks = {block.id: _targets(study.protocol, block) for block in study.trial_blocks}
     reaching_blocks = tuple(name for name, targets in tasks.items() if targets is not None)
     reaching = rows[rows["block"].isin(reaching_blocks)]
     trial_reaches: list[TrialReaches] = []
@@ -245,12 +245,12 @@ def performance(study: Study, each: Callable[[int, int], object] = lambda _done,
         path_m=rows["path_length_m"],
         at_limit_percent=100 * rows["limiter_norm"].astype("Float64") / rows["ticks"].replace(0, pd.NA),
     )
-    moved = [quartile for block in study.blocks for quartile in _movement_quartiles(block, of_trials, OF_TRIALS)]
+    moved = [quartile for block in study.trial_blocks for quartile in _movement_quartiles(block, of_trials, OF_TRIALS)]
     if trial_reaches:
         of_reaches = _reach_table(trial_reaches)
         moved += [
             quartile
-            for block in study.blocks
+            for block in study.trial_blocks
             if block.id in reaching_blocks
             for quartile in _movement_quartiles(block, of_reaches, OF_REACHES)
         ]

@@ -1,7 +1,7 @@
 """Read sessions into typed tables, check them against their receipts, and mark excluded rows."""
 
 import contextlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, NamedTuple, TypeAlias
@@ -107,24 +107,28 @@ def _rebuild_remedy(path: Path) -> str:
     return f"create it again from the journal with liquid-study rebuild {as_argument(path.parent)}"
 
 
-def _read_json_object(path: Path) -> dict[str, Any]:
-    """Read a JSON object; raise AnalysisError if the file is unreadable or holds something else."""
+def _read_receipt(path: Path) -> dict[str, Any]:
     try:
         parsed = parse_json(read_regular(path))
+    except FileNotFoundError as error:
+        raise DamagedReceiptError(f"{path} is missing: restore it from a backup") from error
     except OSError as error:
         raise _unreadable_error(path, error) from error
     except ValueError as error:
-        raise AnalysisError(f"{path} is damaged ({error}): restore it from a backup") from error
+        raise DamagedReceiptError(f"{path} is damaged ({error}): restore it from a backup") from error
     if not isinstance(parsed, dict):
-        raise AnalysisError(f"{path} is damaged (it does not contain a JSON object): restore it from a backup")
+        raise DamagedReceiptError(f"{path} is damaged (it does not contain a JSON object): restore it from a backup")
     return parsed
+
+
+class DamagedReceiptError(AnalysisError):
+    """A receipt is missing or does not describe its session, so that the session cannot be analysed."""
 
 
 def _unreadable_error(path: Path, error: OSError, remedy: str = "restore it from a backup") -> AnalysisError:
     """Return the error for a file that cannot be read."""
-    return AnalysisError(
-        f"{path} cannot be read ({error.strerror or type(error).__name__}): {remedy}, or correct its permissions"
-    )
+    permissions = "" if isinstance(error, FileNotFoundError) else ", or correct its permissions"
+    return AnalysisError(f"{path} cannot be read ({error.strerror or type(error).__name__}): {remedy}{permissions}")
 
 
 class Bench(NamedTuple):
@@ -139,6 +143,7 @@ class Bench(NamedTuple):
 class Session:
     """The contents of one session's receipt; ``visit`` is its row of ``Study.participants``.
 
+    ``blocks`` are the main blocks with statements, ``unrated_blocks`` those with neither statements nor a design.
     ``own_dynamics`` are the device's own damping, friction and mass; None if they were not measured.
     ``device_velocity`` is whether the device measured its velocity.
     """
@@ -150,6 +155,7 @@ class Session:
     protocol: Mapping[str, Any]
     blocks: tuple[Block, ...]
     visit: Mapping[str, Any]
+    unrated_blocks: tuple[Block, ...] = ()
     others: OtherQuestions = NO_QUESTIONS
     levels: tuple[LevelBlock, ...] = ()
     own_dynamics: Bench | None = None
@@ -168,9 +174,10 @@ class Session:
 def read_session(folder: SessionFolder, key: Key | None, like: Session | None = None) -> Session:
     """Read a session's receipt; ``key`` is the study's opened key, if any.
 
-    ``like`` is another session of the study, with which equal values are shared to save memory.
+    ``like`` is another session of the study, with which equal values are shared to save memory. Raise
+    `DamagedReceiptError` if the receipt is missing or does not describe the session.
     """
-    receipt = _read_json_object(folder.receipt)
+    receipt = _read_receipt(folder.receipt)
     try:
         protocol = receipt["protocol"]
         if like is not None and protocol == like.protocol:
@@ -195,11 +202,13 @@ def read_session(folder: SessionFolder, key: Key | None, like: Session | None = 
         own_dynamics = _own_dynamics(receipt["device"].get("bench"))
         device_velocity = receipt["device"].get("estimator") == "device"
         same_protocol = like is not None and protocol is like.protocol
-        blocks = like.blocks if like is not None and same_protocol else main_blocks(protocol, key)
+        blocks = (
+            (*like.blocks, *like.unrated_blocks) if like is not None and same_protocol else main_blocks(protocol, key)
+        )
         others = like.others if like is not None and same_protocol else other_questions(protocol, key)
         levels = like.levels if like is not None and same_protocol else level_blocks(protocol, key)
     except (KeyError, TypeError, AttributeError, ValueError) as error:
-        raise AnalysisError(
+        raise DamagedReceiptError(
             f"{folder.receipt} does not describe the session ({type(error).__name__}, {error}): it has been changed, "
             "or was written by a different version of the program; restore it from a backup"
         ) from error
@@ -209,7 +218,8 @@ def read_session(folder: SessionFolder, key: Key | None, like: Session | None = 
         title=title,
         version=version,
         protocol=protocol,
-        blocks=blocks,
+        blocks=tuple(block for block in blocks if block.items),
+        unrated_blocks=tuple(block for block in blocks if not block.items),
         visit=visit,
         others=others,
         levels=levels,
@@ -341,6 +351,27 @@ def _row_location(lengths: _Counts, index: int) -> tuple[int, int]:
     ends = np.cumsum(lengths)
     session = int(np.searchsorted(ends, index, side="right"))
     return session, int(index - ends[session] + lengths[session]) + 2
+
+
+def read_sessions(
+    folders: Iterable[SessionFolder], key: Key | None
+) -> tuple[tuple[Session, ...], tuple[SessionFolder, ...]]:
+    """Return the sessions of a study, and the folders whose receipts are missing or damaged.
+
+    Raise AnalysisError if no receipt describes its session, or a receipt may not be read.
+    """
+    sessions: list[Session] = []
+    damaged: list[SessionFolder] = []
+    first_error: DamagedReceiptError | None = None
+    for folder in folders:
+        try:
+            sessions.append(read_session(folder, key, like=sessions[0] if sessions else None))
+        except DamagedReceiptError as error:
+            first_error = first_error or error
+            damaged.append(folder)
+    if first_error is not None and not sessions:
+        raise first_error
+    return tuple(sessions), tuple(damaged)
 
 
 def mark_excluded(table: pd.DataFrame, listed: Sequence[Exclusion]) -> pd.DataFrame:

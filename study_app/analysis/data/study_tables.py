@@ -48,7 +48,7 @@ from study_app.analysis.data.session_files import (
     estimators_of,
     mark_excluded,
     mean_dynamics,
-    read_session,
+    read_sessions,
     read_tables,
 )
 from study_app.errors import AnalysisError, StoreError
@@ -148,6 +148,8 @@ def _pooled_dynamics(sites: Iterable[OwnDynamics | None], sessions: int) -> OwnD
 
 
 _TRIAL: Final = ["participant", "session", "trial"]
+DAMAGED: Final = "damaged"
+"""The status of a session whose receipt is missing or does not describe it."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -156,9 +158,10 @@ class Study:
 
     ``responses`` and ``trials`` have the columns of ``store.files.columns``, with ``session_status``, ``excluded``,
     ``exclusion_reason`` and ``counted`` added; ``participants`` has one row per session, with the last three and its
-    `MissingTrials`. ``blocks`` are the main blocks with questions; ``settings`` maps every (block, code) to its
-    condition, and is empty while the key is sealed; ``exclusions`` are all exclusions, ``late`` those that a person
-    decided or reversed after the key was opened; ``kept`` are sessions that a person decided to keep; ``doubts`` are
+    `MissingTrials`. ``blocks`` are the main blocks with statements, ``unrated_blocks`` those with neither statements
+    nor a design, and ``trial_blocks`` both; ``settings`` maps every (block, code) to its condition, and is empty while
+    the key is sealed; ``exclusions`` are all exclusions, ``late`` those that a person decided or reversed after the key
+    was opened; ``kept`` are sessions that a person decided to keep; ``doubts`` are
     files that differ from their recorded state but are used. ``decided`` is the protocol's analysis plan, ``protocol``
     the first session's, from its receipt. ``levels`` are the blocks with a design, ``intervals`` the intervals of their
     trials; ``others`` are the questions outside blocks of statements; ``answered`` has the recorded answers to all
@@ -198,6 +201,7 @@ class Study:
     with_below_chance: bool = False
     liquids: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     split: str = ""
+    unrated_blocks: tuple[Block, ...] = ()
     _aggregates: dict[tuple[str, ...], pd.DataFrame] = field(
         init=False, default_factory=dict, repr=False, compare=False
     )
@@ -220,12 +224,23 @@ class Study:
     @property
     def left_out(self) -> int:
         """The number of sessions that were not completed."""
-        return int((~self.participants["counted"] & ~self.participants["excluded"]).sum())
+        left_out = ~self.participants["counted"] & ~self.participants["excluded"]
+        return int((left_out & (self.participants["status"] != DAMAGED)).sum())
+
+    @property
+    def damaged_sessions(self) -> int:
+        """The number of sessions without a valid receipt that are not excluded for another reason."""
+        return int(((self.participants["status"] == DAMAGED) & ~self.participants["excluded"]).sum())
 
     @property
     def excluded_sessions(self) -> pd.DataFrame:
         """The rows of ``participants`` for excluded sessions, completed or not."""
         return self.participants[self.participants["excluded"]]
+
+    @property
+    def trial_blocks(self) -> tuple[Block, ...]:
+        """The main blocks without a design: those with statements, then the others."""
+        return (*self.blocks, *self.unrated_blocks)
 
     @property
     def versions(self) -> tuple[str, ...]:
@@ -287,7 +302,7 @@ class Study:
         if warn is None:
             return
         for doubt in self.doubts:
-            warn(f"warning: {doubt}; the file is still used")
+            warn(f"warning: {doubt}{'; the file is still used' * doubt.used}")
 
     def blocks_of(self, kind: Kind) -> tuple[Block, ...]:
         """Return the blocks that compare liquids, delays or views."""
@@ -301,6 +316,10 @@ class Study:
         """Return the valid rows of ``answered`` for a question outside blocks of statements."""
         rows = self.rows_of(asked)
         return rows[rows["counted"]]
+
+    def hidden_from(self, asked: PlacedQuestion) -> set[str]:
+        """Return the participants to whom a question with a display condition was never shown."""
+        return set() if asked.question.show_if is None else {*self.people} - {*self.answers_to(asked)["participant"]}
 
     def rows_of(self, asked: PlacedQuestion) -> pd.DataFrame:
         """Return all rows of ``answered`` for a question outside blocks of statements."""
@@ -406,6 +425,7 @@ def pool_sites(folder: Path, sites: Mapping[str, Study], withdrawn: Sequence[Tom
         folder=folder,
         sites=tuple(sites),
         blocks=_pooled_blocks({site: study.blocks for site, study in sites.items()}),
+        unrated_blocks=_pooled_blocks({site: study.unrated_blocks for site, study in sites.items()}),
         levels=_pooled_blocks({site: study.levels for site, study in sites.items()}),
         others=_pooled_questions({site: study.others for site, study in sites.items()}),
         settings={
@@ -441,15 +461,15 @@ def _load(folder: Path, *, sealed: bool = False, planned: bool = True) -> Study:
     refuse_earlier_columns(place)
     key = None if sealed else _read_key(place, sessions)
     listed = tuple(row for row in exclusions(place.path) if planned or row.rule_or_person not in RULES)
-    records = [read_session(sessions[0], key)]
-    records += [read_session(session, key, like=records[0]) for session in sessions[1:]]
+    records, damaged = read_sessions(sessions, key)
     listed += tuple(_find_missing_exclusions(place, records, listed))
     for session in records[1:]:
         _check_poolable(records[0], session)
     responses, trials = read_tables(records, "responses"), read_tables(records, "trials")
     if key is None:  # tables of earlier versions have these columns
         trials = _drop_columns(trials, SEALED)
-    check_exclusions_exist(place, trials, listed)
+    unread = {(session.participant, session.number) for session in damaged}
+    check_exclusions_exist(place, trials, [row for row in listed if (row.participant, row.session) not in unread])
     after_trials = responses[responses["trial"].notna()]
     attempts = pd.concat([after_trials, trials])[[*_TRIAL, "attempt"]]
     last_attempts = attempts.groupby(_TRIAL)["attempt"].max().rename("last_attempt")
@@ -458,13 +478,14 @@ def _load(folder: Path, *, sealed: bool = False, planned: bool = True) -> Study:
     is_counted = form_answers["session_status"].isin(REACHED_END) & ~form_answers["excluded"]
     form_answers = form_answers.assign(counted=is_counted.astype(bool))
     answered = pd.concat([counted, form_answers]).sort_index() if len(form_answers) else counted
-    participants = mark_excluded(pd.DataFrame([session.visit for session in records]), listed)
+    participants = mark_excluded(_participants(records, damaged), listed)
     return Study(
         folder=place.path,
         name=records[0].study,
         title=records[0].title,
         version=records[0].version,
         blocks=records[0].blocks,
+        unrated_blocks=records[0].unrated_blocks,
         settings={} if key is None else settings_from_key(key),
         responses=_statement_answers(counted),
         answered=answered,
@@ -475,8 +496,13 @@ def _load(folder: Path, *, sealed: bool = False, planned: bool = True) -> Study:
         exclusions=listed,
         late=late_exclusions(place.path, listed),
         kept=reversals(place.path),
-        doubts=tuple(
-            doubt for record in records for doubt in session_discrepancies(Place(place, record.folder, record.study))
+        doubts=(
+            *(
+                doubt
+                for record in records
+                for doubt in session_discrepancies(Place(place, record.folder, record.study))
+            ),
+            *map(_receipt_discrepancy, damaged),
         ),
         others=records[0].others,
         decided=read_decided([session.protocol.get("analysis") for session in records]),
@@ -487,6 +513,24 @@ def _load(folder: Path, *, sealed: bool = False, planned: bool = True) -> Study:
         estimator=estimators_of(records),
         withdrawn=tuple(tombstones(place).values()),
     )
+
+
+def _participants(records: Sequence[Session], damaged: Sequence[SessionFolder]) -> pd.DataFrame:
+    """Return a row for each session; of ``damaged`` sessions it contains only what their folders and others tell."""
+    visits = [dict(session.visit) for session in records]
+    shared = {name: visits[0][name] for name in ("simulated", "pilot")}
+    unknown = dict.fromkeys(visits[0], None)
+    visits += [
+        unknown | shared | {"participant": folder.participant, "session": folder.number, "status": DAMAGED}
+        for folder in damaged
+    ]
+    table = pd.DataFrame(visits)
+    return table.assign(seed=pd.Series([visit["seed"] for visit in visits], dtype=object)) if damaged else table
+
+
+def _receipt_discrepancy(session: SessionFolder) -> Discrepancy:
+    what = "is missing or damaged, so the session is not included in the analysis"
+    return Discrepancy(session.receipt, what, "restore it from a backup", used=False)
 
 
 def _find_missing_exclusions(
@@ -527,7 +571,7 @@ def _read_key(place: StudyFolder, sessions: Sequence[SessionFolder]) -> Key | No
     try:
         return revealed_key(place.path)
     except StoreError:
-        first, *others = [read_session(session, None) for session in sessions]
+        (first, *others), _ = read_sessions(sessions, None)
         for other in others:
             if other.study != first.study:
                 raise AnalysisError(_other_study_message(other, first)) from None

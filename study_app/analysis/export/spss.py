@@ -70,8 +70,11 @@ def _code_question(
     if isinstance(question, PlacedScore) or not question.levels:
         return values, {}
     rows, asked = study.rows_of(question), study.rows_in(question.where)
+    rows = cells.select(rows[rows["counted"]])
     if cells.setting is not None:
-        rows, asked = (table[table["code"] == cells.setting.code] for table in (rows, asked))
+        asked = asked[asked["code"] == cells.setting.code]
+    if cells.occasion is not None:
+        asked = asked[asked["session"] == cells.occasion[0]]
     if _has_options(question):
         if question.question.names_several:
             return values, {}

@@ -238,36 +238,52 @@ class Cells:
 
 @dataclass(frozen=True, slots=True)
 class QuestionCells:
-    """The content of a wide-table column for another question or a questionnaire score."""
+    """The content of a wide-table column for another question or a questionnaire score.
+
+    ``occasion`` is the session and the number of the answer in that session, if a column has one of several answers.
+    """
 
     asked: PlacedQuestion | PlacedScore
     setting: Setting | None
+    occasion: tuple[int, int] | None = None
+
+    def select(self, answers: pd.DataFrame) -> pd.DataFrame:
+        """Return the rows of the column's setting and occasion."""
+        if self.setting is not None:
+            answers = answers[answers["code"] == self.setting.code]
+        if self.occasion is None:
+            return answers
+        numbered = _number_answers(answers)
+        return numbered[(numbered["session"] == self.occasion[0]) & (numbered["number"] == self.occasion[1])]
 
 
 def wide_table(study: Study) -> tuple[ExportTable, dict[str, Cells | QuestionCells]]:
     """Return the wide table of all valid answers, and the content of each of its columns.
 
     Columns are ``item__condition``, or ``item__code`` until the key is opened; if names would not be unique, they are
-    ``block__item__condition``. A column has the median of repeated answers, and the last answer for options and texts.
+    ``block__item__condition``. A column has the median of repeated answers; options and texts have a column for each
+    answer, whose name ends with the session and the number of the answer in the session, if there are several.
     Questions of forms are ``form__item``, scores ``form__score``, and for repeated forms ``form__item__block``.
     """
-    people, cells = list(study.people), _wide_cells(study)
+    participants, cells = list(study.people), _wide_cells(study)
     simulated = dict(zip(study.participants["participant"], study.participants["simulated"], strict=True))
     values_by_name = {
-        "participant": pd.array(people, dtype="string"),
-        "simulated": pd.array([bool(simulated[person]) for person in people], dtype="boolean"),
+        "participant": pd.array(participants, dtype="string"),
+        "simulated": pd.array([bool(simulated[person]) for person in participants], dtype="boolean"),
     }
     columns = [_BY_NAME["participant"], _BY_NAME["simulated"]]
     if groups := group_members(study):
-        values_by_name["group"] = pd.array([groups.get(person) for person in people], dtype="string")
+        values_by_name["group"] = pd.array([groups.get(person) for person in participants], dtype="string")
         columns.append(_BY_NAME["group"])
     for name, cell in cells.items():
         column = (
-            _statement_column(study, cell, people) if isinstance(cell, Cells) else _question_column(study, cell, people)
+            _statement_column(study, cell, participants)
+            if isinstance(cell, Cells)
+            else _question_column(study, cell, participants)
         )
-        values_by_name[name], description, (least, most) = column
+        values_by_name[name], description, (minimum, maximum) = column
         kind = next(kind for kind, dtype in _TYPES.items() if dtype == values_by_name[name].dtype.name)
-        columns.append(optional(name, kind, description, minimum=least, maximum=most))
+        columns.append(optional(name, kind, description, minimum=minimum, maximum=maximum))
     return _add_site(study, ExportTable("wide", tuple(columns), pd.DataFrame(values_by_name))), cells
 
 
@@ -286,31 +302,52 @@ def _wide_cells(study: Study) -> dict[str, Cells | QuestionCells]:
         question_name = other.name if isinstance(other, PlacedScore) else other.id
         for setting in other.where.settings or (None,):
             ending = "" if setting is None else f"__{setting.condition or setting.code}"
-            other_cells[f"{other.where.id}__{question_name}{ending}"] = QuestionCells(other, setting)
+            for occasion_ending, cells in _cells_by_occasion(study, QuestionCells(other, setting)):
+                other_cells[f"{other.where.id}__{question_name}{ending}{occasion_ending}"] = cells
     name_counts = Counter((*other_cells, *(name for name, _ in statements)))
     return {
         name if name_counts[name] == 1 else f"{cells.block.id}__{name}": cells for name, cells in statements
     } | other_cells
 
 
+def _cells_by_occasion(study: Study, cells: QuestionCells) -> Iterator[tuple[str, QuestionCells]]:
+    """Yield the end of the name and the content of each column of a question: one unless options or texts repeat."""
+    question = cells.asked
+    answers = None
+    if not isinstance(question, PlacedScore) and question.question.value_type == "text":
+        answers = _number_answers(cells.select(study.answers_to(question)))
+    if answers is None or not answers["participant"].duplicated().any():
+        yield "", cells
+        return
+    occasions = sorted({*zip(answers["session"].astype(int), answers["number"].astype(int), strict=True)})
+    sessions, numbers = (len({occasion[place] for occasion in occasions}) > 1 for place in (0, 1))
+    for session, number in occasions:
+        yield f"{f'__{session}' * sessions}{f'__{number}' * numbers}", replace(cells, occasion=(session, number))
+
+
+def _number_answers(answers: pd.DataFrame) -> pd.DataFrame:
+    """Return answers with their ``number`` among the participant's answers in the session, from 1."""
+    ordered = answers.sort_values(["session", "trial"], kind="stable")
+    return ordered.assign(number=ordered.groupby(["participant", "session"]).cumcount() + 1)
+
+
 Answers: TypeAlias = tuple[pd.api.extensions.ExtensionArray, str, tuple[float | None, float | None]]
 """The cells of a column of the wide table, its description, and the ends of the scale."""
 
 
-def _statement_column(study: Study, cells: Cells, people: list[str]) -> Answers:
+def _statement_column(study: Study, cells: Cells, participants: list[str]) -> Answers:
     block, setting, item = cells.block, cells.setting, cells.item
     answers = study.answers(block)
     answers = answers[(answers["code"] == setting.code) & (answers["item"] == item.id)]
     description = f"{item.text} About {block.name(setting)}, in {block.title}.{_repeats_note(answers, 'median')}"
-    return _median_column(answers, "response", people), description, (1, 7)
+    return _median_column(answers, "response", participants), description, (1, 7)
 
 
-def _question_column(study: Study, cells: QuestionCells, people: list[str]) -> Answers:
+def _question_column(study: Study, cells: QuestionCells, participants: list[str]) -> Answers:
     question, setting = cells.asked, cells.setting
-    answers = scored(study, question) if isinstance(question, PlacedScore) else study.answers_to(question)
+    answers = cells.select(scored(study, question) if isinstance(question, PlacedScore) else study.answers_to(question))
     setting_note = ""
     if setting is not None:
-        answers = answers[answers["code"] == setting.code]
         setting_note = (
             f" {question.where.name(setting)}." if question.where.is_form else f" About {question.where.name(setting)}."
         )
@@ -318,15 +355,16 @@ def _question_column(study: Study, cells: QuestionCells, people: list[str]) -> A
         instrument = f" of {question.instrument}" if question.instrument else ""
         description = f"Score {question.name}{instrument}, in {question.where.title}.{setting_note}"
         description += _repeats_note(answers, "median", _MEAN_ELSEWHERE)
-        return _median_column(answers, "score", people), description, (None, None)
+        return _median_column(answers, "score", participants), description, (None, None)
     text = question.text if question.text.endswith((".", "?", "!")) else f"{question.text}."
     description = f"{text} In {question.where.title}.{setting_note}"
     if question.question.value_type != "text":
         description += _repeats_note(answers, "median", _MEAN_ELSEWHERE)
-        return _median_column(answers, "value", people), description, question.bounds or (None, None)
-    description += _repeats_note(answers, "last")
-    last = answers.sort_values(["session", "trial"]).groupby("participant")["response"].last()
-    return pd.array([last.get(person, pd.NA) for person in people], dtype="string"), description, (None, None)
+        return _median_column(answers, "value", participants), description, question.bounds or (None, None)
+    if cells.occasion is not None:
+        description += " Session {}, answer {}.".format(*cells.occasion)
+    texts = answers.groupby("participant")["response"].first()
+    return pd.array([texts.get(person, pd.NA) for person in participants], dtype="string"), description, (None, None)
 
 
 _MEAN_ELSEWHERE: Final = " (hypotheses and the first page of the report use the mean)"
@@ -338,10 +376,10 @@ def _repeats_note(answers: pd.DataFrame, which: str, note: str = "") -> str:
     return f" The {which} of each participant's answers{note}." if is_repeated else ""
 
 
-def _median_column(answers: pd.DataFrame, column: str, people: list[str]) -> pd.api.extensions.ExtensionArray:
+def _median_column(answers: pd.DataFrame, column: str, participants: list[str]) -> pd.api.extensions.ExtensionArray:
     """Return each participant's median, missing without numbers; the type is integer if all medians are whole."""
     numbers = answers[column].dropna().astype(float).groupby(answers["participant"]).median()
-    values = numbers.reindex(people).to_numpy()
+    values = numbers.reindex(participants).to_numpy()
     missing = np.isnan(values)
     filled = np.where(missing, 0, values)
     if (filled == np.floor(filled)).all():

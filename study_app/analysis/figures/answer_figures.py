@@ -144,7 +144,7 @@ def _drawn_participants(participants: int) -> list[int]:
     return [int(place) for place in np.linspace(0, participants - 1, MOST_LINES).round()]
 
 
-def line_words(participants: int) -> str:
+def line_text(participants: int) -> str:
     """Return the caption's description of the thin lines."""
     if participants <= MOST_LINES:
         return "participants"
@@ -179,7 +179,7 @@ def _draw_line_legend(sheet: Sheet) -> None:
 _PLASTIC: Final = (0.7548776662, 0.5698402910)
 """Steps of a sequence that spreads points evenly in a plane (Roberts 2018)."""
 _PERSON_SPREAD: Final = 0.5
-"""Largest distance between participants' points at one delay, as a share of the distance between delays."""
+"""Largest distance between participants' points at one delay, as a proportion of the distance between delays."""
 _CURVE_LEFT_PT: Final = 30.0
 _CURVE_FOOT_PT: Final = 30.0
 _CURVE_LINE_PT: Final = 9.0
@@ -192,9 +192,9 @@ _RIGHT_PT: Final = 26.0
 def draw_threshold(
     threshold: Threshold, shares_of: Mapping[str, Mapping[float, float]], lowest_ms: float | None, look: Look
 ) -> Sheet:
-    """Draw shares of agreement, the fitted curve, its threshold with interval, and the shortest delay with a trend.
+    """Draw agreement, the fitted curve, its threshold with interval, and the shortest delay with a trend.
 
-    ``shares_of`` has each participant's shares by delay, drawn as small points.
+    ``shares_of`` has each participant's proportions by delay, drawn as small points.
     """
     below = (
         "Added delay in ms.   Points: participants; circles: all participants; diamond: threshold with 95 % interval"
@@ -209,12 +209,12 @@ def draw_threshold(
     span = float(np.ptp(levels)) or 1.0
     axes.set_xlim(levels.min() - 0.04 * span, levels.max() + 0.04 * span)
     axes.set_ylim(-0.08, 1.08)
-    sheet.scale(axes, "y", (0.0, 0.5, 1.0), [f"{share:.0%}" for share in (0.0, 0.5, 1.0)], lines=True)
+    sheet.scale(axes, "y", (0.0, 0.5, 1.0), [f"{proportion:.0%}" for proportion in (0.0, 0.5, 1.0)], lines=True)
     sheet.scale(axes, "x", levels)
     step = float(np.diff(levels).min()) if len(levels) > 1 else 1.0
     for place, (person, shares_of_person) in enumerate(shares_of.items()):
         x, y = (_PERSON_SPREAD * ((place + 1) * golden % 1 - 0.5) for golden in _PLASTIC)
-        points = [(delay + step * x, share + 0.12 * y) for delay, share in shares_of_person.items()]
+        points = [(delay + step * x, proportion + 0.12 * y) for delay, proportion in shares_of_person.items()]
         look_of_person: Style = {"color": style.PARTICIPANT, "markersize": 2.2, "markeredgewidth": 0}
         axes.plot(*zip(*points, strict=True), "o", gid=f"person-{person}", **look_of_person)
     if lowest_ms is not None:
@@ -222,10 +222,10 @@ def draw_threshold(
     half = threshold.half_way
     if half is not None and threshold.effect is not None and threshold.width is not None:
         xs = np.linspace(levels.min(), levels.max(), 200)
-        shares = success(
+        proportions = success(
             "logistic", xs, threshold.effect, threshold.width, threshold.guess or 0.0, threshold.lapse or 0.0
         )
-        axes.plot(xs, shares, color=style.ACCENT, linewidth=1.4, gid="curve")
+        axes.plot(xs, proportions, color=style.ACCENT, linewidth=1.4, gid="curve")
         if threshold.interval is not None:
             ends = [threshold.interval.low, threshold.interval.high]
             axes.plot(ends, [half, half], color=style.BAND, linewidth=4, solid_capstyle="butt", gid="interval")
@@ -241,9 +241,9 @@ def draw_threshold(
         offset: Style = {"xytext": (6 if right else -6, 5), "textcoords": "offset points"}
         axes.annotate(words, at, fontproperties=sheet.font(8.5, "bold"), color=style.TEXT, **where, **offset)
     was_asked = asked > 0
-    shares = np.array(threshold.yes)[was_asked] / asked[was_asked]
+    proportions = np.array(threshold.yes)[was_asked] / asked[was_asked]
     dots: Style = {"markersize": 4, "markerfacecolor": "white", "markeredgecolor": style.TEXT, "gid": "shares"}
-    axes.plot(levels[was_asked], shares, "o", **dots)
+    axes.plot(levels[was_asked], proportions, "o", **dots)
     sheet.text(MARGIN_PT, 28, "Proportion of answers expressing agreement", size=SMALL, colour=style.TEXT_SOFT)
     middle = sheet.height_pt - 5 - _CURVE_LINE_PT * (len(lines) - 1) / 2
     sheet.lines(MARGIN_PT, middle, lines, _CURVE_LINE_PT, size=SMALL, colour=style.TEXT_SOFT)
@@ -314,6 +314,8 @@ def _caption_sentences(study: Study, block: Block) -> Iterator[str]:
     if study.left_out:
         was = "it was" if study.left_out == 1 else "they were"
         yield f"{counted(study.left_out, 'session is', 'sessions are')} excluded because {was} not completed."
+    if study.damaged_sessions:
+        yield f"{counted(study.damaged_sessions, 'damaged session is', 'damaged sessions are')} not included."
     if len(rows := study.excluded_sessions):
         yield f"{counted(len(rows), 'session is', 'sessions are')} excluded."
     if len(rows := study.excluded_trials(block)):
@@ -321,8 +323,7 @@ def _caption_sentences(study: Study, block: Block) -> Iterator[str]:
         yield f"{which} excluded, so {'its' if len(rows) == 1 else 'their'} answers are missing here."
     if invalid := int((~trials["valid"].fillna(value=True)).sum()):
         yield f"{invalid} of {len(trials)} trials exceeded the protocol's limits but are included."
-    if study.doubts:
-        names = sorted({doubt.path.relative_to(study.folder).as_posix() for doubt in study.doubts})
+    if names := sorted({doubt.path.relative_to(study.folder).as_posix() for doubt in study.doubts if doubt.used}):
         more = f" and {len(names) - _FILES} more" if len(names) > _FILES else ""
         files = counted(len(names), "file is", "files are")
         changed = "it has" if len(names) == 1 else "they have"
@@ -340,7 +341,7 @@ def _marks_of_bars(block: Block) -> Iterator[str]:
 
 def _marks_of_delays(study: Study, block: Block) -> Iterator[str]:
     yield (
-        f"Thin lines: {line_words(len(set(study.answers(block)['participant'])))}, shifted slightly where they "
+        f"Thin lines: {line_text(len(set(study.answers(block)['participant'])))}, shifted slightly where they "
         f"overlap; thick line: median; band: interquartile range, by {QUARTILES}."
     )
     yield f"Answers range from 1 ({block.labels[0]}) to 7 ({block.labels[-1]})."
@@ -437,7 +438,7 @@ def _panel_widths(tables: Sequence[pd.DataFrame], room: float) -> _PanelWidths:
     answer = _WIDEST_ANSWER_PT
     while sum(
         side_widths := [
-            max(answer * count, least) for count, least in zip(largest_counts, (32.0, 26.0, 27.0), strict=True)
+            max(answer * count, minimum) for count, minimum in zip(largest_counts, (32.0, 26.0, 27.0), strict=True)
         ]
     ) > (room - (_NEUTRAL_GAP_PT + n)):
         answer *= 0.99
@@ -450,25 +451,36 @@ def _lacks_answers(counts: pd.DataFrame) -> pd.Series[bool]:
     return counts["n"] < counts["presented"] + counts["presented_excluded"]
 
 
+_LEGEND_ROW_PT: Final = 9.5
+
+
 def _draw_level_legend(sheet: Sheet, labels: Sequence[str], x: float) -> None:
-    """Draw the legend of the levels in order, followed by the neutral level as in the panels."""
+    """Draw the legend of the levels in order, followed by the neutral level as in the panels.
+
+    If the labels are too long for one row, disagreement and agreement have a row each.
+    """
     short = _legend_labels(labels)
-    order = [*_DISAGREEMENT[::-1], *_AGREEMENT, NEUTRAL]
     size, swatch, gap = SMALL, 7.0, 9.0
-    steps = {level: swatch + 4 + sheet.text_width(short[level - 1], size) + gap for level in order}
-    x = min(x + _PANEL_PADDING_PT, max(sheet.width_pt - MARGIN_PT - sum(steps.values()), MARGIN_PT))
-    for level in order:
-        if level == NEUTRAL:
-            x += gap
-        sheet.box(x, 26.6, swatch, swatch, style.LEVEL_COLOURS[level - 1])
-        sheet.text(x + swatch + 4, 32.7, short[level - 1], size=size, colour=style.TEXT_SOFT)
-        x += steps[level]
+    steps = {level: swatch + 4 + sheet.text_width(short[level - 1], size) + gap for level in LEVELS}
+    rows = [[*_DISAGREEMENT[::-1], *_AGREEMENT, NEUTRAL]]
+    if sum(steps.values()) > sheet.width_pt - 2 * MARGIN_PT:
+        rows = [[*_DISAGREEMENT[::-1]], [*_AGREEMENT, NEUTRAL]]
+    width = max(sum(steps[level] for level in row) for row in rows)
+    left = min(x + _PANEL_PADDING_PT, max(sheet.width_pt - MARGIN_PT - width, MARGIN_PT))
+    for number, row in enumerate(rows):
+        x, y = left, 26.6 + _LEGEND_ROW_PT * (number - (len(rows) - 1) / 2)
+        for level in row:
+            if level == NEUTRAL:
+                x += gap
+            sheet.box(x, y, swatch, swatch, style.LEVEL_COLOURS[level - 1])
+            sheet.text(x + swatch + 4, y + 6.1, short[level - 1], size=size, colour=style.TEXT_SOFT)
+            x += steps[level]
 
 
 def _legend_labels(labels: Sequence[str]) -> list[str]:
     """Shorten the middle labels by the ending that they share with the outermost label on their side.
 
-    "Completely disagree, Mostly disagree" becomes "Completely disagree, Mostly".
+    "Completely disagree, Mostly disagree" becomes "Completely disagree, Mostly", unless two labels become the same.
     """
     short = list(labels)
     for outer, inner in ((1, (2, 3)), (7, (5, 6))):
@@ -479,7 +491,7 @@ def _legend_labels(labels: Sequence[str]) -> list[str]:
             while shared < min(len(ending), len(words) - 1) and words[-1 - shared] == ending[-1 - shared]:
                 shared += 1
             short[level - 1] = " ".join(words[: len(words) - shared])
-    return short if len(set(short[:3])) == 3 and len(set(short[4:])) == 3 else list(labels)
+    return short if len({*short[:3], *short[4:]}) == 6 else list(labels)
 
 
 def _draw_agreement_panel(
@@ -634,10 +646,13 @@ def draw_recognition(
 
 
 def _draw_cell(sheet: Sheet, axes: Axes, row: int, count: int, total: int, *, right: bool) -> None:
-    share = count / total if total else 0.0
-    ground = (*_GROUND, _DARKEST * share) if count else style.GROUND
+    proportion = count / total if total else 0.0
+    ground = (*_GROUND, _DARKEST * proportion) if count else style.GROUND
     edge, width = (style.TEXT, 1.6) if right else (style.BORDER, 0.5)
     look: Style = {"facecolor": ground, "edgecolor": edge, "linewidth": width}
     axes.add_patch(Rectangle((0.03, row + 0.05), 0.94, 0.9, gid=f"{axes.get_label()}-setting{row + 1}", **look))
-    words, font = f"{count}" + (f"  ({share:.0%})" if count else ""), sheet.font(7.5, "bold" if right else "regular")
+    words, font = (
+        f"{count}" + (f"  ({proportion:.0%})" if count else ""),
+        sheet.font(7.5, "bold" if right else "regular"),
+    )
     axes.text(0.5, row + 0.5, words, fontproperties=font, color=style.TEXT, ha="center", va="center")

@@ -10,7 +10,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 
 from study_app import figure_style as style
-from study_app.analysis.data.blocks import published_words
+from study_app.analysis.data.blocks import published_text
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.figures.people_figures import scale_ticks
 from study_app.analysis.levels.answers import (
@@ -18,11 +18,11 @@ from study_app.analysis.levels.answers import (
     LevelAnswers,
     SettingEstimate,
     Settings,
-    mean_words,
+    mean_text,
     people,
-    summary_words,
+    summary_text,
 )
-from study_app.analysis.levels.statistic import level_words, with_unit
+from study_app.analysis.levels.statistic import level_text, with_unit
 from study_app.analysis.levels.thresholds import (
     Flags,
     ThresholdEstimate,
@@ -33,7 +33,7 @@ from study_app.analysis.levels.thresholds import (
     track_courses,
 )
 from study_app.analysis.levels.tracks import tracks
-from study_app.analysis.page_layout import MARGIN_PT, SMALL, FigureTask, Look, Picture, Sheet, picture_of, sample_words
+from study_app.analysis.page_layout import MARGIN_PT, SMALL, FigureTask, Look, Picture, Sheet, picture_of, sample_text
 from study_app.analysis.results import LevelsResult
 from study_app.analysis.statistics.outcome import Array
 from study_app.analysis.wording import counted
@@ -137,9 +137,9 @@ _FEWEST_TICKS: Final = 2
 _SIZE_PT2: Final = 2.0
 """Area of a circle for each answer at a level."""
 _ASIDE: Final = 0.025
-"""Distance between the points of consecutive standards, as a share of the axis."""
+"""Distance between the points of consecutive standards, as a proportion of the axis."""
 _BELOW: Final = 0.03
-"""Distance by which the interval of each standard's threshold is drawn below the previous one, as a share correct."""
+"""Distance by which the interval of each standard's threshold is drawn below the previous one (proportion correct)."""
 _COLOURS: Final = (style.ACCENT, style.SECOND, style.TEXT, "#6d1007", "#5d8aa8", "#b75a26", "#02256d", style.AXIS)
 
 
@@ -155,8 +155,8 @@ def _level_picture(
     chance = "" if result.guess_rate is None else f" Dashed line: chance ({100 * result.guess_rate:.0f} %)."
     where = "for each comparison" if result.vary is None else "at each level"
     caption = (
-        f"{result.title}: {summary_words(result)} {where}. {_panels_caption(result, bool(bands))}{chance}{left_out} "
-        f"{sample_words(study, len(people(result)))}"
+        f"{result.title}: {summary_text(result)} {where}. {_panels_caption(result, bool(bands))}{chance}{left_out} "
+        f"{sample_text(study, len(people(result)))}"
     )
     return picture_of(study, result.block, name, result.title, caption, partial(_draw_levels, result, bands), forms)
 
@@ -183,7 +183,7 @@ def _panels_caption(result: LevelsResult, banded: bool) -> str:
     units = " after removing differences between participants' units" if result.own_units else ""
     own = "thin lines" if len(_level_positions(result)) > 1 else "small points"
     return (
-        f"First panel: {mean_words(result)} across participants with its 95 % interval (Student's t); {own} show "
+        f"First panel: {mean_text(result)} across participants with its 95 % interval (Student's t); {own} show "
         f"individual participants{units}. Other panels: one participant each, with 95 % intervals for the "
         f"answers{crosses}."
     )
@@ -192,7 +192,7 @@ def _panels_caption(result: LevelsResult, banded: bool) -> str:
 @style.own_settings()
 def _draw_levels(result: LevelsResult, bands: Mapping[str, Array], look: Look) -> Sheet:
     shown_people = people(result)[:_MOST_PEOPLE]
-    words = summary_words(result)
+    words = summary_text(result)
     above = words[:1].upper() + words[1:]
     standards = _standards(result)
     keys = [
@@ -209,7 +209,7 @@ def _draw_levels(result: LevelsResult, bands: Mapping[str, Array], look: Look) -
 
     names = [(name, "") for name in ("All", *shown_people)]
     shown = keys if len(standards) > 1 else ()
-    return panels(look, above, names, draw, level_words(result), keys=shown, foot_pt=_FOOT_PT)
+    return panels(look, above, names, draw, level_text(result), keys=shown, foot_pt=_FOOT_PT)
 
 
 def _standards(result: LevelsResult) -> list[float]:
@@ -306,7 +306,7 @@ def _draw_answer_points(
     )
     if Thresholds.participant_rows(result):
         sizes = [_SIZE_PT2 * point.n for point in points]
-        axes.scatter(xs, ys, s=sizes, facecolors="none", edgecolors=colour, linewidths=0.7, zorder=3)
+        axes.scatter(xs, ys, s=sizes, facecolors="none", edgecolors=colour, linewidths=0.7, zorder=3, clip_on=False)
         return
     joined = "none" if result.vary is None else "-"
     axes.plot(xs, ys, marker="o", markersize=3, color=colour, linewidth=0.9, linestyle=joined)
@@ -345,7 +345,7 @@ def _level_positions(result: LevelsResult) -> dict[Any, float]:
 
 
 def _draw_levels_frame(axes: Axes, result: LevelsResult, places: Mapping[Any, float], *, first: bool) -> None:
-    """Draw the axes: levels below, and shares, points or numbers at the left."""
+    """Draw the axes: levels below, and proportions, points or numbers at the left."""
     axes.set_xlim(*_position_limits(result, places))
     shown = _labelled_levels(result, places)
     axes.set_xticks(
@@ -383,7 +383,7 @@ def _labelled_levels(result: LevelsResult, places: Mapping[Any, float]) -> Mappi
 
 def _value_ticks(result: LevelsResult) -> list[tuple[float, str]]:
     if result.summary == "share":
-        return [(share, f"{100 * share:.0f} %") for share in (0.0, 0.25, 0.5, 0.75, 1.0)]
+        return [(proportion, f"{100 * proportion:.0f} %") for proportion in (0.0, 0.25, 0.5, 0.75, 1.0)]
     ends = [
         end for answer in Answers.rows_in(result) for end in (answer.value, answer.low, answer.high) if end is not None
     ]
@@ -392,9 +392,9 @@ def _value_ticks(result: LevelsResult) -> list[tuple[float, str]]:
         return [(float(point), str(point)) for point in range(math.floor(low), math.ceil(high) + 1)]
     decades = range(math.floor(math.log10(min(ends))), math.ceil(math.log10(max(ends))) + 1)
     known = [(math.log10(step) + decade, f"{step * 10.0**decade:g}") for decade in decades for step in (1, 2, 5)]
-    least = max((at for at, _ in known if at <= math.log10(min(ends))), default=known[0][0])
-    most = min((at for at, _ in known if at >= math.log10(max(ends))), default=known[-1][0])
-    inside = [tick for tick in known if least <= tick[0] <= most]
+    minimum = max((at for at, _ in known if at <= math.log10(min(ends))), default=known[0][0])
+    maximum = min((at for at, _ in known if at >= math.log10(max(ends))), default=known[-1][0])
+    inside = [tick for tick in known if minimum <= tick[0] <= maximum]
     return inside if len(inside) <= 2 * _MOST_TICKS else [tick for tick in inside if tick[0] == math.floor(tick[0])]
 
 
@@ -420,7 +420,7 @@ def _track_picture(
     caption = (
         f"{result.title}: the level of each trial. Filled: answered {success}; hollow: other answers.{marks} Band: 95 "
         f"% interval for the threshold, given the answers up to that trial.{left_out} "
-        f"{sample_words(study, len(people(result)))}"
+        f"{sample_text(study, len(people(result)))}"
     )
     return picture_of(
         study, result.block, name, f"{result.title}: tracks", caption, partial(_draw_tracks, result, courses), forms
@@ -452,7 +452,7 @@ def _draw_tracks(result: LevelsResult, courses: Sequence[TrackCourse], look: Loo
         _draw_track_panel(axes, courses[place])
 
     below = "Trial number at this standard" if standards else "Trial number"
-    return panels(look, level_words(result), names, draw, below)
+    return panels(look, level_text(result), names, draw, below)
 
 
 def _draw_track_panel(axes: Axes, course: TrackCourse) -> None:
@@ -498,12 +498,11 @@ def _settings_picture(
 ) -> Picture:
     """Draw the settings of an adjustment block, once the key is open."""
     left_out = _panels_left_out(len(Settings.participant_rows(result)) - _MOST_PANELS)
-    compared = any(setting.constant_error is not None for setting in Settings.participant_rows(result))
-    standard = " Dashed line: standard." if compared else ""
+    standard = " Dashed line: standard." if Settings.matches_standard(result) else ""
     caption = (
         f"{result.title}: the levels set by participants, in trial order. Filled: started high; hollow: started low. "
-        f"Line and band: point of subjective equality with its 95 % interval (Student's t).{standard}{left_out} "
-        f"{sample_words(study, len(people(result)))}"
+        f"Line and band: {Settings.measure_name(result)} with its 95 % interval (Student's t).{standard}{left_out} "
+        f"{sample_text(study, len(people(result)))}"
     )
     return picture_of(
         study, result.block, name, f"{result.title}: settings", caption, partial(_draw_settings, result), forms
@@ -534,7 +533,7 @@ def _draw_settings(result: LevelsResult, look: Look) -> Sheet:
         _set_trial_axes(axes, result, estimates[place].n, ends, first=first)
         _draw_settings_panel(axes, estimates[place])
 
-    return panels(look, level_words(result), names, draw, "Setting")
+    return panels(look, level_text(result), names, draw, "Setting")
 
 
 def _standard_level(estimate: SettingEstimate) -> float | None:
@@ -604,12 +603,12 @@ def _weber_picture(
     study: Study, result: LevelsResult, forms: Sequence[str], name: str, _study_tracks: _TracksFunction
 ) -> Picture:
     """Draw the Weber fractions of a block with thresholds at two or more standards."""
-    values = "; ".join(published_words(published, result.unit) for published in result.published)
+    values = "; ".join(published_text(published, result.unit) for published in result.published)
     published = f" Open circles and dotted lines: published values, {values}." if _published_fractions(result) else ""
     caption = (
         f"{result.title}: Weber fraction for {result.quantity}{_percentage_phrase(result)}, as a function of the "
         f"standard. Thin lines: participants; thick line: random-effects mean with its 95 % interval.{published} "
-        f"{sample_words(study, len(people(result)))}"
+        f"{sample_text(study, len(people(result)))}"
     )
     return picture_of(
         study,

@@ -43,9 +43,9 @@ _TITLE_PT: Final = 10.0
 _NAME_PT: Final = 8.6
 _HEAD_PT: Final = 38.0
 _ROOM: Final = 0.07
-"""Margin beyond the ends of a scale, as a share of the scale."""
+"""Margin beyond the ends of a scale, as a proportion of the scale."""
 _SPREAD: Final = 0.16
-"""Largest distance between joined points of a column, as a share of the distance between columns."""
+"""Largest distance between joined points of a column, as a proportion of the distance between columns."""
 _SPREAD_OF_ENDS: Final = 0.26
 """The same if each participant has an interval; participants are then sorted by value."""
 _SPREAD_ALONE: Final = 0.2
@@ -53,12 +53,12 @@ _SPREAD_ALONE: Final = 0.2
 _GOLDEN: Final = 0.6180339887
 """Steps of a sequence that spreads points evenly."""
 _ASIDE: Final = 0.27
-"""Distance of a mean from its points, as a share of the distance between columns."""
+"""Distance of a mean from its points, as a proportion of the distance between columns."""
 _GROUPS: Final = (style.ACCENT, style.SECOND, "#5d6a75", "#6d1007", "#5d8aa8", "#02256d")
 _MARKERS: Final = "osD^vP"
 _LEAST_TICKS: Final = 3
 _GROUP_STEP: Final = 0.8
-"""Distance over which the groups of a column are spread, as a share of the distance between columns."""
+"""Distance over which the groups of a column are spread, as a proportion of the distance between columns."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -107,7 +107,7 @@ class Panel:
     title : its heading
     places : positions of the columns on a numeric axis; by default columns are evenly spaced
     joined : whether the points of a participant are joined
-    share : its width as a share of all panels of a row
+    share : its width as a proportion of all panels of a row
     line, bound : a value and a range to mark
     log : whether the scale is logarithmic
     level : the confidence level of the intervals of means
@@ -216,7 +216,7 @@ def numbers_of_panels(panels: Sequence[Panel], members: Mapping[str, str] = Mapp
             for same in columns.values()
         )
         rows.append(row(person, members.get(person, ""), values))
-    interval = _interval_words(panels)
+    interval = _interval_text(panels)
     means = {"value": "mean", "low": f"lower end of the {interval}", "high": f"upper end of the {interval}"}
     for field, words in means.items():
         for group in dict.fromkeys(column.group for same in columns.values() for column in same):
@@ -227,7 +227,7 @@ def numbers_of_panels(panels: Sequence[Panel], members: Mapping[str, str] = Mapp
     return "".join("\t".join(cells) + "\n" for cells in rows)
 
 
-def _interval_words(panels: Sequence[Panel]) -> str:
+def _interval_text(panels: Sequence[Panel]) -> str:
     return f"{percent(panels[0].level)} interval"
 
 
@@ -283,7 +283,7 @@ def draw_people(
     sheet = look.sheet(height, width_pt)
     logarithmic = " (logarithmic scale)" if any(panel.log for panel in panels) else ""
     sheet.text(MARGIN_PT, 28, f"{above}{logarithmic}", size=SMALL, colour=style.TEXT_SOFT)
-    _draw_legend(sheet, groups, _interval_words(panels))
+    _draw_legend(sheet, groups, _interval_text(panels))
     y = head
     for row, row_widths, row_titles, row_names, title, name in zip(
         rows, widths, titles, names, title_pt, name_pt, strict=True

@@ -1,5 +1,6 @@
 """Figures of questions other than statements after trials."""
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -22,12 +23,13 @@ from study_app.analysis.page_layout import (
     Sheet,
     Style,
     picture_of,
-    sample_words,
+    sample_text,
     spread_points,
     tab_separated,
 )
 from study_app.analysis.results import QuestionResult
 from study_app.discovery import by_name
+from study_app.protocol.questions import Number
 
 _LEFT_PT: Final = 120.0
 _RIGHT_PT: Final = 40.0
@@ -85,6 +87,10 @@ _ROW_PT: Final = 30.0
 _BAND: Final = 0.22
 _MOST_PT: Final = 30.0
 """Largest distance of a point from the middle of a row."""
+_LARGEST_LINEAR_RATIO: Final = 100.0
+"""The largest ratio of two answers on a linear axis."""
+_SMALLEST_PART: Final = 0.1
+"""The smallest part of the permitted range that answers span if the axis shows the whole range."""
 
 
 @style.own_settings()
@@ -92,25 +98,55 @@ def draw_distribution(question: PlacedQuestion, result: QuestionResult, look: Lo
     """Draw the distribution of the answers."""
     groups = result.groups
     values = [value for group in groups for value in group.numbers["values"]]
-    low, high = question.bounds or (min(values, default=0.0), max(values, default=1.0))
-    span = (high - low) or 1.0
-    per_value = (style.PAGE_WIDTH_PT - _LEFT_PT - _RIGHT_PT) / (1.06 * span)
-    offsets = [spread_points(per_value * np.array(group.numbers["values"]), _MOST_PT) for group in groups]
+    low, high, decades = _axis_of_answers(question, values)
+    place_of = np.log10 if decades else np.asarray
+    left, right = place_of([low, high])
+    span = float(right - left) or 1.0
+    width_pt = style.PAGE_WIDTH_PT - _LEFT_PT - _RIGHT_PT
+    per_value = width_pt / (1.06 * span)
+    offsets = [spread_points(per_value * place_of(np.array(group.numbers["values"])), _MOST_PT) for group in groups]
     row_pt = max(_ROW_PT, *(2 * np.abs(row_offsets).max(initial=0.0) + 10 for row_offsets in offsets))
     sheet, axes = _draw_group_rows(result, look, row_pt)
-    axes.set_xlim(low - 0.03 * span, high + 0.03 * span)
+    axes.set_xlim(left - 0.03 * span, right + 0.03 * span)
     for place, group in enumerate(groups):
         numbers = group.numbers
-        axes.plot([low, high], [place, place], color=style.GRID, linewidth=0.8, zorder=0)
+        axes.plot([left, right], [place, place], color=style.GRID, linewidth=0.8, zorder=0)
         if numbers["median"] is None:
             continue
-        axes.fill_between([numbers["q1"], numbers["q3"]], place - _BAND, place + _BAND, color=style.BAND, linewidth=0)
-        axes.plot([numbers["median"]] * 2, [place - _BAND, place + _BAND], color=style.ACCENT, linewidth=1.6)
-        axes.plot(numbers["values"], place + offsets[place] / row_pt, **POINT, gid=f"{group.code}")
+        q1, median, q3 = place_of([numbers[name] for name in ("q1", "median", "q3")])
+        axes.fill_between([q1, q3], place - _BAND, place + _BAND, color=style.BAND, linewidth=0)
+        axes.plot([median] * 2, [place - _BAND, place + _BAND], color=style.ACCENT, linewidth=1.6)
+        axes.plot(place_of(numbers["values"]), place + offsets[place] / row_pt, **POINT, gid=f"{group.code}")
+    foot_pt = sheet.height_pt - _FOOT_PT + 12
+    for decade in decades[1:-1]:
+        axes.axvline(decade, color=style.GRID, linewidth=0.6, zorder=0)
+        x_pt = _LEFT_PT + per_value * (decade - left + 0.03 * span)
+        sheet.text(x_pt, foot_pt, f"{10.0**decade:g}", size=SMALL, colour=style.TEXT_SOFT, ha="center")
     view = question.question.view(0, question.context)
-    ends = (f"{low:g} {getattr(view, 'low', '')}".strip(), f"{high:g} {getattr(view, 'high', '')}".strip())
-    _draw_end_labels(sheet, sheet.height_pt - _FOOT_PT + 12, *ends)
+    ends = (
+        f"{low:g} {getattr(view, 'low', question.unit)}".strip(),
+        f"{high:g} {getattr(view, 'high', question.unit)}".strip(),
+    )
+    _draw_end_labels(sheet, foot_pt, *ends)
     return sheet
+
+
+def _axis_of_answers(question: PlacedQuestion, values: Sequence[float]) -> tuple[float, float, range]:
+    """Return the ends of the axis of answers, and the decades of a logarithmic axis, which are empty for a linear one.
+
+    The axis of a number ends at its bounds, unless the answers span more than two decades or only a small part of the
+    permitted range.
+    """
+    smallest, largest = min(values, default=0.0), max(values, default=1.0)
+    low, high = question.bounds or (smallest, largest)
+    if not isinstance(question.question, Number) or not values:
+        return low, high, range(0)
+    if smallest > 0 and largest / smallest > _LARGEST_LINEAR_RATIO:
+        decades = range(math.floor(math.log10(smallest)), math.ceil(math.log10(largest)) + 1)
+        return 10.0 ** decades[0], 10.0 ** decades[-1], decades
+    if smallest < largest and largest - smallest < _SMALLEST_PART * (high - low):
+        return smallest, largest, range(0)
+    return low, high, range(0)
 
 
 _DISTRIBUTION: Final = _QuestionFigure(
@@ -146,14 +182,14 @@ _OPTIONS: Final = _QuestionFigure(
     id="counts",
     draw=draw_options,
     caption="Bars show the number of participants who chose each option; grey bars show the number who answered.",
-    repeated="Bars show the number of answers with each option; grey bars show the total number of answers.",
+    repeated="Bars show how often each option was chosen; grey bars show the total number of answers.",
 )
 
 
 _RATING_PT: Final = 26.0
 _HALF: Final = 0.32
 _SWATCH_PT: Final = 18.0
-_NARROW: Final = 0.03  # share of a bar in which the value is not printed
+_NARROW: Final = 0.03  # proportion of a bar in which the value is not printed
 
 
 def _point_colours(points: int) -> list[str]:
@@ -178,12 +214,12 @@ def draw_ratings(question: PlacedQuestion, result: QuestionResult, look: Look) -
         total = max(1, int(group.numbers["n"]))
         left = 0.0
         for count, colour in zip(group.numbers["counts"].values(), colours, strict=True):
-            share = count / total
-            axes.barh(place, share, left=left, height=2 * _HALF, color=colour, gid=f"{group.code}")
-            if share > _NARROW:
+            proportion = count / total
+            axes.barh(place, proportion, left=left, height=2 * _HALF, color=colour, gid=f"{group.code}")
+            if proportion > _NARROW:
                 look_of_count: Style = {"ha": "center", "va": "center", "color": _text_colour(colour)}
-                axes.text(left + share / 2, place, str(count), fontproperties=sheet.font(SMALL), **look_of_count)
-            left += share
+                axes.text(left + proportion / 2, place, str(count), fontproperties=sheet.font(SMALL), **look_of_count)
+            left += proportion
     _draw_legend(sheet, list(question.levels.values()), colours)
     return sheet
 
@@ -231,7 +267,7 @@ def _picture(
     title = result.short if result.short == result.title else f"{result.title}: {result.short}"
     is_repeated = any(int(group.numbers["n"]) > int(group.numbers["participants"]) for group in result.groups)
     drawn = figure.repeated if is_repeated and figure.repeated else figure.caption
-    caption = f"{result.title}: “{result.text}” {drawn} {sample_words(study, study.n)}"
+    caption = f"{result.title}: “{result.text}” {drawn} {sample_text(study, study.n)}"
     rows = study.answers_to(question)[["participant", "session", "code", "response"]].rename(
         columns={"response": question.id}
     )

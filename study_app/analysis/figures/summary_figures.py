@@ -14,9 +14,9 @@ from study_app.analysis.figures.people_figures import Column, Mean, Panel, mean_
 from study_app.analysis.levels.answers import Answers, Settings
 from study_app.analysis.levels.exponents import Exponents
 from study_app.analysis.levels.sensitivities import Sensitivities
-from study_app.analysis.levels.statistic import LevelStatistic, level_words
+from study_app.analysis.levels.statistic import LevelStatistic, level_text
 from study_app.analysis.levels.thresholds import Thresholds
-from study_app.analysis.page_layout import FigureTask, Picture, sample_words
+from study_app.analysis.page_layout import FigureTask, Picture, sample_text
 from study_app.analysis.questions import scored
 from study_app.analysis.results import ContrastResult, LevelsResult, Results
 from study_app.number_text import capitalised
@@ -50,7 +50,8 @@ class Estimates(NamedTuple):
 class Numbers(NamedTuple):
     """The values of a score or a question: the name of each setting with each participant's value.
 
-    ``bounds`` are the ends of the answer scale, ``codes`` and ``conditions`` those of the settings.
+    ``bounds`` are the ends of the answer scale, ``codes`` and ``conditions`` those of the settings; ``unit`` is that of
+    the values, or "".
     """
 
     title: str
@@ -60,6 +61,7 @@ class Numbers(NamedTuple):
     id: str = ""
     codes: tuple[str, ...] = ()
     conditions: tuple[str | None, ...] = ()
+    unit: str = ""
 
 
 def estimates_of(result: LevelsResult) -> Estimates | None:
@@ -67,7 +69,9 @@ def estimates_of(result: LevelsResult) -> Estimates | None:
     for statistic, attribute, words in _MEASURES:
         rows = [row for row in statistic.rows_in(result) if getattr(row, attribute) is not None]
         if own := [row for row in rows if row.participant is not None]:
-            return Estimates([row for row in rows if row.participant is None], own, attribute, words)
+            name = "point of subjective equality" if attribute == "threshold" and result.has_pse else words
+            name = Settings.measure_name(result) if statistic is Settings else name
+            return Estimates([row for row in rows if row.participant is None], own, attribute, name)
     answers = [answer for answer in Answers.rows_in(result) if not answer.catch]
     own = [answer for answer in answers if answer.participant is not None]
     words = (
@@ -160,20 +164,20 @@ def _hypothesis_picture(
         f"{capitalised(contrast.hypothesis)}. {lines_note}Right: {contrast.comparison}"
         f"{', for each participant and on average' if within else ''}; dashed line: no "
         f"difference.{band_note}{weights_note} "
-        f"{sample_words(study, len({person for side in contrast.sides for person in side.values} & {*study.people}))}"
+        f"{sample_text(study, len({person for side in contrast.sides for person in side.values} & {*study.people}))}"
     )
     result = next((level for level in results.levels if level.block == contrast.contrast.blocks[0]), None)
-    title, above = capitalised(contrast.measure_name or contrast.contrast.measure_words), _scale_title(contrast, result)
+    title, above = capitalised(contrast.measure_name or contrast.contrast.measure_text), _scale_title(contrast, result)
     return people_picture(study, contrast.contrast.blocks[0], name, title, caption, panels, forms, above=above)
 
 
 def _scale_title(contrast: ContrastResult, result: LevelsResult | None) -> str:
     """Return the title of a hypothesis' scale."""
-    measure = contrast.measure_name or contrast.contrast.measure_words
+    measure = contrast.measure_name or contrast.contrast.measure_text
     if contrast.contrast.form is not None:
         return measure
     if contrast.contrast.measure in ("threshold", "pse") and result is not None:
-        return level_words(result)
+        return level_text(result)
     return {"d_prime": "d′", "exponent": "Exponent"}.get(contrast.contrast.measure, "Points on the scale")
 
 
@@ -203,10 +207,10 @@ def _estimates_picture(study: Study, result: LevelsResult, forms: Sequence[str],
     lines_note = " Thin lines: each participant's 95 % interval, sorted by value." if alone else ""
     caption = (
         f"{result.title}: {estimates.words} for each participant, and the mean with its 95 % interval.{lines_note} "
-        f"{sample_words(study, people)}"
+        f"{sample_text(study, people)}"
     )
     words = estimates.words if estimates.words == "d′" else capitalised(estimates.words)
-    above = level_words(result) if estimates.attribute in ("threshold", "pse") else words
+    above = level_text(result) if estimates.attribute in ("threshold", "pse") else words
     axis = "Standard" if getattr(estimates.own[0], "level", None) is None else "Level"
     below = "" if result.quantity is None or alone else f"{axis}: {result.quantity} [{result.unit}]"
     title = f"{result.title}: {estimates.words}"
@@ -226,6 +230,7 @@ def _numbers_at(study: Study, where: str) -> list[Numbers]:
     If a hypothesis compares two settings, they are in the order of the hypothesis.
     """
     scores = [score for score in study.others.scores if score.where.id == where]
+    units: dict[str, str] = {}
     tables: list[tuple[str, str, tuple[float, float] | None, QuestionPlace, pd.DataFrame]]
     if scores:
         tables = [
@@ -244,6 +249,7 @@ def _numbers_at(study: Study, where: str) -> list[Numbers]:
             for question in study.others.questions
             if question.where.id == where and question.bounds is not None
         ]
+        units = {question.id: question.unit for question in questions}
         tables = [
             (question.id, question.short, question.scale_ends, question.where, study.answers_to(question))
             for question in questions
@@ -270,6 +276,7 @@ def _numbers_at(study: Study, where: str) -> list[Numbers]:
                     by_setting=tuple(by_setting),
                     codes=codes,
                     conditions=tuple(setting.condition for setting in place.settings),
+                    unit=units.get(name, ""),
                 )
             )
     return numbers
@@ -278,7 +285,7 @@ def _numbers_at(study: Study, where: str) -> list[Numbers]:
 def _answers_picture(study: Study, where: str, shown: Sequence[Numbers], forms: Sequence[str], name: str) -> Picture:
     panels = [
         Panel(
-            title=numbers.title,
+            title=f"{numbers.title} ({numbers.unit})" if numbers.unit else numbers.title,
             columns=tuple(
                 Column(name=words, values=values, mean=mean_of(values.values())) for words, values in numbers.by_setting
             ),
@@ -290,6 +297,6 @@ def _answers_picture(study: Study, where: str, shown: Sequence[Numbers], forms: 
     title = next(question.where.title for question in study.others.questions if question.where.id == where)
     caption = (
         f"{title}: the value for each participant, and the mean with its 95 % confidence interval (Student's t). "
-        f"{sample_words(study, people)}"
+        f"{sample_text(study, people)}"
     )
     return people_picture(study, where, name, title, caption, panels, forms, above="")

@@ -10,7 +10,7 @@ from study_app import number_text
 from study_app.analysis.findings.finding import FDR, Absent, BlockAnswers, in_family
 from study_app.analysis.findings.statement_tests import StatementTests
 from study_app.analysis.html_page import heading, paragraph, table_of
-from study_app.analysis.results import BlockResult, NotTested, Tested, method_words, short_text
+from study_app.analysis.results import BlockResult, NotTested, Tested, method_text, short_text
 from study_app.analysis.statistics.cumulative_models import CumulativeModel, cumulative_model
 from study_app.analysis.statistics.outcome import false_discovery
 from study_app.analysis.wording import counted, interval, number, p_value
@@ -74,7 +74,7 @@ class _CumulativeModels(StatementTests):
             ("Verdict", lambda test: test.verdict),
             last=1,
         )
-        methods = method_words(test.outcome.method for test in fitted)
+        methods = method_text(test.outcome.method for test in fitted)
         unit, sign = ("per 100 ms of delay", "answers rise") if delays else ("", "the first of the two is rated higher")
         yield paragraph(
             f"A cumulative logit mixed model was fitted to {self._answers_noun()} to each primary statement, including "
@@ -103,11 +103,14 @@ class _CumulativeModels(StatementTests):
 
     def methods(self) -> Iterator[str]:
         fitted = sum(test.outcome.p is not None for test in self.value)
+        failed = len(self.value) - fitted
+        failures = "the other statement" if failed == 1 else f"the other {counted(failed, 'statement')}"
+        failure_note = f" (it could not be fitted to {failures})" if failed else ""
         if fitted:
             slopes = " and delay effects" if self.result.delays_ms else ""
             yield (
                 f"In an exploratory analysis, a cumulative logit mixed model with random intercepts{slopes} was fitted "
-                f"to {self._answers_noun()} to {counted(fitted, 'primary statement')}, including the answers of "
-                "participants who did not answer in all conditions; effects were tested with likelihood-ratio tests, "
-                "and the false discovery rate was controlled (Benjamini–Hochberg)."
+                f"to {self._answers_noun()} to {counted(fitted, 'primary statement')}{failure_note}, including the "
+                "answers of participants who did not answer in all conditions; effects were tested with "
+                "likelihood-ratio tests, and the false discovery rate was controlled (Benjamini–Hochberg)."
             )

@@ -482,15 +482,15 @@ class DetectionThreshold(Finding[Threshold | None]):
             "Proportion of answers that express agreement (5 to 7), as a function of the requested delay "
             f"({drawing.simulated}n = {threshold.n}). Small points: individual participants. {curve}{dashed}"
         )
-        shares = self._shares(drawing)
+        proportions = self._shares(drawing)
         numbers = tab_separated(
-            drawing.study, pd.DataFrame(shares).T.rename(columns=ms).rename_axis("participant").reset_index()
+            drawing.study, pd.DataFrame(proportions).T.rename(columns=ms).rename_axis("participant").reset_index()
         )
-        draw = partial(answer_figures.draw_threshold, threshold, shares, lowest)
+        draw = partial(answer_figures.draw_threshold, threshold, proportions, lowest)
         return drawing.picture(self.figure_title, caption, draw, (f"n = {threshold.n}",), numbers)
 
     def _shares(self, drawing: Drawing) -> dict[str, dict[float, float]]:
-        """Return, for each participant, the share of answers that agree, by delay."""
+        """Return, for each participant, the proportion of answers that agree, by delay."""
         answers = drawing.study.answers(drawing.block)
         rows = answers[(answers["item"] == self.results.decided.noticed) & answers["response"].notna()]
         delays_ms = {setting.code: setting.delay_ms or 0.0 for setting in drawing.result.settings}
@@ -516,7 +516,7 @@ def _threshold_interval(threshold: Threshold) -> str:
 
 
 def _threshold_definition(threshold: Threshold) -> str:
-    """Return a sentence that defines a detection threshold and gives the share of agreement there."""
+    """Return a sentence that defines a detection threshold and gives the proportion of agreement there."""
     return (
         "The threshold is the delay at which the fitted function lies halfway between the guess rate "
         f"({percent(threshold.guess or 0.0)}) and one minus the lapse rate ({percent(threshold.lapse or 0.0)}). At "
@@ -546,7 +546,7 @@ class _FirstNoticedDelay(Finding[None]):
                     "particular delay."
                 )
             if text:
-                return self.make_answer(verdict, f"{self._threshold_words() if is_fitted else ''}{text}", claims=True)
+                return self.make_answer(verdict, f"{self._threshold_text() if is_fitted else ''}{text}", claims=True)
         return self.make_answer("not shown", f"We could not show that participants noticed any delay. {NO_EVIDENCE}")
 
     def _shortest(self, items: Sequence[str]) -> str:
@@ -576,7 +576,7 @@ class _FirstNoticedDelay(Finding[None]):
             "compares ranks, not mean ratings."
         )
 
-    def _threshold_words(self) -> str:
+    def _threshold_text(self) -> str:
         """Return a sentence on the detection threshold, with a leading space."""
         threshold = DetectionThreshold.value_in(self.result)
         if threshold is None or threshold.effect is None:
@@ -618,18 +618,18 @@ class _EquivalentDelays(Finding[None]):
             needed = f" (at least {fewest} participants are needed)" if self.result.n < fewest else ""
             return self.make_answer(
                 "inconclusive",
-                f"{_NO_DELAY.format(within + needed)} {_largest_words(self.result, against)}{_beyond_words(against)}",
+                f"{_NO_DELAY.format(within + needed)} {_largest_text(self.result, against)}{_beyond_text(against)}",
             )
         statements = all_of(len(equivalent_up_to(against)), "statement")
-        share = _minority_phrase([tested.found for tested in against if tested.delay_ms <= at])
-        text = f"Up to {ms(at)}, mean answers to {statements} stay {within}, but {share}."
+        proportion = _minority_phrase([tested.found for tested in against if tested.delay_ms <= at])
+        text = f"Up to {ms(at)}, mean answers to {statements} stay {within}, but {proportion}."
         return self.make_answer("equivalent", text)
 
 
 _NO_DELAY: Final = "We could not show for any delay that the mean answers to all statements stay {}."
 
 
-def _largest_words(result: BlockResult, against: Sequence[ContrastWithControl]) -> str:
+def _largest_text(result: BlockResult, against: Sequence[ContrastWithControl]) -> str:
     """Return a sentence on the largest mean difference with its interval, with a leading space, or ""."""
     comparisons = [
         tested for tested in against if tested.found.effect is not None and tested.found.interval is not None
@@ -644,7 +644,7 @@ def _largest_words(result: BlockResult, against: Sequence[ContrastWithControl]) 
     )
 
 
-def _beyond_words(against: Sequence[ContrastWithControl]) -> str:
+def _beyond_text(against: Sequence[ContrastWithControl]) -> str:
     """Return a sentence on the comparisons that are not equivalent, with their delays, or that there are none."""
     beyond = [tested.delay_ms for tested in against if tested.verdict == "not equivalent"]
     if not beyond:
@@ -657,7 +657,7 @@ def _beyond_words(against: Sequence[ContrastWithControl]) -> str:
 
 
 def _minority_phrase(tested: Sequence[Equivalence]) -> str:
-    """Return a phrase on the share of people who may differ by more than the bound."""
+    """Return a phrase on the proportion of people who may differ by more than the bound."""
     most = max(
         (equivalence.beyond.interval.high for equivalence in tested if equivalence.beyond is not None), default=1.0
     )
@@ -719,7 +719,7 @@ class Movement(Finding[None]):
         )
         caption = (
             f"Reaching movements as a function of the requested delay ({drawing.simulated}n = {people} with "
-            f"recordings). Thin lines: {answer_figures.line_words(people)}; thick line: median; band: interquartile "
+            f"recordings). Thin lines: {answer_figures.line_text(people)}; thick line: median; band: interquartile "
             "range. Movement time is measured from the moment a target lights up until the hand enters it for the "
             f"last time. The axes do not start at zero. {_limits_sentence(block, drawing.results)}"
         )

@@ -1,13 +1,13 @@
 """The base class of findings, and what all tests of a block's answers share: families, verdicts, rows of tests.csv."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Final, Generic, TypeAlias, TypeVar, cast
 
 import numpy as np
 import pandas as pd
 
-from study_app.analysis.data.blocks import KINDS, Block, Decided, Kind
+from study_app.analysis.data.blocks import KINDS, Block, Decided, Kind, setting_name
 from study_app.analysis.data.measures import Array, medians, presentations
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.html_page import drawn_figure
@@ -171,6 +171,16 @@ def empty_result(block: Block, *absent: NotTested) -> BlockResult:
     )
 
 
+def unrated_results(blocks: Sequence[Block]) -> Iterator[BlockResult]:
+    """Yield empty results for blocks without statements, in which names distinguish the settings of all blocks."""
+    settings = list({setting.condition: setting for block in blocks for setting in block.settings}.values())
+    for block in blocks:
+        result = empty_result(block)
+        if block.revealed:
+            result = replace(result, names=tuple(setting_name(setting, settings) for setting in block.settings))
+        yield result
+
+
 def _presentation_range(single: Iterable[Array]) -> tuple[int, int]:
     """Return the minimum and maximum number of answers by a participant to one statement in one condition."""
     counts = np.concatenate([(~np.isnan(values)).sum(axis=2).ravel() for values in single] or [np.zeros(0)])
@@ -213,8 +223,8 @@ def in_family(
     ps = [outcome.p for outcome in outcomes.values()]
     members = []
     for place, ((item, outcome), p) in enumerate(zip(outcomes.items(), correct(ps), strict=True)):
-        least = correct([*ps[:place], outcome.smallest_p, *ps[place + 1 :]])[place]
-        test_verdict = answers.verdict(p, least, primary=primary_flags[place])
+        minimum = correct([*ps[:place], outcome.smallest_p, *ps[place + 1 :]])[place]
+        test_verdict = answers.verdict(p, minimum, primary=primary_flags[place])
         adjusted = None if p is None else max(p, answers.gate)
         members.append(
             Tested(

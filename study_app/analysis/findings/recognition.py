@@ -63,6 +63,8 @@ class LiquidRecognition(Finding[RecognitionResult | None]):
         """Test whether settings were named correctly more often than by chance."""
         labels = answers.decided.names
         correct_labels = tuple(setting.label for setting in answers.block.settings)
+        if not labels and not any(correct_labels):
+            return None, ()  # the study does not ask participants to recognise liquids
         if not labels or not set(labels) <= answers.values.keys() or not any(correct_labels):
             return None, (NotTested(cls.what, "the protocol does not specify which statements name these liquids"),)
         if not 2 <= answers.k <= MOST_NAMED or len(labels) < 2:
@@ -106,7 +108,7 @@ class LiquidRecognition(Finding[RecognitionResult | None]):
         yield paragraph(
             f"Correct names: {number(outcome.statistic, 0)}; {number(outcome.expected, 1)} expected by chance; "
             f"{p_equals(outcome.p)} ({outcome.method}; smallest attainable {p_equals(outcome.smallest_p or 0.0)}): "
-            f"{recognition_result.verdict}. {_kappa_words(outcome)} {_undecided_words(outcome)}This is a single test, "
+            f"{recognition_result.verdict}. {_kappa_text(outcome)} {_undecided_text(outcome)}This is a single test, "
             "so its p value is not corrected."
         )
         kappa_note = "" if outcome.interval is None else f" Confidence interval for kappa: {outcome.interval.method}."
@@ -163,7 +165,7 @@ _UNDECIDED_COLUMN: Final = -2
 """The index of the column of undecided answers in `Recognition.table`."""
 
 
-def _kappa_words(outcome: Recognition) -> str:
+def _kappa_text(outcome: Recognition) -> str:
     """Return a sentence on kappa, with its interval and the number of answers."""
     if outcome.effect is None:
         return f"Cohen's kappa could not be calculated ({outcome.no_interval.removeprefix('no interval: ')})."
@@ -174,7 +176,7 @@ def _kappa_words(outcome: Recognition) -> str:
     )
 
 
-def _undecided_words(outcome: Recognition) -> str:
+def _undecided_text(outcome: Recognition) -> str:
     """Return a sentence on the treatment of undecided answers, with a leading space, or ""."""
     if not outcome.undecided:
         return ""
@@ -185,7 +187,7 @@ def _undecided_words(outcome: Recognition) -> str:
     )
 
 
-def _hits_words(named: RecognitionResult) -> str:
+def _hits_text(named: RecognitionResult) -> str:
     """Return a sentence on the number of correct names and the number expected by chance, if there is a p value."""
     tested = named.found
     hits = f"named {number(tested.statistic, 0)} of {sum(rate.n for rate in tested.rates)} liquids correctly"
@@ -250,20 +252,20 @@ class _Distinguished(Finding[None]):
             )
         else:
             text = f"No statement showed a difference between any two {result.kind}."
-        text += self._largest_words({test.item for test in differing if test.verdict == verdict})
+        text += self._largest_text({test.item for test in differing if test.verdict == verdict})
         if named is not None and named.found.p is not None:
             names = listed([name_in_sentence(result.names[place]) for place in recognised_settings])
             single = f"Recognised above chance: {names}." if names else _NO_SINGLE_LIQUID
             if named.verdict not in FOUND:
                 single = _NONE_RECOGNISED
-            hits = f"{_hits_words(named)} {single}"
+            hits = f"{_hits_text(named)} {single}"
             # Significant results come first.
             text = f"{hits} {text}" if recognised_settings or not verdicts else f"{text} {hits}"
         if not verdicts:
             return self.make_answer("not shown", f"{text} {NO_EVIDENCE}")
         return self.make_answer(verdict, text, claims=True)
 
-    def _largest_words(self, items: Container[str]) -> str:
+    def _largest_text(self, items: Container[str]) -> str:
         """Return a sentence on the largest mean difference from the first setting in ``items``, with a space."""
         result = self.result
         effects = [effect for effect in Effects.value_in(result) if effect.item in items and effect.low is not None]

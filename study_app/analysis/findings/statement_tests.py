@@ -34,7 +34,7 @@ from study_app.analysis.results import (
     Failure,
     NotTested,
     Tested,
-    method_words,
+    method_text,
     name,
     settings_noun,
     short_text,
@@ -79,7 +79,7 @@ def table_of_tests(
     family = dict.fromkeys(f"{_adjustment(test)} (family “{test.family}”)" for test in tests)
     two = isinstance(first.outcome, SignedRanks) and len(compared) == 2
     above = f", above 0 if {compared[0]} was rated higher than {compared[1]}" if two else ""
-    exact = f" ({method_words(methods)})" if methods else ""
+    exact = f" ({method_text(methods)})" if methods else ""
     l_words = " L is Page's statistic." if statistic_symbol(first.outcome) == "L" else ""
     effect = first.outcome.effect_name
     yield heading(3, title)
@@ -267,12 +267,12 @@ class DelayTrend(StatementTests):
             yield f"Trends across delays were tested with {TRENDS[decided.trends]} ({one_sided}), {families(trends)}."
             yield (
                 "If a statement showed a trend, the longest delay was dropped and the rank correlations were tested "
-                f"again, until no trend remained. At every step, a trend required p ≤ alpha{_divided_words(trends)}. "
+                f"again, until no trend remained. At every step, a trend required p ≤ alpha{_divided_text(trends)}. "
                 "The shortest delay with a trend is an upper bound for the shortest noticeable delay."
             )
 
 
-def _divided_words(trends: Sequence[Tested]) -> str:
+def _divided_text(trends: Sequence[Tested]) -> str:
     """Return a phrase on the correction of alpha for the number of statements, with a leading space, or ""."""
     families = {test.primary: test.members for test in trends}
     if len(families) > 1:
@@ -373,10 +373,10 @@ class OverAll(Finding[Outcome | None]):
         if self.value is not None:
             several = len(self.result.items) > 1
             across = f" across {all_of(len(self.result.items), 'statement')}" if several else ""
-            statistic_words = "the sum of the statements' Friedman statistics" if several else "Friedman's statistic"
+            statistic_text = "the sum of the statements' Friedman statistics" if several else "Friedman's statistic"
             yield (
                 f"First, the {settings_noun(self.result)}s were compared{across} with a within-participant "
-                f"permutation test; the statistic was {statistic_words}."
+                f"permutation test; the statistic was {statistic_text}."
             )
 
 
@@ -395,7 +395,7 @@ class Effect:
     high: float | None
 
 
-def _scale_words(labels: Sequence[str]) -> str:
+def _scale_text(labels: Sequence[str]) -> str:
     """Return the title of a scale, with the names of its ends if there is space."""
     words = f"Points from {LEVELS[0]} ({labels[0]}) to {LEVELS[-1]} ({labels[-1]})"
     return words if len(words) <= MOST_LETTERS else "Points on the scale"
@@ -479,7 +479,7 @@ class Effects(Finding[tuple[Effect, ...]]):
             caption,
             panels,
             drawing.forms,
-            above=f"Difference from {first}, in points" if over_delay else _scale_words(drawing.block.labels),
+            above=f"Difference from {first}, in points" if over_delay else _scale_text(drawing.block.labels),
             below="Added delay in ms" if over_delay else "",
             shared=True,
         )

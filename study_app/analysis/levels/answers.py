@@ -27,7 +27,7 @@ from study_app.analysis.levels.statistic import (
     digits,
     group_mean_row,
     interval_text,
-    level_words,
+    level_text,
     signed,
     standards_phrase,
     unit,
@@ -37,6 +37,7 @@ from study_app.analysis.results import LevelsResult, Summary
 from study_app.analysis.statistics.outcome import Array, clopper_pearson, student_interval
 from study_app.analysis.wording import listed
 from study_app.number_text import counted
+from study_app.protocol.model import MEAN_SETTING
 from study_app.protocol.trials import Reply, Stimulus
 
 _MOST_NAMED = 6
@@ -44,12 +45,12 @@ _MOST_LISTED: Final = 12
 """The most levels that are listed one by one."""
 
 
-def _condition_words(setting: Setting) -> str:
+def _condition_text(setting: Setting) -> str:
     """Return the liquid of a condition with its visual delay, if it has one."""
-    return f"{(setting.liquid or '').replace('_', ' ')}{_delay_words(setting)}"
+    return f"{(setting.liquid or '').replace('_', ' ')}{_delay_text(setting)}"
 
 
-def _delay_words(setting: Setting) -> str:
+def _delay_text(setting: Setting) -> str:
     """Return the visual delay and the link of a condition as a phrase; "" without any."""
     delay = f" with a visual delay of {setting.delay_ms:g} ms" if setting.delay_ms else ""
     return f"{delay}{f' ({setting.link})' if setting.link else ''}"
@@ -60,6 +61,7 @@ class SettingEstimate:
     """A participant's settings at one standard, as in `columns.RESULTS`, or the means of ``n`` participants.
 
     ``levels`` are a participant's settings in order; ``started_high`` shows which of them started at the high end.
+    ``timed_out`` settings were ended by the time limit, and ``at_ends`` lie at an end of the range.
     """
 
     participant: str | None
@@ -71,6 +73,8 @@ class SettingEstimate:
     jnd: float | None
     constant_error: float | None
     hysteresis: float | None
+    timed_out: int = 0
+    at_ends: int = 0
     levels: tuple[float, ...] = ()
     started_high: tuple[bool, ...] = ()
 
@@ -88,7 +92,8 @@ def setting_estimates(block: LevelBlock, opened: pd.DataFrame) -> Iterator[Setti
         ]
         others = ("jnd", "constant_error", "hysteresis")
         group = group_mean_row(estimates, "pse", *others, coordinate=stimulus.coordinate, level_of=stimulus.level_of)
-        yield replace(group, levels=(), started_high=())
+        counts = {name: sum(getattr(row, name) for row in estimates) for name in ("timed_out", "at_ends")}
+        yield replace(group, levels=(), started_high=(), **counts)
         yield from estimates
 
 
@@ -101,6 +106,8 @@ def _estimate_settings(
     pse, (low, high) = float(u.mean()), student_interval(u)
     above, below = u[started_high], u[~started_high]
     compared = standard is not None and block.design.intervals > 1
+    ends = np.array(stimulus.domain)
+    is_at_end = np.isclose(u[:, np.newaxis], ends, rtol=0.0, atol=1e-6 * float(ends[1] - ends[0])).any(axis=1)
     return SettingEstimate(
         participant=person,
         standard=standard,
@@ -111,6 +118,8 @@ def _estimate_settings(
         jnd=float(u.std(ddof=1)) if len(u) > 1 else None,
         constant_error=pse - stimulus.coordinate(standard) if compared and standard is not None else None,
         hysteresis=float(above.mean() - below.mean()) if len(above) and len(below) else None,
+        timed_out=int(rows["outcome"].eq("timeout").sum()),
+        at_ends=int(is_at_end.sum()),
         levels=tuple(rows["setting"].to_numpy(dtype=float).tolist()),
         started_high=tuple(started_high.tolist()),
     )
@@ -131,30 +140,52 @@ class Settings(LevelStatistic[SettingEstimate]):
     def is_exported_in(cls, study: Study) -> bool:
         return any(block.design.adjusts for block in study.levels)
 
-    @property
-    def _has_constant_error(self) -> bool:
-        return any(row.constant_error is not None for row in self.rows)
+    @classmethod
+    def matches_standard(cls, result: LevelsResult) -> bool:
+        """Return whether participants matched a standard, so that their mean setting is a PSE."""
+        return any(row.constant_error is not None for row in cls.rows_in(result))
+
+    @classmethod
+    def measure_name(cls, result: LevelsResult) -> str:
+        """Return the name of the mean of the settings."""
+        return "point of subjective equality" if cls.matches_standard(result) else MEAN_SETTING
 
     def table_columns(self) -> Sequence[TableColumn]:
+        matches = self.matches_standard(self.result)
+        timed_out, at_ends = (any(getattr(row, name) for row in self.rows) for name in ("timed_out", "at_ends"))
         in_u = "decades" if self.result.spacing == "log" else self.result.unit or "units of the level"
         return (
             self.standard_column(),
             *PARTICIPANT_COLUMNS,
-            (f"PSE{unit(self.result)}", lambda row: digits(row.pse)),
+            (f"{'PSE' if matches else 'mean setting'}{unit(self.result)}", lambda row: digits(row.pse)),
             INTERVAL,
-            (f"JND [{in_u}]", lambda row: digits(row.jnd)),
-            (f"constant error [{in_u}]", lambda row: signed(row.constant_error)) if self._has_constant_error else None,
+            (f"{'JND' if matches else 'SD'} [{in_u}]", lambda row: digits(row.jnd)),
+            (f"constant error [{in_u}]", lambda row: signed(row.constant_error)) if matches else None,
             (f"hysteresis [{in_u}]", lambda row: signed(row.hysteresis)),
+            ("timed out", lambda row: str(row.timed_out)) if timed_out else None,
+            ("at an end of the range", lambda row: str(row.at_ends)) if at_ends else None,
         )
 
     def explanation(self) -> str:
         values = "logarithms of the set levels" if self.result.spacing == "log" else "set levels"
-        error = " constant error: PSE − standard;" if self._has_constant_error else ""
+        matches = self.matches_standard(self.result)
+        mean, sd = (
+            ("PSE (point of subjective equality)", "JND (just-noticeable difference)")
+            if matches
+            else ("Mean setting", "SD")
+        )
+        error = " constant error: PSE − standard;" if matches else ""
+        counts = (
+            " Counts show how many settings were ended by the time limit (timed out) or lie at an end of the range; "
+            "all of them are included."
+        )
+        has_counts = any(row.timed_out or row.at_ends for row in self.rows)
         return (
-            f"Settings are expressed as levels ({level_words(self.result)}). PSE (point of subjective equality): mean "
-            f"of the {values}, with a 95 % confidence interval (Student’s t); JND (just-noticeable difference): their "
-            f"standard deviation;{error} hysteresis: mean of the settings that started high minus mean of those that "
-            "started low. Group values are means across participants; the group PSE has a 95 % confidence interval."
+            f"Settings are expressed as levels ({level_text(self.result)}). {mean}: mean of the {values}, with a 95 % "
+            f"confidence interval (Student’s t); {sd}: their standard deviation;{error} hysteresis: mean of the "
+            "settings that started high minus mean of those that started low. Group values are means across "
+            f"participants; the group {'PSE' if matches else 'mean'} has a 95 % confidence interval."
+            f"{counts * has_counts}"
         )
 
     def is_comparable_with(self, measure: str) -> bool:
@@ -164,14 +195,32 @@ class Settings(LevelStatistic[SettingEstimate]):
         title = self.result.title
         if not (estimates := self.participant_rows(self.result)):
             return
+        matches = self.matches_standard(self.result)
+        criterion = "criterion for calling two stimuli equal" if matches else "own criterion"
         yield (
-            f"{title}: settings depend on each participant's criterion for calling two stimuli equal, so the "
-            "variability of settings is not a criterion-free measure of the threshold."
+            f"{title}: settings depend on each participant's {criterion}, so the variability of settings is not a "
+            "criterion-free measure of the threshold."
         )
+        if any(estimate.timed_out or estimate.at_ends for estimate in estimates):
+            yield (
+                f"{title}: {self._count_text()}. They are included, so means may be biased and intervals too narrow."
+            )
         if people := [str(estimate.participant) for estimate in estimates if estimate.hysteresis is None]:
             reason = "all settings started near the same end of the range, so the hysteresis is unknown"
             yield f"{title}: {reason} ({listed(people[:_MOST_NAMED])})."
         yield f"{title}: {MOTORS}"
+
+    def _count_text(self) -> str:
+        """Return a clause on the settings that were ended by the time limit, and on those at an end of the range."""
+        rows = self.participant_rows(self.result)
+        total = sum(row.n for row in rows)
+        timed_out, at_ends = sum(row.timed_out for row in rows), sum(row.at_ends for row in rows)
+        were, lay = "was" if timed_out == 1 else "were", "lies" if at_ends == 1 else "lie"
+        clauses = [
+            f"{timed_out} of {total} settings {were} ended by the time limit" if timed_out else "",
+            f"{at_ends}{'' if timed_out else f' of {total} settings'} {lay} at an end of the range" if at_ends else "",
+        ]
+        return " and ".join(filter(None, clauses))
 
     def methods(self, block: LevelBlock) -> Iterator[str]:
         if not self.rows or block.stimulus is None:
@@ -181,26 +230,37 @@ class Settings(LevelStatistic[SettingEstimate]):
         kind, (low, high) = KINDS[block.stimulus.level_kind], block.stimulus.levels
         top = f"{high:g}" if block.stimulus.level_kind == "weber" else with_unit(self.result, high)
         numbers = {row.n for row in self.participant_rows(self.result)}
-        least, most = min(numbers), max(numbers)
-        often = wording.counted(most, "time") if least == most else f"{least} to {most} times"
+        minimum, maximum = min(numbers), max(numbers)
+        often = wording.counted(maximum, "time") if minimum == maximum else f"{minimum} to {maximum} times"
         each = " for each standard" if len({row.standard for row in self.rows}) > 1 else ""
         yield (
             f"In “{self.result.title}”, participants set {self.result.quantity}{to} by {block.design.paper_name}, "
             f"{often}{each}; {kind} ranged from {low:g} to {top}, and the starting level alternated between values "
             "near the lower and the upper end of this range."
         )
+        if counts := self._count_text():
+            yield f"In “{self.result.title}”, {counts}; these settings were included."
 
     @classmethod
     def common_methods(cls, blocks: Sequence[LevelsResult]) -> Iterator[str]:
-        if any(map(cls.rows_in, blocks)):
-            yield (
+        if not (blocks := [block for block in blocks if cls.rows_in(block)]):
+            return
+        if any(map(cls.matches_standard, blocks)):
+            measures = (
                 "The point of subjective equality is the mean of a participant’s settings, the just-noticeable "
                 "difference is their standard deviation, the constant error is the difference between the mean and the "
                 "standard, and the hysteresis is the mean of settings that started high minus the mean of those that "
-                "started low. All four are calculated from the logarithm of the level if levels are spaced "
-                "logarithmically (Gescheider 1997). Group values are means across participants with 95 % confidence "
-                "intervals (Student’s t)."
+                "started low. All four are calculated"
             )
+        else:
+            measures = (
+                "For each participant, the mean of the settings, their standard deviation and the hysteresis (the mean "
+                "of settings that started high minus the mean of those that started low) are calculated"
+            )
+        yield (
+            f"{measures} from the logarithm of the level if levels are spaced logarithmically (Gescheider 1997). Group "
+            "values are means across participants with 95 % confidence intervals (Student’s t)."
+        )
 
 
 SUMMARIES: Final[dict[Reply, Summary]] = {
@@ -218,8 +278,8 @@ class LevelAnswers:
 
     Answers to catch trials are separate, with ``catch``. A block that compares conditions has ``comparison`` instead of
     ``standard`` and ``level``. ``value`` summarises ``n`` answers of ``participants``; ``count`` is the number of
-    counted answers in a share. ``low`` and ``high`` are the ends of the 95 % interval: Clopper–Pearson for a
-    participant's share, otherwise Student's t over the answers of one participant, or over the participants' values.
+    counted answers in a proportion. ``low`` and ``high`` are the ends of the 95 % interval: Clopper–Pearson for a
+    participant's proportion, otherwise Student's t over the answers of one participant or the participants' values.
     """
 
     participant: str | None
@@ -275,8 +335,8 @@ def _answers_at_level(
     block: LevelBlock, rows: pd.DataFrame, bounds: tuple[float, float] | None, units: Mapping[str, float]
 ) -> Iterator[LevelAnswers]:
     summary = SUMMARIES[block.design.reply]
-    share = summary == "share"
-    numbers = rows["success" if share else "value"].to_numpy(dtype=float)
+    proportion = summary == "share"
+    numbers = rows["success" if proportion else "value"].to_numpy(dtype=float)
     numbers = np.log(numbers) if summary == "geometric mean" else numbers
     first = rows.iloc[0]
     make_answers = partial(
@@ -286,17 +346,17 @@ def _answers_at_level(
         comparison=first["comparison"] if isinstance(first["comparison"], str) else number_or_none(first["comparison"]),
         catch=bool(first["catch"]),
     )
-    summarise = partial(_summarise_mean, summary, (0.0, 1.0) if share else bounds)
+    summarise = partial(_summarise_mean, summary, (0.0, 1.0) if proportion else bounds)
     people = rows["participant"].to_numpy()
     numbers_by_person = {person: numbers[people == person] for person in sorted(set(people))}
     mean = summarise(np.array([values.mean() - units.get(person, 0.0) for person, values in numbers_by_person.items()]))
-    count = int(numbers.sum()) if share else None
+    count = int(numbers.sum()) if proportion else None
     yield make_answers(
         participant=None, n=len(numbers), participants=len(numbers_by_person), count=count, **mean._asdict()
     )
     for person, values in numbers_by_person.items():
         mean = summarise(values)
-        if share:
+        if proportion:
             count = int(values.sum())
             exact = clopper_pearson(count, len(values))
             mean = mean._replace(low=exact.low, high=exact.high)
@@ -312,7 +372,7 @@ class _Mean(NamedTuple):
 
 
 def _summarise_mean(summary: Summary, bounds: tuple[float, float] | None, values: Array) -> _Mean:
-    """Return the back-transformed mean of shares, points or logarithms and its 95 % interval within bounds."""
+    """Return the back-transformed mean of proportions, points or logarithms and its 95 % interval within bounds."""
     low, high = student_interval(values)
     if summary == "geometric mean":
         low, high = (None if end is None else math.exp(end) for end in (low, high))
@@ -333,14 +393,14 @@ def people(result: LevelsResult) -> tuple[str, ...]:
     return tuple(sorted(answered | {str(setting.participant) for setting in Settings.participant_rows(result)}))
 
 
-def summary_words(result: LevelsResult) -> str:
+def summary_text(result: LevelsResult) -> str:
     """Return the description of a value at a level: "proportion correct", "mean rating", and so on."""
     if result.summary == "share":
         return "proportion correct" if result.counts == "correct" else f"proportion “{result.counts}”"
     return "mean rating" if result.summary == "mean" else "geometric mean of the numbers"
 
 
-def mean_words(result: LevelsResult) -> str:
+def mean_text(result: LevelsResult) -> str:
     """Return the noun for the group's value at a level."""
     return "geometric mean" if result.summary == "geometric mean" else "mean"
 
@@ -362,7 +422,7 @@ class Answers(LevelStatistic[LevelAnswers]):
                 "answers after subtracting the participant's mean ln answer."
             )
             yield paragraph(
-                f"The table shows the {mean_words(result)} across participants, with a 95 % confidence interval "
+                f"The table shows the {mean_text(result)} across participants, with a 95 % confidence interval "
                 "(Student's t) unless all participants have the same value. The tables by participant also show "
                 "the number of answers." + (units if result.own_units else ""),
                 "soft",
@@ -384,14 +444,14 @@ class Answers(LevelStatistic[LevelAnswers]):
             (f"Standard{unit(result)}", lambda answers: cell_text(answers.standard)) if standards else None,
             None
             if result.level_kind in {None, "value"}
-            else (level_words(result), lambda answers: cell_text(answers.level)),
+            else (level_text(result), lambda answers: cell_text(answers.level)),
             (
-                level_words(result) if alone else f"Comparison{unit(result)}",
+                level_text(result) if alone else f"Comparison{unit(result)}",
                 lambda answers: cell_text(answers.comparison),
             ),
             ("participants", lambda answers: str(answers.participants)),
             ("n", lambda answers: str(answers.n)),
-            (summary_words(result), lambda answers: self._value(answers.value)),
+            (summary_text(result), lambda answers: self._value(answers.value)),
             ("95 % interval", lambda answers: interval_text(answers.low, answers.high, self._value)),
             words=1 if result.vary is None else 0,
         )
@@ -437,18 +497,19 @@ class Answers(LevelStatistic[LevelAnswers]):
         for row in self.rows:
             if row.participant is not None:
                 trial_counts[row.participant] += row.n
-        least, most = min(trial_counts.values()), max(trial_counts.values())
-        trials = counted(most, "trial") if least == most else f"{least} to {most} trials"
+        minimum, maximum = min(trial_counts.values()), max(trial_counts.values())
+        trials = counted(maximum, "trial") if minimum == maximum else f"{minimum} to {maximum} trials"
         design = f"{block.design.paper_name}, {trials} per participant"
         if stimulus is None:
             settings = [] if block.reference is None else [block.reference, *block.settings]
-            conditions = listed([*map(_condition_words, settings)]) or "conditions"
+            conditions = listed([*map(_condition_text, settings)]) or "conditions"
             yield f"In “{title}” ({design}), {conditions} were compared."
             return
         kind, chosen = KINDS[stimulus.level_kind], ""
         if block.method is not None:
-            chosen = f"; levels were chosen by {block.method.paper_name}"
-        delays = dict.fromkeys(_delay_words(setting.of) for setting in block.settings if setting.of is not None)
+            tracks = block.method.track_phrase(stimulus)
+            chosen = f"; levels were chosen by {block.method.paper_name}{f', {tracks}' if tracks else ''}"
+        delays = dict.fromkeys(_delay_text(setting.of) for setting in block.settings if setting.of is not None)
         yield (
             f"In “{title}” ({design}), {self.result.quantity} was judged at {kind} {self._presented_levels(stimulus)}"
             f"{standards_phrase(self.result, self.rows)}{''.join(delays)}{chosen}."

@@ -7,7 +7,7 @@ without the libraries of the analysis, which may not be installed.
 from dataclasses import replace
 from typing import Final, NamedTuple
 
-from study_app.store.files import INTERVALS, PARTICIPANTS, TRIALS_MISSING, Column, optional, with_missing_trials
+from study_app.store.files import INTERVALS, PARTICIPANTS, TRIALS, TRIALS_MISSING, Column, optional, with_missing_trials
 from study_app.store.tables import table_markdown
 
 _STATUS: Final = next(column for column in with_missing_trials(PARTICIPANTS) if column.name == "status")
@@ -79,6 +79,12 @@ OF_TRACKS: Final[tuple[Column, ...]] = (
         "it.",
         minimum=1,
     ),
+    optional(
+        "outcome",
+        "text",
+        "How the trial ended. If a setting timed out, it is the level at the end of the time allowed.",
+        levels=next(column for column in TRIALS if column.name == "outcome").levels,
+    ),
     optional("response", "text", "The answer; n/a if there is no answer."),
     optional("value", "number", "The answer as a number; n/a if it is not a number."),
     optional("right", "flag", "true if the answer was correct; n/a if answers are neither correct nor incorrect."),
@@ -105,16 +111,16 @@ _SETTINGS: Final[tuple[Column, ...]] = (
     Column(
         "pse",
         "number",
-        "Point of subjective equality, as a level: the mean of the settings (the geometric mean if levels are spaced "
-        "logarithmically).",
+        "Mean of the settings as a level (the geometric mean if levels are spaced logarithmically); if a standard was "
+        "presented, this is the point of subjective equality (PSE).",
     ),
-    optional("low", "number", "Lower end of the 95 % confidence interval for the PSE (Student's t)."),
-    optional("high", "number", "Upper end of the 95 % confidence interval for the PSE (Student's t)."),
+    optional("low", "number", "Lower end of the 95 % confidence interval for the mean (Student's t)."),
+    optional("high", "number", "Upper end of the 95 % confidence interval for the mean (Student's t)."),
     optional(
         "jnd",
         "number",
-        "Just-noticeable difference: the standard deviation of the settings (in decades if levels are spaced "
-        "logarithmically, otherwise in the unit of the levels).",
+        "Standard deviation of the settings (in decades if levels are spaced logarithmically, otherwise in the unit "
+        "of the levels); if a standard was presented, this is the just-noticeable difference (JND).",
         minimum=0,
     ),
     optional(
@@ -125,6 +131,8 @@ _SETTINGS: Final[tuple[Column, ...]] = (
         "number",
         "Mean of the settings that started high minus the mean of those that started low, in the unit of the JND.",
     ),
+    Column("timed_out", "integer", "Number of settings that the time limit ended; they are included.", minimum=0),
+    Column("at_ends", "integer", "Number of settings at an end of the range; they are included.", minimum=0),
 )
 
 _EXPONENTS: Final[tuple[Column, ...]] = (

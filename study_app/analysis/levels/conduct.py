@@ -47,7 +47,7 @@ def _split_by_level(rows: pd.DataFrame) -> Iterator[_LevelRange]:
 
 
 def _withheld_shares(block: LevelBlock, intervals: pd.DataFrame) -> Iterator[_Row]:
-    """Yield the share of the force [%] held back by the safety layer at each level, if the stimulus varies the link."""
+    """Yield the percentage of the force withheld by the safety layer at each level, if the stimulus varies the link."""
     if block.stimulus is None or block.stimulus.vary not in OF_LINK:
         return
     rows = intervals[(intervals["block"] == block.id) & (intervals["presented"] == "comparison")]
@@ -86,7 +86,7 @@ def _level_conduct(block: LevelBlock, opened: pd.DataFrame, intervals: pd.DataFr
 
 
 def _catch_answers(block: LevelBlock, opened: pd.DataFrame) -> Iterator[_Row]:
-    """Yield the incorrect catch trials of each session; a share above ``most`` excludes the session."""
+    """Yield the incorrect catch trials of each session; a proportion above ``most`` excludes the session."""
     if block.wrong_most is None:
         return
     caught = opened[(opened["block"] == block.id) & opened["catch"].fillna(False) & opened["right"].notna()]

@@ -6,7 +6,7 @@ from typing import Any, Final
 
 import pandas as pd
 
-from study_app.analysis.data.blocks import LevelBlock, Setting, published_words, setting_name
+from study_app.analysis.data.blocks import LevelBlock, Setting, published_text, setting_name
 from study_app.analysis.data.measures import quartiles_or_none
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.html_page import heading, paragraph, table_of
@@ -20,7 +20,7 @@ from study_app.analysis.wording import number
 TRACK_COLUMNS: Final = (
     *("participant", "session", "trial", "block", "code", "track", "catch", "standard", "level", "level_delivered"),
     *("comparison", "arrangement", "analysed", "response", "value", "success", "right", "response_s", "reversal"),
-    "setting",
+    *("setting", "outcome"),
 )
 """The columns of tracks that statistics read."""
 
@@ -115,7 +115,7 @@ def level_findings(result: LevelsResult) -> Iterator[str]:
     sentences = [line for statistic in statistics() for line in statistic(result).sentences()]
     yield from sentences
     if sentences and result.published:
-        published = [published_words(value, result.unit) for value in result.published]
+        published = [published_text(value, result.unit) for value in result.published]
         yield f"{result.title}: published values: {'; '.join(published)}."
 
 

@@ -20,7 +20,7 @@ from study_app.analysis.levels.statistic import (
     LevelStatistic,
     TableColumn,
     group_mean_row,
-    interval_words,
+    interval_phrase,
 )
 from study_app.analysis.levels.thresholds import ThresholdEstimate, Thresholds
 from study_app.analysis.results import LevelsResult
@@ -182,7 +182,7 @@ class Exponents(LevelStatistic[ExponentEstimate]):
         for row in self.rows:
             if row.participant is None:
                 yield (
-                    f"{self.result.title}: {name} {number(row.exponent)} ({interval_words(row, number)}; "
+                    f"{self.result.title}: {name} {number(row.exponent)} ({interval_phrase(row, number)}; "
                     f"{counted(row.n, 'participant')}){meaning}."
                 )
 

@@ -37,7 +37,7 @@ _MODELS: Final = {
     "column d_prime_other contains d′ for the differencing model.",
 }
 _FROM_SHARE_CORRECT: Final = ("abx", "oddity", "3ifc", "4ifc")
-"""Designs in which the share of correct answers alone determines d′."""
+"""Designs in which the proportion of correct answers alone determines d′."""
 _BIASES: Final = {
     "2ifc": " c is positive if participants are biased towards the second interval.",
     "yesno": " c is positive if participants are biased towards answering “no”.",
@@ -59,9 +59,9 @@ class SensitivityEstimate:
     """A participant's sensitivity and bias or (``participant`` None) their means over ``n`` participants.
 
     They apply to a ``standard``, to a condition as ``comparison``, or to the ratings at a ``level`` against the lowest
-    level. ``shares`` are the shares of each answer. The 95 % interval of ``d_prime`` is from its variance, if known, or
-    from the share of correct answers; the group's is from Student's t. ``criterion`` is c, or k for same–different;
-    ``other`` is d′ under the model that is not ``model``.
+    level. ``shares`` are the proportions of each answer. The 95 % interval of ``d_prime`` is from its variance, if
+    known, or from the proportion of correct answers; the group's is from Student's t. ``criterion`` is c, or k for
+    same–different; ``other`` is d′ under the model that is not ``model``.
     """
 
     participant: str | None
@@ -130,11 +130,11 @@ def sensitivities(block: LevelBlock, opened: pd.DataFrame) -> Iterator[Sensitivi
 def _add_group_means(estimates: Sequence[SensitivityEstimate]) -> Iterator[SensitivityEstimate]:
     """Yield the means over participants, followed by the values of each."""
     if estimates:
-        shares = {
+        proportions = {
             answer: float(np.mean([estimate.shares[answer] for estimate in estimates]))
             for answer in estimates[0].shares
         }
-        yield replace(group_mean_row(estimates, "d_prime", "criterion", "other"), shares=shares)
+        yield replace(group_mean_row(estimates, "d_prime", "criterion", "other"), shares=proportions)
     yield from estimates
 
 
@@ -153,8 +153,8 @@ def _estimate_from_choices(
     counts = Counter((design.arrangement_of(letters), answer) for letters, answer in pairs)
     answer_counts = Counter(rows["response"].astype(str))
     sensitivity = design.sensitivity(counts, roving=block.standards_rove) if block.has_correct_answer else None
-    shares = {answer: answer_counts[answer] / len(rows) for answer in design.answers}
-    estimate = SensitivityEstimate(participant=person, n=len(rows), shares=shares, **where)  # type: ignore[arg-type]  # standard or comparison
+    proportions = {answer: answer_counts[answer] / len(rows) for answer in design.answers}
+    estimate = SensitivityEstimate(participant=person, n=len(rows), shares=proportions, **where)  # type: ignore[arg-type]  # standard or comparison
     if sensitivity is None:
         return estimate
     with_d_prime = _add_sensitivity(estimate, sensitivity)
@@ -168,12 +168,12 @@ def _estimate_from_choices(
 def _add_interval(
     estimate: SensitivityEstimate, design: Design, counts: Mapping[tuple[int, str], int], model: Model | None
 ) -> SensitivityEstimate:
-    """Return an estimate with the d′ interval from that of the share correct; unchanged if all or none are correct."""
+    """Return an estimate with the d′ interval from the proportion correct; unchanged if all or none are correct."""
     correct, n = design.correct_of(counts)
     if correct in (0, n):
         return estimate
-    share, task = clopper_pearson(correct, n), f"{design.kind}{f' {model}' if model else ''}"
-    return replace(estimate, low=d_prime_at(task, share.low), high=d_prime_at(task, share.high))
+    proportion, task = clopper_pearson(correct, n), f"{design.kind}{f' {model}' if model else ''}"
+    return replace(estimate, low=d_prime_at(task, proportion.low), high=d_prime_at(task, proportion.high))
 
 
 def _add_sensitivity(estimate: SensitivityEstimate, sensitivity: Sensitivity) -> SensitivityEstimate:
@@ -190,7 +190,7 @@ def _add_sensitivity(estimate: SensitivityEstimate, sensitivity: Sensitivity) ->
 
 
 def _is_perfect(estimate: SensitivityEstimate) -> bool:
-    """Return whether all answers were correct, so that d′ from the share of correct answers has no interval."""
+    """Return whether all answers were correct, so that d′ from the proportion of correct answers has no interval."""
     return estimate.d_prime is not None and estimate.d_prime > 0 and estimate.high is None
 
 
@@ -246,7 +246,7 @@ class Sensitivities(LevelStatistic[SensitivityEstimate]):
         has_d_prime = any(row.d_prime is not None for row in self.rows)
         has_criterion = any(row.criterion is not None for row in self.rows)
         answers = tuple(first.shares)
-        shares: list[TableColumn] = [
+        proportions: list[TableColumn] = [
             (f"“{answer.replace('_', ' ')}”", lambda row, answer=answer: f"{100 * row.shares[answer]:.0f} %")  # type: ignore[misc]
             for answer in (answers[:1] if len(answers) == 2 else answers)
         ]
@@ -260,7 +260,7 @@ class Sensitivities(LevelStatistic[SensitivityEstimate]):
             ("k" if self.result.design == "samedifferent" else "c", lambda row: number(row.criterion))
             if has_criterion
             else None,
-            *shares,
+            *proportions,
         )
 
     def limits(self) -> Iterator[str]:
@@ -286,9 +286,9 @@ class Sensitivities(LevelStatistic[SensitivityEstimate]):
             )
 
     def explanation(self) -> str:
-        shares = "Percentages show how often each answer was given." if self.rows[0].shares else ""
+        proportions = "Percentages show how often each answer was given." if self.rows[0].shares else ""
         if all(row.d_prime is None for row in self.rows):
-            return shares
+            return proportions
         over = "across all presented levels" if self.result.vary is not None else "for each comparison"
         if self.result.summary == "mean":
             over = "for each level relative to the lowest (d_a from the area under the ROC curve)"
@@ -297,7 +297,7 @@ class Sensitivities(LevelStatistic[SensitivityEstimate]):
         return (
             f"d′ {over}, calculated from rates with the log-linear correction (Hautus 1995; Macmillan & Creelman "
             f"2005); the group value is the mean across participants with a t-based confidence interval.{model}{bias} "
-            f"{shares}"
+            f"{proportions}"
         ).rstrip()
 
     @classmethod

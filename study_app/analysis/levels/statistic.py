@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 
 from study_app.analysis import levels
-from study_app.analysis.data.blocks import LevelBlock, published_words
+from study_app.analysis.data.blocks import LevelBlock, published_text
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.html_page import drawn_figure, heading, paragraph, table_of
 from study_app.analysis.levels.columns import RESULTS
@@ -106,7 +106,7 @@ class LevelStatistic(Generic[_R]):
         if words := self.explanation():
             yield paragraph(words, "soft")
         if published := [
-            published_words(published, self.result.unit)
+            published_text(published, self.result.unit)
             for published in self.result.published
             if self.is_comparable_with(published.measure)
         ]:
@@ -163,7 +163,7 @@ def statistics() -> tuple[type[LevelStatistic[Any]], ...]:
 
 def digits(value: float | None, count: int = 3) -> str:
     """Return a number with the given number of digits; a dash for None."""
-    return "–" if value is None else f"{value:.{count}g}"
+    return "–" if value is None else f"{value:.{count}g}".replace("-", "−")
 
 
 def signed(value: float | None) -> str:
@@ -199,7 +199,7 @@ KINDS: Final = {"weber": "Weber fractions", "difference": "differences", "value"
 _LEVELS: Final[Mapping[str | None, str]] = {"weber": "Weber fraction for ", "difference": "difference in ", "value": ""}
 
 
-def level_words(result: LevelsResult) -> str:
+def level_text(result: LevelsResult) -> str:
     """Return the name of a level with its unit: "Weber fraction for viscosity", "Viscosity [Pa·s]", "Condition"."""
     if result.quantity is None:
         return "Condition"
@@ -220,7 +220,7 @@ def standards_phrase(result: LevelsResult, rows: Iterable[Any]) -> str:
     return f" for {noun} of {values} {result.unit}".rstrip() if standards else ""
 
 
-def interval_words(row: Any, format_number: Callable[[float], str]) -> str:
+def interval_phrase(row: Any, format_number: Callable[[float], str]) -> str:
     """Return the interval of a row as text."""
     if row.low is None or row.high is None:
         return "no interval"

@@ -7,7 +7,7 @@ requested level is the mean of their delivered levels.
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Final
+from typing import Any, Final, cast
 
 import numpy as np
 import pandas as pd
@@ -22,8 +22,8 @@ from study_app.analysis.levels.statistic import (
     LevelStatistic,
     TableColumn,
     digits,
-    interval_words,
-    level_words,
+    interval_phrase,
+    level_text,
     unit,
     with_unit,
 )
@@ -32,8 +32,8 @@ from study_app.analysis.results import LevelsResult
 from study_app.analysis.statistics.outcome import Array
 from study_app.analysis.statistics.thresholds import FEWEST, SETS, WORST, GroupMean, drift, group_mean, p_of_fit
 from study_app.analysis.wording import counted, listed
-from study_app.protocol.trials import ANALYSIS_LAPSES, SESSION_SD, Assumed, Design, Stimulus
-from study_app.psychophysics.families import level_at
+from study_app.protocol.trials import ANALYSIS_LAPSES, COMPARISON_CHOSEN, SESSION_SD, Assumed, Design, Stimulus
+from study_app.psychophysics.families import Family, level_at, position
 from study_app.psychophysics.grid import ALIKE, MANY_LAPSES, MEAN_LAPSE, NEAR_MODE, GroupPriors, Posterior, group_priors
 from study_app.psychophysics.person_fit import (
     BEYOND_CHANCE,
@@ -54,6 +54,8 @@ BEYOND: Final = {None: "", "above": "above ", "below": "below "}
 _OPEN_ENDS: Final = {(False, False): None, (True, False): "low", (False, True): "high", (True, True): "both"}
 _SHIFT: Final = 0.1
 """The largest relative shift of a threshold by the prior on the width that is not reported."""
+_NEGLIGIBLE: Final = 0.01
+"""The largest relative change of a threshold by lapses that is not reported. [choice]"""
 _FEW_ANSWERS: Final = 40
 """The fewest answers for which the coverage of the intervals was tested."""
 _MOST_NAMED: Final = 6
@@ -287,7 +289,7 @@ def _estimate_participant(
     others = posterior.others
     psi, (lowest, highest) = fit.expected(posterior), stimulus.domain
     _, first, cells = np.unique([given.places, fit.shifts], axis=1, return_index=True, return_inverse=True)
-    decades = fit.change / (1.0 if grid.log else abs(threshold) * math.log(10))
+    decades = fit.change / (1.0 if stimulus.spacing == "log" else abs(threshold) * math.log(10))
     percent, compared = compared_percent(block.published), math.nan
     if percent is not None:
         compared = level_at(grid.family, percent, threshold, **others._asdict())
@@ -445,6 +447,34 @@ def percent_compared(result: LevelsResult) -> float | None:
     )
 
 
+def _has_jnd(result: LevelsResult) -> bool:
+    """Return whether the spread of the function is a just-noticeable difference in the unit of the levels."""
+    return result.has_pse and result.spacing == "linear"
+
+
+def _jnd(result: LevelsResult, estimate: ThresholdEstimate) -> float | None:
+    """Return half the distance between the levels chosen in 25 and 75 % of the trials without lapses."""
+    if estimate.width is None or result.family is None:
+        return None
+    return estimate.width * position(cast(Family, result.family), 0.75)
+
+
+def _session_sd_text(result: LevelsResult) -> str:
+    """Return the standard deviation of a person's threshold between sessions."""
+    if result.has_pse:
+        return f"{100 * SESSION_SD * math.log(10):.0f} % of the just-noticeable difference"
+    return f"a factor of {10**SESSION_SD:.2f}"
+
+
+def _is_biased_by_lapses(group: ThresholdEstimate) -> bool:
+    """Return whether `grid.MANY_LAPSES` lapses would change a group's threshold by a size that matters."""
+    if group.if_many_lapses is None:
+        return False
+    half_width = 0.0 if group.low is None or group.high is None else (group.high - group.low) / 2
+    shift = abs(group.if_many_lapses - group.threshold)
+    return shift > max(_NEGLIGIBLE * abs(group.threshold), _SHIFT * half_width)
+
+
 def _device_weber_fraction(result: LevelsResult, estimate: ThresholdEstimate) -> float | None:
     """Return the Weber fraction of damping relative to standard plus device damping, ΔB/(B + b); None if unknown."""
     if (
@@ -483,6 +513,9 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
 
     compute = staticmethod(lambda block, opened, _study, _found: thresholds(block, opened))
 
+    def heading(self) -> str:
+        return "Points of subjective equality" if self.result.has_pse else self.title
+
     def table_columns(self) -> Sequence[TableColumn]:
         result, percent, compared = self.result, self._target_percent(), percent_compared(self.result)
 
@@ -514,7 +547,9 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
             self.standard_column(),
             *PARTICIPANT_COLUMNS,
             (
-                "threshold" + (" (Weber fraction)" if result.level_kind == "weber" else unit(result)),
+                "threshold (Weber fraction)"
+                if result.level_kind == "weber"
+                else f"{'PSE' if result.has_pse else 'threshold'}{unit(result)}",
                 lambda row: f"{BEYOND[row.beyond]}{row.threshold:.3g}",
             ),
             ("95 % interval", interval),
@@ -523,6 +558,7 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
             if any(_device_weber_fraction(result, row) is not None for row in self.rows)
             else None,
             (f"width [{_WIDTH_UNITS[result.spacing]}]", lambda row: digits(row.width, 2)),
+            (f"JND{unit(result)}", lambda row: digits(_jnd(result, row))) if _has_jnd(result) else None,
             ("flat width prior", lambda row: digits(row.flat_width)),
             None
             if percent is None
@@ -550,23 +586,29 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
             else f" “At {compared:g} %” is the level that yields {compared:g} % {result.counts}, the criterion used "
             "for the published value."
         )
+        jnd = (
+            "The JND is half the distance between the levels at which the comparison is chosen in 25 and 75 % of the "
+            "trials. "
+            if _has_jnd(result)
+            else ""
+        )
         function = FAMILIES[result.family or ""]
         return (
-            f"A threshold is the level ({level_words(result)}) at which the {function} function lies halfway between "
-            f"the guess rate and one minus the lapse rate{at}. The estimate is the posterior median with an "
-            "equal-tailed 95 % interval, based on all analysed answers at the levels delivered to the hand. The "
-            "width, from 5 to 95 % of the rise, has a log-normal prior; the next column shows the threshold under a "
-            "flat prior. “Above” and “below” mark thresholds outside the range of the stimulus levels; “<” and “>” "
-            "mark interval ends that the answers do not determine. The intervals allow for differences in a person’s "
-            f"threshold between sessions (one standard deviation is a factor of {10**SESSION_SD:.2f}) and for changes "
-            "over the trials. The group value is the random-effects mean (Paule–Mandel), with the Hartung–Knapp "
-            "interval if there are at least three participants. Each participant's variance is replaced by the "
-            f"geometric mean of that variance and the median variance.{level}{reversals} Fit: p value of the deviance, "
-            f"based on {SETS} simulated data sets; for the group, how much more often errors follow one another than "
-            f"expected, in standard errors, marked “!” if above {MOST_CLUSTERED:g}. "
-            "Drift: correlation between trial number and deviance residual, marked “!” if the threshold changes over "
-            f"the trials by more than {BEYOND_CHANCE:g} standard errors; for the group, the mean change of thresholds "
-            "after the first trials, in standard errors. n is the number of "
+            f"A {'PSE' if result.has_pse else 'threshold'} is the level ({level_text(result)}) at which the {function} "
+            f"function lies halfway between the guess rate and one minus the lapse rate{at}. The estimate is the "
+            "posterior median with an equal-tailed 95 % interval, based on all analysed answers at the levels "
+            "delivered to the hand. The width, from 5 to 95 % of the rise, has a log-normal prior; the column “flat "
+            f"width prior” shows the threshold under a flat prior. {jnd}“Above” and “below” mark thresholds outside "
+            "the range of the stimulus levels; “<” and “>” mark interval ends that the answers do not determine. The "
+            "intervals allow for differences in a person’s threshold between sessions (one standard deviation is "
+            f"{_session_sd_text(result)}) and for changes over the trials. The group value is the random-effects mean "
+            "(Paule–Mandel), with the Hartung–Knapp interval if there are at least three participants. Each "
+            "participant's variance is replaced by the geometric mean of that variance and the median "
+            f"variance.{level}{reversals} Fit: p value of the deviance, based on {SETS} simulated data sets; for the "
+            "group, how much more often errors follow one another than expected, in standard errors, marked “!” if "
+            f"above {MOST_CLUSTERED:g}. Drift: correlation between trial number and deviance residual, marked “!” if "
+            f"the threshold changes over the trials by more than {BEYOND_CHANCE:g} standard errors; for the group, the "
+            "mean change of thresholds after the first trials, in standard errors. n is the number of "
             f"answers{catch}." + (f" {REMOVED.format('is')}" if result.design == "2ifc" else "")
         )
 
@@ -584,8 +626,8 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
                 if row.compared is not None:
                     percent += f", {row.compared:.3g} at {percent_compared(result):g} %"
                 yield (
-                    f"{result.title}{where}: threshold {row.threshold:.3g}{percent} ({level_words(result)}; "
-                    f"{interval_words(row, digits)}; {counted(row.n, 'participant')})."
+                    f"{result.title}{where}: threshold {row.threshold:.3g}{percent} ({level_text(result)}; "
+                    f"{interval_phrase(row, digits)}; {counted(row.n, 'participant')})."
                 )
 
     def limits(self) -> Iterator[str]:
@@ -674,12 +716,16 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
         if thresholds := [
             f"{group.if_many_lapses:.3g} instead of {group.threshold:.3g}{where}"
             for group, where in groups
-            if group.if_many_lapses is not None
+            if _is_biased_by_lapses(group)
         ]:
+            has_catch = self.result.counts != COMPARISON_CHOSEN  # a forced choice without a correct answer has none
+            advice = (
+                " The more catch trials far above the threshold a block has, the better the lapse rate can be "
+                "estimated."
+            )
             yield (
                 f"{self.result.title}: the answers do not rule out a mean lapse rate of {100 * MANY_LAPSES:g} %, at "
-                f"which the group's threshold would be {listed(thresholds)}. The more catch trials far above the "
-                "threshold a block has, the better the lapse rate can be estimated."
+                f"which the group's threshold would be {listed(thresholds)}.{advice * has_catch}"
             )
 
     def _limit_of_device(self) -> str:
@@ -697,14 +743,17 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
             f"{own.friction_n:.2g} N and mass of {own.mass_kg:.2g} kg{where} add to the force delivered by the "
             "motors. Weber fractions refer only to the force delivered by the motors"
         )
-        shares = [
-            f"{share:.3g} instead of {row.threshold:.3g} at {row.standard:g} {result.unit}"
+        proportions = [
+            f"{proportion:.3g} instead of {row.threshold:.3g} at {row.standard:g} {result.unit}"
             for row in self.rows
-            if row.participant is None and (share := _device_weber_fraction(result, row)) is not None
+            if row.participant is None and (proportion := _device_weber_fraction(result, row)) is not None
         ]
-        if not shares:
+        if not proportions:
             return f"{words}."
-        return f"{words}; if the standard includes the device's damping, the group values are {listed(shares)}."
+        return (
+            f"{words}; if the device's damping is included in the standard, the group's Weber fractions are "
+            f"{listed(proportions)}."
+        )
 
     def methods(self, block: LevelBlock) -> Iterator[str]:
         if not self.rows or block.assumed is None or block.stimulus is None:
@@ -729,9 +778,10 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
                 "analysed answers at the levels delivered to the hand. The deviance was compared with the deviances "
                 f"of {SETS} simulated data sets, and drift is the correlation between trial number and deviance "
                 "residual (Wichmann & Hill 2001). The intervals allow for differences in a person’s threshold between "
-                f"sessions (one standard deviation is a factor of {10**SESSION_SD:.2f}; from data in Jäkel & Wichmann "
-                f"2006), and for a change over the trials if it exceeded {BEYOND_CHANCE:g} standard errors. The "
-                f"posterior averages over linear changes (prior: a factor of {CHANGE_PRIOR:g}), so the threshold "
+                f"sessions (one standard deviation is {listed([*dict.fromkeys(map(_session_sd_text, blocks))])}; from "
+                "data in Jäkel & Wichmann 2006), and for a change over the trials if it exceeded "
+                f"{BEYOND_CHANCE:g} standard errors. The posterior averages over linear changes (prior: a factor of "
+                f"{CHANGE_PRIOR:g}), so the threshold "
                 f"refers to the middle of the trials. We assumed that {100 * ALIKE:.0f} % of the standard deviation of "
                 "log widths is due to differences between participants and that lapse rates vary around a common "
                 "mean, so each participant’s width and lapse rate depend on all participants’ answers; the posterior "

@@ -98,7 +98,7 @@ class BelowChance:
 def sessions_below_chance(frame: pd.DataFrame, blocks: Iterable[LevelBlock]) -> Iterator[BelowChance]:
     """Yield the sessions with answers below chance (binomial p below `BELOW_CHANCE_P`).
 
-    Designs without a guess rate have no chance level, because a bias reduces the share of correct answers.
+    Designs without a guess rate have no chance level, because a bias reduces the proportion of correct answers.
     """
     by_id = {block.id: block for block in blocks}
     answered = frame[frame["analysed"].fillna(False) & frame["right"].notna()]

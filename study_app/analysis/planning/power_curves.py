@@ -18,7 +18,6 @@ from matplotlib.ticker import MaxNLocator, PercentFormatter
 
 from study_app import __version__
 from study_app import figure_style as style
-from study_app.analysis.contrasts import inclusion_words
 from study_app.analysis.data.blocks import TRENDS
 from study_app.analysis.data.measures import Array
 from study_app.analysis.page_layout import SMALL, Style
@@ -37,7 +36,7 @@ from study_app.analysis.planning.simulated_studies import (
 from study_app.analysis.planning.smallest_differences import question_differences, size_text, smallest_differences
 from study_app.analysis.results import min_sample_reason
 from study_app.analysis.statistics.equivalence import STEPS
-from study_app.analysis.wording import bound_text, listed, whole_percent
+from study_app.analysis.wording import bound_text, inclusion_text, listed, whole_percent
 from study_app.protocol.participants import CONSISTENT, NOISY, STATED
 from study_app.psychophysics.grid import Z_95
 from study_app.store.files import Column, csv_bytes, optional, write_files
@@ -55,10 +54,10 @@ class Curve:
     """The power of one test as a function of sample size.
 
     ``item`` is None for tests over several statements, whose scope is ``over``; ``setting`` is the delay of tests of
-    one delay. ``power`` has the shares of studies that detect the effect, and ``alarms`` the shares without any effect
-    (for equivalence: the power if there is no difference). ``effect`` is the simulated effect, in scale points, between
-    the two settings whose mean answers differ most. ``detectable`` is the smallest effect in the same unit that 80 % of
-    studies find, None if it exceeds eight times the simulated one.
+    one delay. ``power`` has the proportions of studies that detect the effect, and ``alarms`` the proportions without
+    any effect (for equivalence: the power if there is no difference). ``effect`` is the simulated effect, in scale
+    points, between the two settings whose mean answers differ most. ``detectable`` is the smallest effect in the same
+    unit that 80 % of studies find, None if it exceeds eight times the simulated one.
     """
 
     block: str
@@ -82,7 +81,7 @@ class Curve:
 
     def needed_size(self, sizes: Sequence[int]) -> int | None:
         """Return the smallest sample size from which the power is at least 80 %."""
-        enough = [share >= WANTED for share in self.power]
+        enough = [proportion >= WANTED for proportion in self.power]
         for place, size in enumerate(sizes):
             if all(enough[place:]):
                 return size
@@ -130,7 +129,7 @@ def powers(
 
 
 def interval(share: float, studies: int) -> tuple[float, float]:
-    """Return Wilson's 95 % interval of a share of simulated studies (Wilson 1927)."""
+    """Return Wilson's 95 % interval of a proportion of simulated studies (Wilson 1927)."""
     middle = (share + Z_95**2 / (2 * studies)) / (1 + Z_95**2 / studies)
     reach = Z_95 / (1 + Z_95**2 / studies) * math.sqrt(share * (1 - share) / studies + Z_95**2 / (4 * studies**2))
     return max(0.0, middle - reach), min(1.0, middle + reach)
@@ -154,11 +153,11 @@ def _block_curves(block: PlannedBlock, counts: Counts, studies: int) -> Iterator
                 detectable=None,
             )
     if (block.id, "found") in counts:
-        shares = counts[block.id, "found"] / studies
+        proportions = counts[block.id, "found"] / studies
         for place, item in enumerate(block.items):
             effects = _effects_in_points(block, means[:, :, place])
             known = effects[FULL] - effects[0] > 0.05
-            power, alarms = _power_and_alarms(shares[:, :, place])
+            power, alarms = _power_and_alarms(proportions[:, :, place])
             yield Curve(
                 block=block.id,
                 question=question,
@@ -168,7 +167,9 @@ def _block_curves(block: PlannedBlock, counts: Counts, studies: int) -> Iterator
                 power=power,
                 alarms=alarms,
                 effect=float(effects[FULL]),
-                detectable=tuple(_detectable_effect(shares[size, :, place], effects) for size in range(len(shares)))
+                detectable=tuple(
+                    _detectable_effect(proportions[size, :, place], effects) for size in range(len(proportions))
+                )
                 if known
                 else None,
             )
@@ -240,11 +241,11 @@ def _longer_delays(block: PlannedBlock) -> list[int]:
 def _lowest_curves(block: PlannedBlock, counts: Counts, studies: int) -> Iterator[Curve]:
     if (block.id, "lowest") not in counts:
         return
-    shares = counts[block.id, "lowest"] / studies
+    proportions = counts[block.id, "lowest"] / studies
     for place, item in enumerate(block.items):
-        if shares[:, place].any():
+        if proportions[:, place].any():
             for delay in _longer_delays(block):
-                power = tuple(shares[:, place, delay].tolist())
+                power = tuple(proportions[:, place, delay].tolist())
                 yield Curve(
                     block=block.id,
                     question="lowest delay",
@@ -261,11 +262,11 @@ def _lowest_curves(block: PlannedBlock, counts: Counts, studies: int) -> Iterato
 def _equivalence_curves(block: PlannedBlock, counts: Counts, studies: int) -> Iterator[Curve]:
     if (block.id, "equivalent") not in counts:
         return
-    shares = counts[block.id, "equivalent"] / studies
+    proportions = counts[block.id, "equivalent"] / studies
     means = counts[block.id, "means"][FULL] / studies
     for place, item in enumerate(block.items):
         for delay in _longer_delays(block):
-            none, full = (tuple(shares[:, effect, place, delay - 1].tolist()) for effect in (0, 1))
+            none, full = (tuple(proportions[:, effect, place, delay - 1].tolist()) for effect in (0, 1))
             difference = float(means[delay, place] - means[0, place])
             yield Curve(
                 block=block.id,
@@ -437,9 +438,10 @@ def _preface_lines(power: Powers) -> list[str]:
         lines += ["", f"**Preliminary: {power.studies} of {power.asked} studies were simulated.**"]
     if power.plan.unknown:
         items = ", ".join(power.plan.unknown)
+        these = "this statement" if len(power.plan.unknown) == 1 else "these statements"
         lines += [
             "",
-            f"The model does not assume any effects for {items}, so any effects detected for these statements are due "
+            f"The model does not assume any effects for {items}, so any effects detected for {these} are due "
             "to chance.",
         ]
     lines += [
@@ -478,6 +480,7 @@ def _summary_lines(power: Powers) -> Iterator[str]:
     place = sizes.index(plan.participants) if plan.participants in sizes else len(sizes) - 1
     planned_word = "the planned " if plan.participants in sizes else ""
     main = next(iter(power.kinds))
+    titles = {block.id: block.title for block in plan.blocks}
     lines = []
     for curve in power.curves:
         primary = (
@@ -486,13 +489,16 @@ def _summary_lines(power: Powers) -> Iterator[str]:
             and (not plan.decided.made or plan.decided.is_primary(curve.item))
         )
         if curve.question == "contrast" or (primary and curve.question in ("conditions differ", "trend")):
-            shares = dict(zip(power.kinds, (kind.power[place] for kind in power.curves_by_kind(curve)), strict=True))
-            question = "" if curve.question == "contrast" else f" ({HEADS[curve.question]})"
+            proportions = dict(
+                zip(power.kinds, (kind.power[place] for kind in power.curves_by_kind(curve)), strict=True)
+            )
+            where = f" in {titles[curve.block]}" if len(titles) > 1 else ""
+            question = "" if curve.question == "contrast" else f" ({HEADS[curve.question]}{where})"
             shown = "show equivalence" if curve.over.endswith(IF_EQUAL) else "detect the effect"
             lines.append(
-                f"- {_curve_name(curve, power).strip('*')}{question}: {whole_percent(shares[CONSISTENT])} of studies "
-                f"{shown} if participants are {CONSISTENT}, {whole_percent(shares[main])} if they are "
-                f"{main}, and {whole_percent(shares[NOISY])} if they are {NOISY}."
+                f"- {_curve_name(curve, power).strip('*')}{question}: {whole_percent(proportions[CONSISTENT])} of "
+                f"studies {shown} if participants are {CONSISTENT}, {whole_percent(proportions[main])} if they are "
+                f"{main}, and {whole_percent(proportions[NOISY])} if they are {NOISY}."
             )
     if lines:
         yield from ("", f"## Power with {planned_word}{sizes[place]} participants", "", *lines)
@@ -503,7 +509,7 @@ def _untested_contrasts(power: Powers) -> Iterator[str]:
     plan = power.plan
     titles = {block.id: block.title for block in plan.blocks}
     opinions = draw_opinions(plan, _MANY, power.seed, 0) if plan.between else ()
-    for contrast, shares in plan.between:
+    for contrast, proportions in plan.between:
         spreads = {}
         for name, kind in plan.kinds.items():
             answers = [block_opinions.answers(1.0, kind)[None, None] for block_opinions in opinions]
@@ -518,7 +524,7 @@ def _untested_contrasts(power: Powers) -> Iterator[str]:
         ]
         yield from smallest_differences(
             contrast, power.sizes, plan.decided.alphas[-1], len(plan.contrasts) + plan.untested, rows, "statement",
-            description, "±{:.2f}".format, shares, contrast.bound, bounds=_count_bounds(plan),
+            description, "±{:.2f}".format, proportions, contrast.bound, bounds=_count_bounds(plan),
             largest=contrast.largest_difference, planned=plan.participants, unit=" points",
             titles=titles,
         )  # fmt: skip
@@ -585,7 +591,7 @@ def _test_sentences(question: Question, powers: Powers) -> list[str]:
                 "Hypotheses are tested with paired t tests on each participant's answers (medians of repeated ones), "
                 "Holm-corrected across "
                 "the hypotheses; the bootstrap and the t test corrected for skewness must also be significant. "
-                f"Equivalence is tested in the same way as in the report. {inclusion_words([])}"
+                f"Equivalence is tested in the same way as in the report. {inclusion_text([])}"
             ]
 
 
@@ -709,9 +715,9 @@ def _draw_curves(axes: Axes, powers: Powers, curves: Sequence[Curve]) -> None:
     """Draw a curve, its range over kinds of participants, and that without any effect; one line per delay."""
     for place, curve in enumerate(curves):
         if curve.setting is not None:
-            share = place / max(len(curves) - 1, 1)
+            proportion = place / max(len(curves) - 1, 1)
             label: Style = {"label": curve.setting, "gid": "delay", "markersize": 3}
-            axes.plot(powers.sizes, curve.power, color=DELAYS(share), marker=".", **label)
+            axes.plot(powers.sizes, curve.power, color=DELAYS(proportion), marker=".", **label)
             continue
         kinds = [kind.power for kind in powers.curves_by_kind(curve)]
         low, high = np.min(kinds, axis=0), np.max(kinds, axis=0)

@@ -11,7 +11,7 @@ from study_app.analysis.planning.simulated_studies import (
     ConditionFeatures,
     compares_statements,
     plan,
-    question_contrasts,
+    unsimulated_contrasts,
 )
 from study_app.analysis.planning.simulated_studies import sweep as sweep_statements
 from study_app.analysis.planning.threshold_studies import Precisions, plans, threshold_markdown
@@ -61,7 +61,7 @@ def estimate_power(
         for done, found in sweep_thresholds(thresholds, sizes, asked, seed, executor):
             yield Precisions(protocol=study, sizes=sizes, studies=done, asked=asked, seed=seed, found=found)
         return
-    if question_contrasts(study) and not compares_statements(study):
+    if unsimulated_contrasts(study) and not compares_statements(study):
         yield Precisions(protocol=study, sizes=sizes, studies=0, asked=0, seed=seed, found={})
         return
     asked = studies or STUDIES

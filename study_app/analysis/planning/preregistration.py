@@ -10,26 +10,36 @@ from typing import Final
 from pydantic import TypeAdapter
 
 from study_app import __version__, number_text
-from study_app.analysis.contrasts import RATIOS, inclusion_words, t_test_name
+from study_app.analysis.contrasts import RATIOS, t_test_name
 from study_app.analysis.data.blocks import TRENDS, Decided, decisions
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.html_page import bullets, heading, paragraph
 from study_app.analysis.levels.thresholds import FAMILIES, REMOVED
 from study_app.analysis.planned_exclusions import unmet_exclusion_sentences
-from study_app.analysis.planning.simulated_studies import compares_statements, question_contrasts
+from study_app.analysis.planning.simulated_studies import compares_statements, question_contrasts, unsimulated_contrasts
 from study_app.analysis.results import min_sample
 from study_app.analysis.statistics.outcome import FEW
 from study_app.analysis.statistics.thresholds import FEWEST
-from study_app.analysis.wording import bound_text, counted, listed, percent, significant
+from study_app.analysis.wording import bound_text, counted, inclusion_text, listed, percent, significant
 from study_app.errors import AnalysisError
 from study_app.protocol.blocks import Block, block_titles, display_language
-from study_app.protocol.descriptions import describe, limit_rows, number_range
+from study_app.protocol.descriptions import describe, limit_rows, number_range, shows_feedback, trials_text
 from study_app.protocol.load import parse, protocol_hash, source_bytes
 from study_app.protocol.model import SPENDINGS, Analysis, Contrast, Protocol
 from study_app.protocol.orders import block_orders_by_group, variants
 from study_app.protocol.participants import fewest_participants
+from study_app.protocol.questionnaires import Questionnaire
+from study_app.protocol.questions import Question
 from study_app.protocol.source import text_in
-from study_app.protocol.warnings import PRECISION, expected_of, precision_plan, precision_rows, threshold_plan
+from study_app.protocol.trials import Design
+from study_app.protocol.warnings import (
+    PRECISION,
+    ThresholdPlan,
+    expected_of,
+    precision_plan,
+    precision_rows,
+    threshold_plan,
+)
 from study_app.psychophysics.people import BETWEEN_PEOPLE
 from study_app.store.exclusions import MISSING_RULE, describe_exclusion
 from study_app.store.files import PREREGISTRATION
@@ -76,7 +86,7 @@ def commitment_lines(committed: Commitment) -> str:
 
 
 def read_commitment(folder: Path) -> Commitment | None:
-    """Return the commitments in a study folder's preregistration; None if there is none."""
+    """Return the commitments in a study folder's preregistration, or None if there is no preregistration."""
     path = folder / FILE
     try:
         blocks = _BLOCK.findall(path.read_text(encoding="utf-8"))
@@ -112,8 +122,8 @@ def _form_title(protocol: Protocol, form: str) -> str:
     return f"“{form_title}”"
 
 
-def _measure_words(protocol: Protocol, contrast: Contrast, language: str) -> str:
-    """Return a phrase on the measure with the short text of its statement or question; "" without such a text."""
+def _measure_text(protocol: Protocol, contrast: Contrast, language: str) -> str:
+    """Return a phrase on the measure, with the short text of its statement or question if it has one."""
     questionnaire = (
         protocol.questionnaire_of(contrast.blocks[0]) if contrast.form is None else protocol.forms[contrast.form]
     )
@@ -122,7 +132,7 @@ def _measure_words(protocol: Protocol, contrast: Contrast, language: str) -> str
         return f"{contrast.measure} score{of_form}"
     item = next((item for item in (questionnaire.items if questionnaire else ()) if item.id == contrast.measure), None)
     if item is None:
-        return ""
+        return protocol.measure_text(contrast) if contrast.is_of_levels else ""
     short = f"“{protocol.text(item.short, language)}”"
     if contrast.form is not None:
         return f"{short} in {_form_title(protocol, contrast.form)}"
@@ -137,7 +147,7 @@ def hypotheses(protocol: Protocol, language: str) -> Iterator[str]:
         compared = titled.words(
             {_title(protocol, block): protocol.condition_of(stimulus) for block, stimulus in stimuli.items()}
         )
-        described = titled.described(compared, measure=_measure_words(protocol, contrast, language))
+        described = titled.described(compared, measure=_measure_text(protocol, contrast, language))
         ratio = contrast.measure in RATIOS and all(stimuli[block].spacing == "log" for block in contrast.blocks)
         test = t_test_name(contrast, ratio=ratio)
         test += " and the degrees of freedom of the smaller group" if contrast.groups else ""
@@ -145,13 +155,13 @@ def hypotheses(protocol: Protocol, language: str) -> Iterator[str]:
         weights_note = " Participants are weighted as in the group mean." if contrast.measure == "threshold" else ""
         yield (
             f"Hypothesis: {described}. We test it with a {sides} {test}, using one value per participant"
-            f"{_reduction_words(protocol, contrast)}.{weights_note} We also use a bootstrap that includes one "
+            f"{_reduction_text(protocol, contrast)}.{weights_note} We also use a bootstrap that includes one "
             "hypothetical participant as extreme as the most extreme participant in the sample (Gaffke 2005), and a t "
             "test corrected for skewness (Hall 1992). The p value is the largest of the three, Holm-adjusted across "
             f"all hypotheses of this kind.{_equivalence_sentences(protocol, contrast)}"
         )
     if protocol.analysis is not None and protocol.analysis.contrasts:
-        yield inclusion_words(protocol.analysis.contrasts)
+        yield inclusion_text(protocol.analysis.contrasts)
     for block in protocol.main_blocks:
         if block.design is not None:
             yield from _interval_lines(protocol, block)
@@ -163,7 +173,7 @@ def hypotheses(protocol: Protocol, language: str) -> Iterator[str]:
         yield f"Published value for comparison, block {titled_value.described(stimulus.unit if stimulus else '')}."
 
 
-def _reduction_words(protocol: Protocol, contrast: Contrast) -> str:
+def _reduction_text(protocol: Protocol, contrast: Contrast) -> str:
     """Return how several answers or estimates of a participant are reduced to one value; "" for a single estimate."""
     if contrast.is_of_levels:
         blocks = [protocol.blocks[name] for name in contrast.blocks]
@@ -192,7 +202,14 @@ def _interval_lines(protocol: Protocol, block: Block) -> Iterator[str]:
     design, title = protocol.design_of(block), _title(protocol, block.id)
     if block.stimulus is None:
         others = [name for name in block.conditions if name != block.standard]
-        yield f"Block {title}: how well can {listed(others)} be discriminated from {block.standard} (d′)?"
+        if design.asks_for_more:
+            verb = "is" if len(others) == 1 else "are"
+            yield (
+                f"Block {title}: how often {verb} {listed(others)} chosen rather than {block.standard} (d′, which is "
+                f"negative if {block.standard} is chosen more often)?"
+            )
+        else:
+            yield f"Block {title}: how well can {listed(others)} be discriminated from {block.standard} (d′)?"
         return
     stimulus = protocol.stimulus_of(block)
     quantity, unit = stimulus.quantity, stimulus.unit
@@ -208,7 +225,7 @@ def _interval_lines(protocol: Protocol, block: Block) -> Iterator[str]:
         yield f"Block {title}: {questions.get(design.reply, f'how do answers change with {quantity}')}?"
         return
     at = f" at {standards_text}" if standards else ""
-    kind = "Weber fraction" if stimulus.level_kind == "weber" else "threshold"
+    kind = "Weber fraction" if stimulus.level_kind == "weber" else stimulus.threshold_term(design)
     yield (
         f"Block {title}: what is the {kind} for {quantity}{at}? We report an estimate with a 95 % interval but no test."
     )
@@ -258,21 +275,25 @@ def analyses(protocol: Protocol) -> Iterator[str]:
     """Yield sentences on the analysis of each block."""
     for block in protocol.main_blocks:
         plan, title = threshold_plan(protocol, block), _title(protocol, block.id)
+        if block.stimulus is not None and (
+            tracks := protocol.method_of(block).track_phrase(protocol.stimulus_of(block))
+        ):
+            yield f"Block {title}: levels are chosen {tracks}."
         if plan is not None:
             stimulus, design = protocol.stimulus_of(block), protocol.design_of(block)
             method, family = protocol.method_of(block), FAMILIES[stimulus.assumed(design).family]
             yield (
                 f"Block {title} ({design.paper_name}, {method.paper_name}): for each participant and standard, we "
-                f"estimate the threshold as the posterior median ({family} function) with its equal-tailed 95 % "
-                "interval, using the delivered levels, and also report the median under a flat prior on the width. "
-                "Goodness of fit is tested with 999 simulated data sets, and drift over the trials is reported."
-                + (f" {REMOVED.format('is')}" if design.kind == "2ifc" else "")
+                f"estimate the {stimulus.threshold_term(design)} as the posterior median ({family} function) with its "
+                "equal-tailed 95 % interval, using the delivered levels, and also report the median under a flat prior "
+                "on the width. Goodness of fit is tested with 999 simulated data sets, and drift over the trials is "
+                "reported." + (f" {REMOVED.format('is')}" if design.kind == "2ifc" else "")
             )
             yield (
-                f"Block {title}, group: we report the random-effects mean of the logarithmic thresholds "
-                f"(Paule–Mandel), with the Hartung–Knapp 95 % interval if there are at least {FEWEST} participants. "
-                "Each participant's variance is replaced by the geometric mean of that variance and the median "
-                "variance."
+                f"Block {title}, group: we report the random-effects mean of the "
+                f"{'logarithmic ' if stimulus.spacing == 'log' else ''}{plan.estimated} (Paule–Mandel), with the "
+                f"Hartung–Knapp 95 % interval if there are at least {FEWEST} participants. Each participant's variance "
+                "is replaced by the geometric mean of that variance and the median variance."
             )
             if plan.standards > 1:
                 yield (
@@ -280,7 +301,7 @@ def analyses(protocol: Protocol) -> Iterator[str]:
                     "standard, with a 95 % confidence interval (Student's t)."
                 )
         elif block.design is not None and block.stimulus is not None:
-            yield from _answer_sentences(protocol.design_of(block).reply, title)
+            yield from _answer_sentences(protocol.design_of(block), title)
         elif block.design is not None:
             yield (
                 f"Block {title}: we report d′ for each participant, calculated from rates with the log-linear "
@@ -290,14 +311,21 @@ def analyses(protocol: Protocol) -> Iterator[str]:
     yield from _statement_sentences(protocol)
 
 
-def _answer_sentences(reply: str, title: str) -> Iterator[str]:
-    """Yield sentences on the analysis of answers that enter no psychometric function; ``reply`` is their kind."""
+def _answer_sentences(design: Design, title: str) -> Iterator[str]:
+    """Yield sentences on the analysis of answers that enter no psychometric function."""
+    reply = design.reply
     if reply == "setting":
+        reported = (
+            "the mean of the settings (the point of subjective equality), their standard deviation, the constant error,"
+            if design.intervals > 1
+            else "the mean of the settings, their standard deviation,"
+        )
         yield (
-            f"Block {title}: for each participant and standard, we report the mean of the settings (the point of "
-            "subjective equality), their standard deviation, the constant error, and the difference between settings "
-            "reached from above and from below. For the group, we report means with 95 % confidence intervals "
-            "(Student's t). If levels are spaced logarithmically, we use the logarithms of the settings."
+            f"Block {title}: for each participant{' and standard' * (design.intervals > 1)}, we report {reported} and "
+            "the difference between settings reached from above and from below. Settings that the time limit ended, or "
+            "that lie at an end of the range, are included, and we report how many there are. For the group, we report "
+            "means with 95 % confidence intervals (Student's t). If levels are spaced logarithmically, we use the "
+            "logarithms of the settings."
         )
         return
     answers = "logarithmic answers" if reply == "number" else "answers"
@@ -319,17 +347,17 @@ def _statement_sentences(protocol: Protocol) -> Iterator[str]:
     decided = decisions(protocol)
     if delayed := [block for block in blocks if protocol.compared_in(block.id) == "delays"]:
         yield (
-            f"{_blocks_words(protocol, delayed)}: we test for trends with {TRENDS[decided.trends]}. The test is "
+            f"{_blocks_text(protocol, delayed)}: we test for trends with {TRENDS[decided.trends]}. The test is "
             "one-sided if a direction is stated, otherwise two-sided. If the answers to a statement show a trend, we "
-            f"drop the longest delay and repeat the test until no trend remains. {_equivalence_words(decided)}We "
+            f"drop the longest delay and repeat the test until no trend remains. {_equivalence_text(decided)}We "
             "estimate the detection threshold from agreement if agreement shows a trend."
         )
     others = [block for block in blocks if block not in delayed]
     if pairs := [block for block in others if len(block.conditions) == 2]:
-        yield f"{_blocks_words(protocol, pairs)}: we test each statement with Wilcoxon's signed-rank test."
+        yield f"{_blocks_text(protocol, pairs)}: we test each statement with Wilcoxon's signed-rank test."
     if several := [block for block in others if len(block.conditions) > 2]:
         yield (
-            f"{_blocks_words(protocol, several)}: we test each statement with Friedman's test (permutation). If a "
+            f"{_blocks_text(protocol, several)}: we test each statement with Friedman's test (permutation). If a "
             "statement shows a difference, we compare pairs of conditions with Wilcoxon's signed-rank test, "
             "Holm-adjusted across all pairs in the block."
         )
@@ -351,7 +379,7 @@ def _statement_sentences(protocol: Protocol) -> Iterator[str]:
         yield f"Alpha is {decided.alpha:g}."
 
 
-def _blocks_words(protocol: Protocol, blocks: Sequence[Block]) -> str:
+def _blocks_text(protocol: Protocol, blocks: Sequence[Block]) -> str:
     """Return the titles of blocks as the beginning of a sentence."""
     return f"Block{'s' * (len(blocks) > 1)} {listed([_title(protocol, block.id) for block in blocks])}"
 
@@ -387,14 +415,41 @@ def _description_sentences(protocol: Protocol) -> Iterator[str]:
         for name in contrast.blocks
     )
     hypotheses = " except in the hypotheses above" * (of_single or bool(question_contrasts(protocol)))
-    yield (
-        f"We describe the answers {listed(described)}, but do not test them{hypotheses}. We report the mean score of "
-        "each questionnaire across participants with its 95 % confidence interval (Student's t). If a questionnaire "
-        "is not scored, we report the means of its ratings and numbers. We count how often each option is chosen."
+    yield " ".join(
+        (
+            f"We describe the answers {listed(described)}, but do not test them{hypotheses}.",
+            *_summary_sentences([*_described_items(protocol)]),
+        )
     )
 
 
-def _equivalence_words(decided: Decided) -> str:
+def _described_items(protocol: Protocol) -> Iterator[tuple[Questionnaire, Question]]:
+    """Yield each question whose answers are described, with its questionnaire."""
+    for questionnaire in protocol.forms.values():
+        yield from ((questionnaire, item) for item in questionnaire.items)
+    for block in protocol.main_blocks:
+        asked = protocol.questionnaire_of(block.id) if block.design is None else None
+        tested = asked.statements if asked is not None and len(block.conditions) > 1 else ()
+        yield from ((asked, item) for item in (asked.items if asked else ()) if asked and item not in tested)
+
+
+def _summary_sentences(described: Sequence[tuple[Questionnaire, Question]]) -> Iterator[str]:
+    """Yield how scores, numbers and choices are summarised, for those that are described."""
+    interval = "with its 95 % confidence interval (Student's t)"
+    has_scores = any(questionnaire.scores for questionnaire, _ in described)
+    if has_scores:
+        yield f"We report the mean score of each questionnaire across participants {interval}."
+    if any(item.value_type != "text" and not questionnaire.scores for questionnaire, item in described):
+        yield (
+            "If a questionnaire is not scored, we report the means of its ratings and numbers."
+            if has_scores
+            else f"We report the mean of each rating and number across participants {interval}."
+        )
+    if any(item.measure == "counts" for _, item in described):
+        yield "We count how often each option is chosen."
+
+
+def _equivalence_text(decided: Decided) -> str:
     """Return a sentence on the equivalence test of delays; "" without a bound."""
     if (bound := decided.equivalence_bound) is None:
         return ""
@@ -489,9 +544,27 @@ def _design_lines(protocol: Protocol) -> Iterator[str]:
         )
     yield from _block_order_lines(protocol)
     for block in protocol.main_blocks:
-        compared = f"levels of {block.stimulus}" if block.stimulus is not None else listed(list(block.conditions))
+        compared = listed(list(block.conditions))
+        if block.stimulus is not None:
+            compared = f"levels of {protocol.stimulus_of(block).quantity}"
         alone, title = block.stimulus is None and len(block.conditions) == 1, _title(protocol, block.id)
-        yield f"Block {title} {'presents' if alone else 'compares'} {compared}.{_trial_order_sentence(protocol, block)}"
+        yield (
+            f"Block {title} {'presents' if alone else 'compares'} {compared}.{_trial_order_sentence(protocol, block)}"
+            f"{_criterion_and_feedback_sentences(protocol, block)}"
+        )
+    for block in protocol.blocks_in_order:
+        if block.phase != "main":
+            yield (
+                f"The {block.phase} block {_title(protocol, block.id)} has {trials_text(protocol, block)}, which are "
+                f"not analysed.{_criterion_and_feedback_sentences(protocol, block)}"
+            )
+
+
+def _criterion_and_feedback_sentences(protocol: Protocol, block: Block) -> str:
+    """Return sentences on the criterion that ends a block early and on feedback, each after a space."""
+    until = block.until
+    ends = "" if until is None else f" The block ends {until.condition_text()}; {until.missed_text}."
+    return ends + " Feedback is given after every trial." * shows_feedback(protocol, block)
 
 
 def _trial_order_sentence(protocol: Protocol, block: Block) -> str:
@@ -553,7 +626,7 @@ def _participant_lines(protocol: Protocol, committed: Commitment, power: str | N
         yield from ("", *reasons) if reasons else ()
     if power is not None:
         yield from ("", *(f"##{line}" if line.startswith("#") else line for line in power.rstrip().splitlines()))
-    elif compares_statements(protocol):
+    elif compares_statements(protocol) or unsimulated_contrasts(protocol):
         yield ""
         yield (
             f"Power was not computed for this text: `liquid-study power {protocol.study.name} --to DIR` computes it, "
@@ -570,9 +643,12 @@ def _precision_lines(protocol: Protocol, block: Block) -> Iterator[str]:
     goal = None if protocol.analysis is None else protocol.analysis.precision
     if goal is not None and expected.measured and (needed := expected.participants_for(goal)) is not None:
         enough = f" The goal requires at least {number_text.counted(needed, 'participant')}."
+    between = f"a factor of {BETWEEN_PEOPLE:g}"
+    if isinstance(plan, ThresholdPlan) and plan.has_pse:
+        between = f"{plan.between_people * plan.value:.2g}{plan.unit} (one standard deviation)"
     yield (
         f"Block {title}: we simulated {expected.trials} trials{plan.per}, with {plan.estimated} that differ between "
-        f"people by a factor of {BETWEEN_PEOPLE:g}. {label}{', ' if plan.words else ': '}{reached}.{enough}"
+        f"people by {between}. {label}{', ' if plan.words else ': '}{reached}.{enough}"
     )
 
 

@@ -67,9 +67,9 @@ class Plan:
     """A planned study, its within-participant contrasts of statements, and the number of its other contrasts.
 
     ``kinds`` are the kinds of participants whose power is computed, by name, the main kind first; ``participants`` is
-    their planned number. Contrasts of statements ``between`` groups come with the share of participants in each of the
-    two groups; so do contrasts ``of_questions``, with None within participants. Of the others, ``untested_bounds`` have
-    an equivalence bound.
+    their planned number. Contrasts of statements ``between`` groups come with the proportion of participants in each of
+    the two groups; so do contrasts ``of_questions``, with None within participants. Of the others, ``untested_bounds``
+    have an equivalence bound.
     """
 
     name: str
@@ -121,7 +121,9 @@ def plan(protocol: Protocol, features: ConditionFeatures) -> Plan:
         contrasts=within,
         untested=len(contrasts) - len(within),
         between=tuple(
-            (contrast, shares) for contrast in stated if (shares := group_shares(protocol, contrast)) is not None
+            (contrast, proportions)
+            for contrast in stated
+            if (proportions := group_shares(protocol, contrast)) is not None
         ),
         untested_bounds=sum(contrast.bound is not None for contrast in contrasts if contrast not in within),
         of_questions=tuple((contrast, group_shares(protocol, contrast)) for contrast in question_contrasts(protocol)),
@@ -139,7 +141,7 @@ def _why_no_power(protocol: Protocol) -> str:
 
 
 def group_shares(protocol: Protocol, contrast: Contrast) -> tuple[float, float] | None:
-    """Return the shares of participants in the two compared groups; None if no groups are compared."""
+    """Return the proportions of participants in the two compared groups; None if no groups are compared."""
     if contrast.groups is None:
         return None
     whole = sum(group.share for group in protocol.groups.values())
@@ -154,6 +156,13 @@ def question_contrasts(protocol: Protocol) -> tuple[Contrast, ...]:
         for contrast in (() if protocol.analysis is None else protocol.analysis.contrasts)
         if not contrast.is_of_levels and not protocol.compares_statement(contrast)
     )
+
+
+def unsimulated_contrasts(protocol: Protocol) -> tuple[Contrast, ...]:
+    """Return the contrasts of answers and scores, and of levels that participants set; neither are simulated."""
+    contrasts = () if protocol.analysis is None else protocol.analysis.contrasts
+    of_questions = question_contrasts(protocol)
+    return tuple(contrast for contrast in contrasts if contrast in of_questions or contrast.measure == "pse")
 
 
 def compares_statements(protocol: Protocol) -> bool:

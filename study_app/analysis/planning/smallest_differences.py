@@ -6,11 +6,10 @@ from typing import Final
 
 from scipy.special import stdtrit
 
-from study_app.analysis.contrasts import inclusion_words
 from study_app.analysis.planning import WANTED
 from study_app.analysis.planning.simulated_studies import IF_EQUAL
 from study_app.analysis.statistics.mean_tests import equivalence_power, smallest_shift
-from study_app.analysis.wording import whole_percent
+from study_app.analysis.wording import inclusion_text, whole_percent
 from study_app.protocol.model import Contrast
 from study_app.protocol.participants import fewest_participants
 
@@ -23,41 +22,48 @@ def question_differences(
     sizes: Sequence[int],
     alpha: float,
     members: int,
-    shares: tuple[float, float] | None,
+    proportions: tuple[float, float] | None,
     planned: int | None,
     titles: Mapping[str, str],
     *,
     bounds: int,
+    setting: str = "",
 ) -> Iterator[str]:
-    """Yield the table of a contrast of answers or scores that are not simulated, in standard deviations.
+    """Yield the table of a contrast of answers, scores or settings that are not simulated, in standard deviations.
 
-    For the parameters see `smallest_differences`.
+    ``setting`` is the measure of settings in words, "" for answers and scores. For the other parameters see
+    `smallest_differences`.
     """
-    values_noun = "answers or scores" if contrast.within is None else "within-participant differences"
+    values_noun = f"participants' {setting}s" if setting else "answers or scores"
+    if setting == "point of subjective equality":
+        values_noun = "participants' points of subjective equality"
+    values_noun = values_noun if contrast.within is None else "within-participant differences"
+    logarithms = ", or of their logarithms if levels are spaced logarithmically" * bool(setting)
     description = (
-        "Answers to this question are not simulated. Differences are expressed in standard deviations (SD) of the "
-        f"{values_noun}; you can obtain the SD from pilot sessions or published data."
+        f"{'Settings' if setting else 'Answers to this question'} are not simulated. Differences are expressed in "
+        f"standard deviations (SD) of the {values_noun}{logarithms}; you can obtain the SD from pilot sessions or "
+        "published data."
     )
-    rows = [(contrast.measure, "1", 1.0)]
+    rows = [(setting or contrast.measure, "1", 1.0)]
     yield from smallest_differences(
         contrast,
         sizes,
         alpha,
         members,
         rows,
-        "question or score",
+        "measure" if setting else "question or score",
         description,
         "±{:.2f} SD".format,
-        shares,
+        proportions,
         bounds=bounds,
         planned=planned,
         titles=titles,
-        measure="" if contrast.form is not None else f"“{contrast.measure}”",
+        measure=setting or ("" if contrast.form is not None else f"“{contrast.measure}”"),
     )
 
 
-def _group_sizes(first: float, second: float) -> str:
-    """Return the sentence on the shares of participants in two groups."""
+def _proportions_sentence(first: float, second: float) -> str:
+    """Return the sentence on the proportions of participants in two groups."""
     if whole_percent(first) == whole_percent(second):
         return f"Each group contains {whole_percent(first)} of the participants."
     return f"The two groups contain {whole_percent(first)} and {whole_percent(second)} of the participants."
@@ -72,7 +78,7 @@ def smallest_differences(
     first: str,
     description: str,
     format_difference: Callable[[float], str],
-    shares: tuple[float, float] | None = None,
+    proportions: tuple[float, float] | None = None,
     bound: float | None = None,
     *,
     bounds: int = 1,
@@ -87,12 +93,13 @@ def smallest_differences(
 
     The contrast is one of ``members`` hypotheses and is tested at the strictest alpha of Holm's correction. Each of
     ``rows`` has the first cell, below the heading ``first``, and the standard deviation as text and as a number;
-    ``description`` explains the standard deviation. ``shares`` are the shares of participants in the two groups, None
-    within participants. ``bound`` is the equivalence bound on the scale of the standard deviation, and ``bounds`` the
-    number of hypotheses with a bound; ``largest`` is the largest difference of a participant that the scale permits,
-    None without a limit. A verdict on ``planned`` participants precedes the table. ``assumed`` is a measure that can
-    fall to 0, with its simulated mean; ``unit`` follows the difference in the verdict; ``titles`` are block titles;
-    ``measure`` is the measure in words, if the contrast cannot tell.
+    ``description`` explains the standard deviation. ``proportions`` are the proportions of
+    participants in the two groups, or None for a comparison within participants. ``bound`` is the equivalence bound on
+    the scale of the standard deviation, and ``bounds`` the number of hypotheses with a bound; ``largest`` is the
+    largest difference of a participant that the scale permits, None without a limit. A verdict on ``planned``
+    participants precedes the table. ``assumed`` is a measure that can fall to 0, with its simulated mean; ``unit``
+    follows the difference in the verdict; ``titles`` are block titles; ``measure`` is the measure in words, if the
+    contrast cannot tell.
     """
 
     def with_titles(names: tuple[str, str] | None) -> tuple[str, str] | None:
@@ -104,21 +111,21 @@ def smallest_differences(
             return format_difference(end)
         return format_difference(end).replace("×/÷", "×" if contrast.expected == "higher" else "÷").removeprefix("±")
 
-    def groups_of(n: int) -> list[int]:
-        return [n] if shares is None else [int(n * share + 1e-9) for share in shares]
+    def group_sizes(n: int) -> list[int]:
+        return [n] if proportions is None else [int(n * proportion + 1e-9) for proportion in proportions]
 
     def differences(n: int, spread: float) -> tuple[float | None, float | None]:
         """Return the half-width and the smallest difference; None if there are too few participants."""
-        if min(groups := groups_of(n)) < 3:
+        if min(groups := group_sizes(n)) < 3:
             return None, None
-        half, least = detectable_difference(*groups, alpha=strictest, expected=contrast.expected)
-        return half * spread, None if least > MOST_SD else least * spread
+        half, minimum = detectable_difference(*groups, alpha=strictest, expected=contrast.expected)
+        return half * spread, None if minimum > MOST_SD else minimum * spread
 
     equal = [] if bound is None else [f"shown to be equivalent {IF_EQUAL}"]
-    heads = (first, "participants", "SD", "half-width of the 95 % interval", "smallest difference", *equal)
+    headings = (first, "participants", "SD", "half-width of the 95 % interval", "smallest difference", *equal)
     sides, strictest = "two-sided" if contrast.expected is None else "one-sided", alpha / members
     corrected = "" if members == 1 else f" ({alpha:.2g} divided by {members} hypotheses)"
-    groups_note = "" if shares is None else f" {_group_sizes(*shares)}"
+    groups_note = "" if proportions is None else f" {_proportions_sentence(*proportions)}"
     hypothesis = contrast.described(with_titles(contrast.compared), with_titles(contrast.within), measure)
     yield from ("", f"## Contrast: {hypothesis}", "")
     test_note = f"{sides}, α = {strictest:.2g}{corrected}"
@@ -126,7 +133,7 @@ def smallest_differences(
         ""
         if contrast.bound is None
         else f"Equivalence requires at least {fewest_participants(alpha / bounds, bound or contrast.bound, largest)} "
-        f"participants{' in each group' if shares else ''}, at α = {alpha / bounds:.2g}. "
+        f"participants{' in each group' if proportions else ''}, at α = {alpha / bounds:.2g}. "
     )
     has_too_few = any(differences(n, spread)[1] is None for n in sizes for *_, spread in rows)
     too_few_note = (
@@ -135,7 +142,7 @@ def smallest_differences(
     )
     yield (
         f"{description}{groups_note} The “smallest difference” is the difference that {whole_percent(WANTED)} of "
-        f"studies detect ({test_note}). {too_few_note}{equivalence_note}{inclusion_words([contrast])}"
+        f"studies detect ({test_note}). {too_few_note}{equivalence_note}{inclusion_text([contrast])}"
     )
     if planned is not None:
         name, _, spread = rows[0]
@@ -151,18 +158,20 @@ def smallest_differences(
                 assumed,
             ),
         )
-    yield from ("", f"| {' | '.join(heads)} |", "|---:" * len(heads) + "|")
+    yield from ("", f"| {' | '.join(headings)} |", "|---:" * len(headings) + "|")
     for name, sd_text, spread in rows:
         for n in sizes:
-            (half, least), groups = differences(n, spread), groups_of(n)
+            (half, minimum), groups = differences(n, spread), group_sizes(n)
             ends = [
                 "too few" if half is None else format_difference(half),
-                "too few" if least is None else directed_text(least),
+                "too few" if minimum is None else directed_text(minimum),
             ]
             if bound is not None:
                 enough_people = min(groups) >= fewest_participants(alpha / bounds, bound, largest)
-                share = equivalence_power(*groups, alpha=alpha / bounds, bound=bound / spread) if enough_people else 0.0
-                ends.append(whole_percent(share))
+                proportion = (
+                    equivalence_power(*groups, alpha=alpha / bounds, bound=bound / spread) if enough_people else 0.0
+                )
+                ends.append(whole_percent(proportion))
             yield f"| {name} | {size_text(n, planned)} | {sd_text} | {' | '.join(ends)} |"
 
 

@@ -9,6 +9,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any, Final, TypeAlias
 
 import numpy as np
@@ -17,7 +18,7 @@ from study_app import __version__
 from study_app.analysis.data.blocks import decisions
 from study_app.analysis.data.measures import Array
 from study_app.analysis.planning.power_curves import OF_BLOCK, OF_STUDIES, interval
-from study_app.analysis.planning.simulated_studies import group_shares, question_contrasts
+from study_app.analysis.planning.simulated_studies import group_shares, unsimulated_contrasts
 from study_app.analysis.planning.smallest_differences import question_differences, size_text, smallest_differences
 from study_app.analysis.statistics.outcome import student_interval
 from study_app.analysis.statistics.thresholds import FEWEST, group_mean
@@ -89,7 +90,7 @@ class PrecisionResult:
         return math.nan if np.isnan(halves).all() else float(np.median(np.nan_to_num(halves, nan=math.inf)))
 
     def within(self, place: int, precision: float) -> float:
-        """Return the share of studies whose half-width is at most ``precision``, at the size with this index."""
+        """Return the proportion of studies whose half-width is at most ``precision``, at the size with this index."""
         return float(np.mean([half[place] <= precision for half in self.halves]))
 
 
@@ -126,8 +127,10 @@ def study_batch(case: Case, sizes: Sequence[int]) -> PrecisionResult:
     low, high = plan.stimulus.domain
     means = low + (high - low) * (0.25 + 0.5 * rng.random((BATCH, 1, 1)))
     deviations = math.log(BETWEEN_PEOPLE) * rng.standard_normal((BATCH, people, 1))
-    log = plan.stimulus.spacing == "log"
-    person_thresholds = means + deviations / math.log(10) if log else means * np.exp(deviations)
+    log, kind = plan.stimulus.spacing == "log", plan.stimulus.decade_kind(plan.design)
+    person_thresholds = (
+        means * np.exp(deviations) if kind == "threshold" else means + deviations / math.log(10) * plan.decade(means)
+    )
     standard_plans, truth = plan.each_standard(), np.broadcast_to(person_thresholds, (BATCH, people, plan.standards))
     first = case.seed[-1] * BATCH
     kinds = [_kind_of(plan, first + place) for place in range(BATCH)]
@@ -355,7 +358,7 @@ def threshold_markdown(precisions: Precisions) -> str:
             for place, size in enumerate(precisions.sizes):
                 half = result.half(place)
                 unknown |= not math.isfinite(half)
-                share = "–" if math.isnan(half) else whole_percent(result.within(place, precision or 0.0))
+                proportion = "–" if math.isnan(half) else whole_percent(result.within(place, precision or 0.0))
                 spread = whole_percent(result.spread) if math.isfinite(result.spread) else "–"
                 cells = (
                     str(trials),
@@ -363,7 +366,7 @@ def threshold_markdown(precisions: Precisions) -> str:
                     spread,
                     f"±{whole_percent(half)}" if math.isfinite(half) else "–",
                 )
-                lines.append(f"| {' | '.join((*cells, *([share] if precision_heading else [])))} |")
+                lines.append(f"| {' | '.join((*cells, *([proportion] if precision_heading else [])))} |")
         if unknown:
             lines += ["", _NO_INTERVAL]
         lines += _kind_sentences(precisions, block)
@@ -404,28 +407,39 @@ def _contrast_tables(precisions: Precisions) -> Iterator[str]:
         return
     planned, titles = plans(precisions.protocol, ()), _titles_by_block(precisions.protocol)
     alpha, members = decisions(precisions.protocol).alphas[-1], len(decided.contrasts)
-    of_questions = question_contrasts(precisions.protocol)
+    unsimulated = unsimulated_contrasts(precisions.protocol)
     bounds = sum(contrast.bound is not None for contrast in decided.contrasts)
     for contrast in decided.contrasts:
-        if contrast in of_questions:
-            shares = group_shares(precisions.protocol, contrast)
+        if contrast in unsimulated:
+            proportions = group_shares(precisions.protocol, contrast)
             yield from question_differences(
-                contrast, precisions.sizes, alpha, members, shares, decided.participants, titles, bounds=bounds
+                contrast,
+                precisions.sizes,
+                alpha,
+                members,
+                proportions,
+                decided.participants,
+                titles,
+                bounds=bounds,
+                setting=precisions.protocol.measure_text(contrast) if contrast.measure == "pse" else "",
             )
             continue
         firsts = [next(iter(planned[block].values())) for block in contrast.blocks if block in planned]
         if len(firsts) < len(contrast.blocks) or any(_MEASURES.get(type(plan)) != contrast.measure for plan in firsts):
             continue
-        first, ratio = firsts[0], contrast.measure == "threshold"
+        first = firsts[0]
+        ratio = isinstance(first, ThresholdPlan) and first.stimulus.spacing == "log"
         measure = contrast.measure.replace("d_prime", "d′")
-        assumed = None if isinstance(first, ThresholdPlan) else (measure, first.value)
-        mean = 1.0 if assumed is None else assumed[1]
-        format_difference = (lambda end: f"×/÷ {math.exp(end):.2f}") if ratio else "±{:.2f}".format
+        if isinstance(first, ThresholdPlan):
+            measure = first.stimulus.threshold_term(first.design)
+        mean = 1.0 if ratio else first.value
+        assumed = None if ratio else (measure, mean)
+        format_difference = _format_ratio if ratio else partial(_format_difference, unit=first.unit)
         spreads = [(name, mean * spread) for name, spread in _spreads_by_trials(precisions, contrast)]
         rows = [(name, format_difference(spread).removeprefix("±"), spread) for name, spread in spreads]
         if not rows:
             continue
-        mean_note = "" if assumed is None else f", at a mean {measure} of {mean:g}"
+        mean_note = "" if assumed is None else f", at a mean {measure} of {mean:g}{first.unit}"
         sd_note = f"of one participant's {measure}, from the estimation error and the variation between people"
         if contrast.within is not None:
             sd_note = "of one participant's difference, from both estimation errors and the variation between people"
@@ -439,6 +453,15 @@ def _contrast_tables(precisions: Precisions) -> Iterator[str]:
             bounds=bounds,
             planned=decided.participants, assumed=assumed, titles=titles,
         )  # fmt: skip
+
+
+def _format_ratio(end: float) -> str:
+    """Return the ratio of two thresholds from the difference of their natural logarithms."""
+    return f"×/÷ {math.exp(end):.2f}"
+
+
+def _format_difference(end: float, unit: str) -> str:
+    return f"±{end:.2f}{unit}"
 
 
 def _titles_by_block(protocol: Protocol) -> dict[str, str]:
@@ -467,7 +490,9 @@ def _spreads_by_trials(precisions: Precisions, contrast: Contrast) -> Iterator[t
         results = [result for block in contrast.blocks if (result := precisions.found.get((block, trials))) is not None]
         spreads = [precision.spread / math.sqrt(count) for precision, count in zip(results, counts, strict=False)]
         if len(results) == len(contrast.blocks) and all(map(math.isfinite, spreads)):
-            yield str(trials), math.hypot(math.log(BETWEEN_PEOPLE), *spreads)
+            plan = plans(protocol, (trials,))[contrast.blocks[0]][trials]
+            between = plan.between_people if isinstance(plan, ThresholdPlan) else math.log(BETWEEN_PEOPLE)
+            yield str(trials), math.hypot(between, *spreads)
 
 
 def _assumption_sentences(plans_of_block: Mapping[int, _Plan]) -> str:

@@ -1,6 +1,7 @@
 """The report: findings in words, tables and figures, with everything needed to check them.
 
-Reading order: methods, questions_in_full, r_script; sections, study_figures; first_page; write_report.
+Reading order: practice_and_breaks; methods, questions_in_full, r_script, background_table, motion_section; sections,
+study_figures; first_page; write_report.
 """
 
 from study_app.analysis.report.sections import answers

@@ -10,7 +10,7 @@ import numpy as np
 from markupsafe import Markup
 
 from study_app import number_text
-from study_app.analysis.contrasts import RATIOS, answer, mean_words, question
+from study_app.analysis.contrasts import RATIOS, answer, mean_text, question
 from study_app.analysis.data.blocks import AFTER, AT_THE_START, Block, LevelBlock, Setting, name_in_sentence
 from study_app.analysis.data.measures import AGREEMENT
 from study_app.analysis.data.study_tables import Study
@@ -32,7 +32,7 @@ from study_app.analysis.results import (
 from study_app.analysis.statistics.outcome import clopper_pearson
 from study_app.analysis.wording import interval, listed, ms, number, significant
 from study_app.number_text import capitalised
-from study_app.protocol.model import quoted_title
+from study_app.protocol.quantities import quoted_title
 
 _BREAKS: Final = re.compile(r"\[[^\]]*\]| %|\b[np] [=<>] |\b(?:d_z|g) (?=[−\d])")
 """Spaces at which a line must not break: in intervals, before percent signs, in "n = 12" and "p < .001"."""
@@ -83,7 +83,7 @@ class Card:
 def presented_in(study: Study) -> dict[str, Presented]:
     """Return the stimuli of each block by its ID; blocks with a sealed key are omitted."""
     presented: dict[str, Presented] = {}
-    blocks: list[Block | LevelBlock] = [*study.blocks, *study.levels]
+    blocks: list[Block | LevelBlock] = [*study.trial_blocks, *study.levels]
     for block in blocks:
         stimulus, reference = (block.stimulus, block.reference) if isinstance(block, LevelBlock) else (None, None)
         conditions = [setting.of or setting for setting in (*block.settings, reference) if setting is not None]
@@ -118,8 +118,9 @@ def _trials_phrase(study: Study, block: LevelBlock) -> str:
     trials = counted.groupby("participant").size()
     if trials.empty:
         return ""
-    least, most = int(trials.min()), int(trials.max())
-    return f", {number_text.counted(most, 'trial') if least == most else f'{least} to {most} trials'} per participant"
+    minimum, maximum = int(trials.min()), int(trials.max())
+    trials_text = number_text.counted(maximum, "trial") if minimum == maximum else f"{minimum} to {maximum} trials"
+    return f", {trials_text} per participant"
 
 
 def _liquid_names(conditions: Sequence[Setting]) -> list[str]:
@@ -209,11 +210,11 @@ def _hypothesis_cards(results: Results, presented: Mapping[str, Presented]) -> I
         introduced.update(blocks)
         lead = f"Hypothesis{f' {place}' if len(results.contrasts) > 1 else ''}"
         yield Card(
-            question=f"{lead}: {_question_words(contrast, presented)}",
+            question=f"{lead}: {_question_text(contrast, presented)}",
             verdict=contrast.verdict,
             sentences=(
-                f"{answer(contrast)}{_scale_words(contrast, results)}",
-                *_cell_words(contrast),
+                f"{answer(contrast)}{_scale_text(contrast, results)}",
+                *_cell_sentences(contrast),
                 *filter(None, [" ".join(introductions)]),
             ),
             block=blocks[0],
@@ -221,7 +222,7 @@ def _hypothesis_cards(results: Results, presented: Mapping[str, Presented]) -> I
         )
 
 
-def _question_words(contrast: ContrastResult, presented: Mapping[str, Presented]) -> str:
+def _question_text(contrast: ContrastResult, presented: Mapping[str, Presented]) -> str:
     """Return the hypothesis, with the liquids and delays that distinguish the compared conditions."""
     hypothesis = contrast.contrast
     names = (contrast.within_names or hypothesis.within or ("", "")) if hypothesis.is_interaction else contrast.compared
@@ -239,7 +240,7 @@ def _question_words(contrast: ContrastResult, presented: Mapping[str, Presented]
     return question(replace(contrast, compared=(first, second)))
 
 
-def _scale_words(contrast: ContrastResult, results: Results) -> str:
+def _scale_text(contrast: ContrastResult, results: Results) -> str:
     """Return a sentence on the unit or scale of the compared values, with a leading space; "" if there is none."""
     hypothesis = contrast.contrast
     levels = [level for level in results.levels if level.block in hypothesis.blocks]
@@ -261,11 +262,11 @@ def _scale_words(contrast: ContrastResult, results: Results) -> str:
     )
 
 
-def _cell_words(contrast: ContrastResult) -> Iterator[str]:
+def _cell_sentences(contrast: ContrastResult) -> Iterator[str]:
     """Yield a sentence for each group with its means in the conditions of an interaction."""
     for place, group in enumerate(contrast.compared):
         cells = contrast.cells[2 * place : 2 * place + 2]
-        means = [f"{mean_words(cell)} in {quoted_title(cell.name)}" for cell in cells if cell.mean is not None]
+        means = [f"{mean_text(cell)} in {quoted_title(cell.name)}" for cell in cells if cell.mean is not None]
         if means:
             yield f"Mean{'s' * (len(means) > 1)} in the group {group} (95 % intervals): {listed(means)}."
 
@@ -294,21 +295,21 @@ def _statement_cards(results: Results, presented: Mapping[str, Presented]) -> It
             yield Card(
                 question=f"{result.title}: statements",
                 verdict="",
-                sentences=tuple(_agreement_words(result)),
+                sentences=tuple(_agreement_sentences(result)),
                 block=result.id,
                 figures=(result.kind,),
             )
 
 
-def _agreement_words(result: BlockResult) -> Iterator[str]:
+def _agreement_sentences(result: BlockResult) -> Iterator[str]:
     """Yield a sentence on agreement with each statement of a block with a single setting."""
     once = result.presentations == (1, 1)
     for item, row in zip(result.items, result.measures, strict=True):
         n, agreed = int(row["n"]), sum(int(row[f"count_{level}"]) for level in AGREEMENT)
         if not n:
             continue
-        share = clopper_pearson(agreed, n)
-        ends = f", 95 % confidence interval [{100 * share.low:.0f}, {100 * share.high:.0f}] %" if once else ""
+        proportion = clopper_pearson(agreed, n)
+        ends = f", 95 % confidence interval [{100 * proportion.low:.0f}, {100 * proportion.high:.0f}] %" if once else ""
         who = "participants agreed" if once else "answers expressed agreement"
         yield f"{agreed} of {n} {who} with “{item.short}” ({100 * agreed / n:.0f} %{ends}; median {row['median']:g})."
 
@@ -331,7 +332,7 @@ def _level_cards(results: Results, presented: Mapping[str, Presented]) -> Iterat
                 question=f"{level.title}: {estimates.words}",
                 verdict="",
                 sentences=(
-                    *_estimate_words(level, estimates.group, estimates.attribute, estimates.words),
+                    *_estimate_sentences(level, estimates.group, estimates.attribute, estimates.words),
                     *([presented[level.block].sentence] if level.block in presented else ()),
                 ),
                 block=level.block,
@@ -339,7 +340,7 @@ def _level_cards(results: Results, presented: Mapping[str, Presented]) -> Iterat
             )
 
 
-def _estimate_words(result: LevelsResult, group: Sequence[Any], attribute: str, words: str) -> Iterator[str]:
+def _estimate_sentences(result: LevelsResult, group: Sequence[Any], attribute: str, words: str) -> Iterator[str]:
     """Yield a sentence on the group mean for each standard or comparison, with its interval."""
     of_level, is_weber = attribute in ("threshold", "pse"), result.level_kind == "weber"
     before = "a Weber fraction of " if of_level and is_weber else ""
@@ -380,11 +381,11 @@ def _question_cards(
         if not answered:
             continue
         sentences = [
-            _number_words(entry, presented if place == 0 else _NOT_PRESENTED)
+            _number_text(entry, presented if place == 0 else _NOT_PRESENTED)
             for place, entry in enumerate(numbers[:MOST_PANELS])
         ]
         chosen = [result for result in answered if result.measure == "counts" and not result.weighs]
-        sentences += [_choice_words(result) for result in chosen]
+        sentences += [_choice_text(result) for result in chosen]
         if sentences:
             yield Card(
                 question=place_title(answered[0], results),
@@ -419,7 +420,7 @@ def _is_in_hypotheses(numbers: Numbers, where: str, results: Results) -> bool:
     return bool(shown) and has_all_settings and people >= participants
 
 
-def _number_words(numbers: Numbers, presented: Mapping[str, Presented] = _NOT_PRESENTED) -> str:
+def _number_text(numbers: Numbers, presented: Mapping[str, Presented] = _NOT_PRESENTED) -> str:
     """Return sentences on the means of a score or question by setting, and on the difference of two settings.
 
     A number that is entered only once describes the sample, so the sentence has its SD and range, not an interval.
@@ -432,17 +433,18 @@ def _number_words(numbers: Numbers, presented: Mapping[str, Presented] = _NOT_PR
         else [""] * len(numbers.by_setting)
     )
     means = [
-        (f" {_setting_words(name)}{addition}" if name else "", mean, len(values))
+        (f" {_setting_text(name)}{addition}" if name else "", mean, len(values))
         for (name, values), addition in zip(numbers.by_setting, additions, strict=True)
         if (mean := mean_of(values.values()))
     ]
-    parts = [f"{number(mean.value)}{_mean_ends(mean)}{where}" for where, mean, _ in means]
+    unit = f" {numbers.unit}" if numbers.unit else ""
+    parts = [f"{number(mean.value)}{_mean_ends(mean)}{unit}{where}" for where, mean, _ in means]
     n = max(count for *_, count in means)
     if numbers.bounds is None and not numbers.is_score and len(means) == 1:
         values = [*next(by_person for _, by_person in numbers.by_setting if by_person).values()]
         spread = f"SD {number(float(np.std(values, ddof=1)))}, " if n > 1 else ""
         low, high = (f"{end:g}" if float(end).is_integer() else number(end) for end in (min(values), max(values)))
-        return f"{subject} was {number(means[0][1].value)} ({spread}range {low} to {high}, n = {n})."
+        return f"{subject} was {number(means[0][1].value)}{unit} ({spread}range {low} to {high}, n = {n})."
     scale = "" if numbers.bounds is None else " on a scale from {:g} to {:g}".format(*numbers.bounds).replace("-", "−")
     details = f"95 % confidence interval{'s' * (len(parts) > 1)}, n = {n}"
     if all(mean.low is None for _, mean, _ in means):
@@ -456,11 +458,11 @@ def _number_words(numbers: Numbers, presented: Mapping[str, Presented] = _NOT_PR
     )
     if difference is None or difference.low is None:
         return text
-    pair = " − ".join(_setting_words(name).removeprefix("for ") for name in (first, second))
-    return f"{text} The mean difference ({pair}) was {number(difference.value)}{_mean_ends(difference)}."
+    pair = " − ".join(_setting_text(name).removeprefix("for ") for name in (first, second))
+    return f"{text} The mean difference ({pair}) was {number(difference.value)}{_mean_ends(difference)}{unit}."
 
 
-def _setting_words(name: str) -> str:
+def _setting_text(name: str) -> str:
     """Return the name of a setting in a sentence: "for water", or "after “80 ms late”" for a form after a block."""
     if name.startswith(AT_THE_START):
         return name_in_sentence(name)
@@ -479,7 +481,7 @@ class _Ends:
     high: float
 
 
-def _choice_words(result: QuestionResult) -> str:
+def _choice_text(result: QuestionResult) -> str:
     """Return a sentence on the most frequent options and how often they were chosen.
 
     There is an interval only if each participant answered once, since the answers of one person are not independent.
@@ -491,17 +493,17 @@ def _choice_words(result: QuestionResult) -> str:
             continue
         most = int(max(counts.values()))
         first, *tied = [f"“{result.options.get(option, option)}”" for option, count in counts.items() if count == most]
-        tied_note = f", and as many chose {listed(tied)}" if tied else ""
-        setting_note = f" {_setting_words(group.name)}" if len(result.groups) > 1 else ""
+        setting = f"{_setting_text(group.name)}, " if len(result.groups) > 1 else ""
         if n > people:
-            tied_note = f", and as many {listed(tied)}" if tied else ""
-            given = f"{n} answers by {number_text.counted(people, 'participant')}"
-            parts.append(f"{most} of {given} were {first}{tied_note}{setting_note} ({100 * most / n:.0f} %)")
+            given = f"{most} of {n} answers by {number_text.counted(people, 'participant')}"
+            chosen = f"{listed([first, *tied])} were each chosen in {given}" if tied else f"{given} were {first}"
+            parts.append(f"{setting}{chosen} ({100 * most / n:.0f} %)")
             continue
-        share = clopper_pearson(most, n)
-        ends = f"[{100 * share.low:.0f}, {100 * share.high:.0f}] %"
+        tied_note = f", and as many chose {listed(tied)}" if tied else ""
+        proportion = clopper_pearson(most, n)
+        ends = f"[{100 * proportion.low:.0f}, {100 * proportion.high:.0f}] %"
         parts.append(
-            f"{most} of {n} participants chose {first}{tied_note}{setting_note} ({100 * most / n:.0f} %, 95 % "
+            f"{setting}{most} of {n} participants chose {first}{tied_note} ({100 * most / n:.0f} %, 95 % "
             f"confidence interval {ends})"
         )
     return f"“{result.short}”: {'; '.join(parts)}."
@@ -517,8 +519,9 @@ def first_page(
     """Return the HTML of the first page: answers next to their figures, limitations, and the rate of false claims."""
     answer_cards = cards(results, numbers, presented)
     cards_with_figures = [(card, card.figure_of(drawn)) for card in answer_cards]
-    has_claims = any(block.n for block in results.blocks) and bool(answers(results))
-    look = results.decided.look_words(len(results.people))
+    kinds = {block.kind for block in results.blocks if block.n}
+    has_claims = kinds >= {"liquids", "delays"} and bool(answers(results))
+    look = results.decided.look_text(len(results.people))
     return render(
         "first_page.html",
         cards=[

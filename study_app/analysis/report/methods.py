@@ -1,25 +1,30 @@
 """The methods paragraph of a report: participants, apparatus, design, hypotheses, tests and exclusions."""
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import Final
+
+from pydantic import ValidationError
 
 from study_app import __version__, number_text
 from study_app.analysis.contrasts import contrast_methods
-from study_app.analysis.data.blocks import Block, name_in_sentence
+from study_app.analysis.data.blocks import Block, PlacedQuestion, name_in_sentence
 from study_app.analysis.data.measures import QUARTILES
-from study_app.analysis.data.study_tables import Study, group_assignment, group_counts
+from study_app.analysis.data.study_tables import DAMAGED, Study, group_assignment, group_counts
 from study_app.analysis.findings import all_findings
 from study_app.analysis.findings.delays import ContrastsWithControl
 from study_app.analysis.findings.statement_tests import DelayTrend, Effects, MeanTests, OverAll
 from study_app.analysis.levels.evaluate import level_methods
 from study_app.analysis.planned_exclusions import NEED_KEY, proposals, rule_conditions
+from study_app.analysis.report.practice_and_breaks import break_sentence, practice_sentences
 from study_app.analysis.results import BlockResult, Results, lead_phrase, presentation_sentences
 from study_app.analysis.wording import counted, listed, ms, number, significant
 from study_app.protocol.blocks import block_titles
 from study_app.protocol.model import SPENDINGS
 from study_app.protocol.participants import RecordedSessions
-from study_app.protocol.quantities import liquid_words
+from study_app.protocol.quantities import liquid_text
+from study_app.protocol.trials import TASK_KINDS
 from study_app.protocol.wording import language_name
 from study_app.store.unblinding import RULES
 
@@ -62,7 +67,9 @@ def _all_sentences(study: Study, results: Results) -> Iterator[str]:
     yield _exclusion_rule_sentence(study, results)
     yield _apparatus_sentence(study)
     yield _liquid_sentence(study)
+    yield from practice_sentences(study)
     yield from _design_sentences(study, results)
+    yield break_sentence(study)
     yield from _delay_sentences(study, results)
     yield from level_methods(study.levels, results.levels)
     yield _missing_trials_sentence(study)
@@ -79,15 +86,41 @@ def _all_sentences(study: Study, results: Results) -> Iterator[str]:
 
 
 def _sample_sentence(study: Study) -> str:
-    people = number_text.capitalised(counted(study.n, "participant"))
+    """Return a sentence on those who took part and, if these differ, on those who were analysed."""
+    took_part = study.participants["participant"].nunique()
+    people = number_text.capitalised(counted(took_part, "participant"))
     kind = " (SIMULATED, not people)" if study.simulated else ""
     conditions_note = ""
-    if study.blocks and study.n:
-        is_complete = all(_is_complete(study, block) for block in study.blocks)
+    if study.trial_blocks and study.n:
+        is_complete = all(_is_complete(study, block) for block in study.trial_blocks)
         conditions_note = ", each in all conditions" if is_complete else _missing_conditions_phrase(study)
     sites = f" at the sites {listed(study.sites)}" if study.sites else ""
-    protocol = f"protocol {study.name}, {version_words(study)}"
-    return f"{people}{kind} took part in “{study.title}” ({protocol}){sites}{conditions_note}."
+    protocol = f"protocol {study.name}, {version_text(study)}"
+    text = f"{people}{kind} took part in “{study.title}” ({protocol}){sites}"
+    withdrawn = counted(len(study.withdrawn), "more participant")
+    withdrawn_note = f"; {withdrawn} withdrew, and their data were erased" if study.withdrawn else ""
+    if took_part == study.n:
+        return f"{text}{conditions_note}{withdrawn_note}."
+    analysed = f"{counted(study.n, 'participant')} {'was' if study.n == 1 else 'were'}" if study.n else "nobody was"
+    reasons = number_text.capitalised(listed(_reasons_for_absence(study)))
+    return f"{text}{withdrawn_note}. {reasons}, so {analysed} analysed{conditions_note}."
+
+
+def _reasons_for_absence(study: Study) -> list[str]:
+    """Return clauses on the participants who are not analysed: "two participants were excluded"."""
+    rows = study.participants[~study.participants["participant"].isin(study.people)]
+    excluded = set(rows.loc[rows["excluded"], "participant"])
+    damaged = set(rows.loc[rows["status"] == DAMAGED, "participant"]) - excluded
+    unfinished = set(rows["participant"]) - excluded - damaged
+    clauses = []
+    for people, one, several in (
+        (unfinished, "did not complete the session", "did not complete their sessions"),
+        (damaged, "has damaged files", "have damaged files"),
+        (excluded, "was excluded", "were excluded"),
+    ):
+        if people:
+            clauses.append(f"{counted(len(people), 'participant')} {one if len(people) == 1 else several}")
+    return clauses
 
 
 def _session_sentence(study: Study) -> str:
@@ -95,17 +128,18 @@ def _session_sentence(study: Study) -> str:
     counts = study.participants.loc[study.participants["counted"], "participant"].value_counts()
     if counts.empty or counts.max() == 1:
         return ""
-    least, most = int(counts.min()), int(counts.max())
-    return f"Each participant attended {counted(most, 'session') if least == most else f'{least} to {most} sessions'}."
+    minimum, maximum = int(counts.min()), int(counts.max())
+    sessions_text = counted(maximum, "session") if minimum == maximum else f"{minimum} to {maximum} sessions"
+    return f"Each participant attended {sessions_text}."
 
 
 def _language_sentence(study: Study) -> str:
     """Return a sentence on the languages of the pages; "" if the study has only one."""
-    languages = language_words(study)
+    languages = language_text(study)
     return f"The participants' texts were in {languages}." if languages else ""
 
 
-def language_words(study: Study) -> str:
+def language_text(study: Study) -> str:
     """Return the languages of the participants' pages with counts: "German (n = 5) and English (n = 3)".
 
     It is "" if the study has only one language.
@@ -127,7 +161,7 @@ def _is_complete(study: Study, block: Block) -> bool:
 def _missing_conditions_phrase(study: Study) -> str:
     """Return a phrase on participants with missing conditions, and whether excluded trials are the cause."""
     incomplete: set[str] = set()
-    for block in study.blocks:
+    for block in study.trial_blocks:
         trials = study.trials[study.trials["counted"] & (study.trials["block"] == block.id)]
         remaining = set(zip(trials["participant"], trials["code"], strict=True))
         excluded = study.excluded_trials(block)
@@ -144,11 +178,11 @@ def _missing_conditions_phrase(study: Study) -> str:
 
 def _group_sentence(study: Study) -> str:
     """Return a sentence on the assignment to groups and their number; "" without groups."""
-    counts, shares = (
+    counts, proportions = (
         group_counts(study),
         {name: group["share"] for name, group in study.protocol.get("groups", {}).items()},
     )
-    groups = listed([f"{name} (n = {counts.get(name, 0)})" if counts else name for name in shares])
+    groups = listed([f"{name} (n = {counts.get(name, 0)})" if counts else name for name in proportions])
     match group_assignment(study):
         case "pre-existing":
             return (
@@ -156,7 +190,7 @@ def _group_sentence(study: Study) -> str:
                 "the start of the session; the groups were not randomised."
             )
         case "randomised":
-            ratio = ":".join(f"{share}" for share in shares.values())
+            ratio = ":".join(f"{proportion}" for proportion in proportions.values())
             return (
                 f"Participants were randomised in permuted blocks to the groups {groups}, with an allocation ratio of "
                 f"{ratio}."
@@ -171,7 +205,7 @@ def _sample_size_sentences(study: Study, results: Results) -> str:
         levels = listed([significant(level) for level in decided.alphas])
         alpha = significant(decided.planned_alpha or decided.alpha)
         return (
-            f"{decided.look_words(len(results.people))} At the planned looks, adjusted p values of up to {levels} are "
+            f"{decided.look_text(len(results.people))} At the planned looks, adjusted p values of up to {levels} are "
             f"significant ({SPENDINGS[decided.spending]} alpha spending with alpha = {alpha}, Lan & DeMets 1983)."
         )
     planned = (study.protocol.get("analysis") or {}).get("participants")
@@ -180,10 +214,18 @@ def _sample_size_sentences(study: Study, results: Results) -> str:
 
 def _exclusion_sentences(study: Study) -> str:
     """Return sentences on the exclusions, and on whether the key was sealed when they were decided."""
-    trials, sessions = sum(exclusion.trial is not None for exclusion in study.exclusions), len(study.excluded_sessions)
-    counts = [(study.left_out, "unfinished session"), (sessions, "excluded session"), (trials, "excluded trial")]
+    people, rows = study.people, study.participants
+    analysed = replace(study, participants=rows[rows["participant"].isin(people)])
+    trials = sum(exclusion.trial is not None and exclusion.participant in people for exclusion in study.exclusions)
+    counts = [
+        (analysed.left_out, "unfinished session"),
+        (analysed.damaged_sessions, "damaged session"),
+        (len(analysed.excluded_sessions), "excluded session"),
+        (trials, "excluded trial"),
+    ]
     parts = [counted(count, noun) for count, noun in counts if count]
-    sentences = [f"The analysis does not include {listed(parts)}."] if parts else []
+    lead = "For the other participants, the" if len(people) < rows["participant"].nunique() else "The"
+    sentences = [f"{lead} analysis does not include {listed(parts)}."] if parts else []
     by_rule = Counter(exclusion.rule_or_person for exclusion in study.exclusions)
     sentences += [
         f"{number_text.capitalised(counted(by_rule[rule], 'session'))} "
@@ -232,7 +274,7 @@ def late_exclusions(study: Study) -> str:
     return listed([*parts, *([f"the reversal of {counted(reversed_count, 'exclusion')}"] if reversed_count else [])])
 
 
-def version_words(study: Study) -> str:
+def version_text(study: Study) -> str:
     """Return the protocol versions of the pooled sessions as text."""
     versions = study.versions
     pooled = f"version {versions[0]}" if len(versions) == 1 else f"versions {listed(versions)}, pooled"
@@ -246,24 +288,22 @@ def _apparatus_sentence(study: Study) -> str:
     device, scene = study.protocol.get("device"), study.protocol.get("scene")
     if not (device and scene and names):
         return ""
-    device_words = (
-        f"a haptic device ({listed(names)}); forces were computed at {device['rate_hz']:g} Hz and limited to "
-    )
-    device_words += f"{device['force_limit_n']:g} N"
+    device_text = f"a haptic device ({listed(names)}); forces were computed at {device['rate_hz']:g} Hz and limited to "
+    device_text += f"{device['force_limit_n']:g} N"
     if _WITHOUT_FORCE.issuperset(names):
-        device_words = f"a device without force feedback ({listed(names)})"
+        device_text = f"a device without force feedback ({listed(names)})"
     velocity_note = {None: "", "device": "; its velocity was measured by the device"}.get(
         study.estimator, f"; its velocity was estimated with {_FILTERS.get(study.estimator or '', study.estimator)}"
     )
     return (
-        f"Participants used {device_words}. A virtual ball with a diameter of {1000 * scene['body']['diameter_m']:g} "
+        f"Participants used {device_text}. A virtual ball with a diameter of {1000 * scene['body']['diameter_m']:g} "
         f"mm moved {scene['scale']:g} times as far as the hand{velocity_note}."
     )
 
 
 def _liquid_sentence(study: Study) -> str:
     """Return a sentence on the liquids of the main blocks and their parameters; "" while the key is sealed."""
-    settings = [setting for block in study.blocks for setting in block.settings]
+    settings = [setting for block in study.trial_blocks for setting in block.settings]
     settings += [setting for block in study.levels for setting in (block.reference, *block.settings) if setting]
     settings += [setting for question in study.others.questions for setting in question.where.settings]
     liquid_ids = [
@@ -273,7 +313,7 @@ def _liquid_sentence(study: Study) -> str:
         if setting is not None and setting.liquid is not None
     ]
     names = [name for liquids in dict.fromkeys(liquid_ids) for name in liquids.split(" + ")]
-    descriptions = [f"{name.replace('_', ' ')} ({liquid_words(study.liquids[name])})" for name in dict.fromkeys(names)
+    descriptions = [f"{name.replace('_', ' ')} ({liquid_text(study.liquids[name])})" for name in dict.fromkeys(names)
              if name in study.liquids]  # fmt: skip
     if not descriptions:
         return ""
@@ -281,44 +321,107 @@ def _liquid_sentence(study: Study) -> str:
 
 
 def _design_sentences(study: Study, results: Results) -> Iterator[str]:
-    """Yield sentences on the presentation and order of trials in each block with questions, and on block order."""
+    """Yield sentences on the presentation and order of trials in each block, on its task, and on block order."""
     blocks = {block.id: block for block in study.blocks}
     for result in results.blocks:
         yield _presentation_sentence(study, blocks[result.id], result)
         yield from presentation_sentences(result)
-    others = [*_other_question_sentences(study, results)]
-    yield from others
-    if results.blocks or others:
+    yield from _other_question_sentences(study)
+    yield from _unrated_block_sentences(study, results)
+    yield from _task_sentences(study)
+    if results.trial_blocks:
         opened = "Conditions were identified only by codes until the key was opened."
         yield opened if study.revealed else "Conditions are identified only by codes."
     yield _block_order_sentence(study)
 
 
-def _other_question_sentences(study: Study, results: Results) -> Iterator[str]:
-    """Yield sentences on other questions in blocks with trials; without statements, also on the design of the block."""
-    designed, rated = {level.id for level in study.levels}, {result.id for result in results.blocks}
-    question_counts = Counter(question.where.id for question in study.others.questions)
-    for where in {question.where.id: question.where for question in study.others.questions}.values():
-        if where.is_form or where.id in designed:
-            continue
-        if where.id in rated:
-            questions = counted(question_counts[where.id], "other question")
-            yield f"In “{where.title}”, participants also answered {questions} after each presentation."
-            continue
-        table, names = study.protocol["blocks"][where.id], [setting.condition for setting in where.settings]
-        conditions = [name.replace("_", " ") for name in names if name is not None]
-        count = study.setting_count(where)
-        conditions_text = counted(count, "condition") + (f" ({listed(conditions)})" if conditions else "")
-        order = f" {_ORDERS[table['order']]}" if count > 1 else ""
-        repetitions_note = f", {table['repetitions']} times each" if table["repetitions"] > 1 else ""
-        trials = study.trials[study.trials["counted"] & (study.trials["block"] == where.id)]
-        if (trials.groupby("participant")["session"].nunique() > 1).any():
-            repetitions_note = f"{repetitions_note or ', once each'} in each session"
-        yield (
-            f"In “{where.title}”, {conditions_text} {'was' if count == 1 else 'were'} "
-            f"presented{order}{repetitions_note}; participants answered "
-            f"{counted(question_counts[where.id], 'question')} after each presentation."
+def _other_question_sentences(study: Study) -> Iterator[str]:
+    """Yield sentences on other questions in blocks with statements, and on the answers that they depend on."""
+    for block in study.blocks:
+        kinds = Counter(
+            ("also answered" if question.question.required else "could also answer", _condition_of(study, question))
+            for question in study.others.questions
+            if question.where.id == block.id and not question.where.is_form
         )
+        for (verb, condition), count in kinds.items():
+            questions = counted(count, "other question")
+            yield f"In “{block.title}”, participants {verb} {questions} after each presentation{condition}."
+
+
+def _condition_of(study: Study, question: PlacedQuestion) -> str:
+    """Return a phrase on the earlier answer for which a question is shown, with a leading space; "" for always."""
+    rule = question.question.show_if
+    if rule is None:
+        return ""
+    shorts = {item.id: item.short for block in study.blocks if block.id == question.where.id for item in block.items}
+    earlier = next(
+        (other for other in study.others.questions if (other.where.id, other.id) == (question.where.id, rule.item)),
+        None,
+    )
+    short = shorts.get(rule.item, rule.item) if earlier is None else earlier.short
+    levels = {} if earlier is None else earlier.levels
+    answers = " or ".join(f"“{levels.get(str(value), value)}”" for value in rule.permitted)
+    bounds = [
+        f"{bound} {value:g}"
+        for bound, value in (("at least", rule.at_least), ("at most", rule.at_most))
+        if value is not None
+    ]
+    return f" if their answer to “{short}” was {answers or listed(bounds)}"
+
+
+def _unrated_block_sentences(study: Study, results: Results) -> Iterator[str]:
+    """Yield sentences on the blocks without statements; those that present one condition alike share a sentence."""
+    question_counts = Counter(question.where.id for question in study.others.questions if not question.where.is_form)
+    single: dict[str, list[BlockResult]] = {}
+    for block, result in zip(study.unrated_blocks, results.unrated_blocks, strict=True):
+        table, count = study.protocol["blocks"][block.id], study.setting_count(block)
+        questions = question_counts[block.id]
+        answered = f"; participants answered {counted(questions, 'question')} after each presentation" * bool(questions)
+        repetitions = {1: "once", 2: "twice"}.get(table["repetitions"], f"{table['repetitions']} times")
+        trials = study.trials[study.trials["counted"] & (study.trials["block"] == block.id)]
+        in_sessions = " in each session" * bool((trials.groupby("participant")["session"].nunique() > 1).any())
+        if count == 1:
+            single.setdefault(f"{repetitions}{in_sessions}{{conditions}}{answered}.", []).append(result)
+            continue
+        settings = _settings_text(study, block, result, "condition")
+        repetitions_note = f", {repetitions} each{in_sessions}" * (table["repetitions"] > 1 or bool(in_sessions))
+        yield f"In “{result.title}”, {settings} were presented {_ORDERS[table['order']]}{repetitions_note}{answered}."
+    for sentence, blocks in single.items():
+        titles = listed([f"“{result.title}”" for result in blocks])
+        each, respectively = (" each", ", respectively") if len(blocks) > 1 else ("", "")
+        conditions = f" ({_single_conditions(blocks)}{respectively})" if study.revealed else ""
+        yield f"{titles}{each} presented one condition {sentence.format(conditions=conditions)}"
+
+
+def _single_conditions(blocks: Sequence[BlockResult]) -> str:
+    """Return the conditions of blocks that present one each; with the same liquid, their delays."""
+    settings = [result.settings[0] for result in blocks]
+    if len({(setting.liquid, setting.link, setting.view) for setting in settings}) > 1 or len(settings) < 2:
+        return "; ".join(name_in_sentence(result.names[0]) for result in blocks)
+    liquid = (settings[0].liquid or "").replace("_", " ")
+    return f"{liquid} with a visual delay of {listed([f'{setting.delay_ms:g}' for setting in settings])} ms"
+
+
+def _task_sentences(study: Study) -> Iterator[str]:
+    """Yield a sentence on each task in the main blocks without a design."""
+    titles: dict[str, list[str]] = {}
+    for block in study.trial_blocks:
+        titles.setdefault(_task_summary(study, block), []).append(f"“{block.title}”")
+    for summary, blocks in titles.items():
+        where = f" of {listed(blocks)}" if len(titles) > 1 else ""
+        if summary:
+            yield f"In each trial{where}, participants were asked to {summary}."
+
+
+def _task_summary(study: Study, block: Block) -> str:
+    """Return what participants do in the trials of a block; "" for a task of a plug-in or without its settings."""
+    name = study.protocol.get("blocks", {}).get(block.id, {}).get("task")
+    task = study.protocol.get("tasks", {}).get(name, {})
+    kind = TASK_KINDS.own.get(task.get("kind"))
+    try:
+        return "" if kind is None else kind.model_validate(task).summary
+    except ValidationError:
+        return ""
 
 
 def _presentation_sentence(study: Study, block: Block, result: BlockResult) -> str:
@@ -326,28 +429,31 @@ def _presentation_sentence(study: Study, block: Block, result: BlockResult) -> s
     noun = (
         {"delays": "visual delay"}.get(result.kind, result.kind.removesuffix("s")) if result.revealed else "condition"
     )
-    names = [f"{delay:g}" for delay in result.delays_ms] or [name_in_sentence(name) for name in result.names]
-    unit = " ms" if result.delays_ms else ""
-    count = study.setting_count(block)
-    settings_text = counted(count, noun) + (f" ({listed(names)}{unit})" if result.revealed else "")
-    liquids = (
-        sorted({setting.liquid for setting in block.settings if setting.liquid is not None}) if result.delays_ms else []
-    )
-    liquid = f" in {listed(liquids)}".replace("_", " ") if liquids else ""
+    count, settings_text = study.setting_count(block), _settings_text(study, block, result, noun)
     statements = counted(len(result.items), "statement")
     return (
-        f"In “{result.title}”, {settings_text}{liquid} {'was' if count == 1 else 'were'} "
+        f"In “{result.title}”, {settings_text} {'was' if count == 1 else 'were'} "
         f"presented{f' {order}' if order and count > 1 else ''}; participants rated {statements} after each "
         "presentation."
     )
 
 
+def _settings_text(study: Study, block: Block, result: BlockResult, noun: str) -> str:
+    """Return the number of a block's settings and their names: "three visual delays (0, 50 and 100 ms) in water"."""
+    names = [f"{delay:g}" for delay in result.delays_ms] or [name_in_sentence(name) for name in result.names]
+    unit = " ms" if result.delays_ms else ""
+    liquids = (
+        sorted({setting.liquid for setting in block.settings if setting.liquid is not None}) if result.delays_ms else []
+    )
+    liquid = f" in {listed(liquids)}".replace("_", " ") if liquids else ""
+    names_text = f" ({listed(names)}{unit})" if result.revealed else ""
+    return f"{counted(study.setting_count(block), noun)}{names_text}{liquid}"
+
+
 def _block_order_sentence(study: Study) -> str:
     """Return a sentence on the order of the main blocks, by group if it differs; "" for a single block."""
-    titles = {block.id: block.title for block in study.blocks}
+    titles = {block.id: block.title for block in study.trial_blocks}
     titles |= {level.id: level.title for level in study.levels if level.phase == "main"}
-    titles |= {question.where.id: question.where.title for question in study.others.questions
-               if not question.where.is_form}  # fmt: skip
     if len(titles) < 2:
         return ""
     order = study.protocol.get("study", {}).get("block_order", "fixed")
@@ -365,13 +471,13 @@ def _block_order_sentence(study: Study) -> str:
 
 def _delay_sentences(study: Study, results: Results) -> Iterator[str]:
     """Yield a sentence on requested and achieved delays for each unblinded block of delays."""
-    for block in results.blocks:
+    for block in results.trial_blocks:
         rows = [
             delivered
             for delivered in results.delivered
             if delivered.block == block.id and delivered.delay_ms is not None
         ]
-        if not block.n or not block.delays_ms or not rows:
+        if not (block.n or block in results.unrated_blocks) or not block.delays_ms or not rows:
             continue
         known = [row for row in rows if row.achieved_ms is not None]
         if not known:
@@ -500,13 +606,13 @@ def _common_sentences(results: Results, blocks: list[BlockResult]) -> Iterator[s
     if decided.binding:
         primary_text = listed([f"“{item}”" for item in decided.primary]) if decided.primary else "all statements"
         yield (
-            f"Alpha ({decided.alpha_words()}) and the primary statements ({primary_text}) were specified before the "
+            f"Alpha ({decided.alpha_text()}) and the primary statements ({primary_text}) were specified before the "
             "first session."
         )
     elif decided.changed:
         yield (
             "The decisions about the analysis changed between sessions, so all results are exploratory; the decisions "
-            f"from the first session were used (alpha = {decided.alpha_words()})."
+            f"from the first session were used (alpha = {decided.alpha_text()})."
         )
     elif not decided.made:
         yield f"The analysis was not specified beforehand, so all results are exploratory (alpha = {decided.alpha:g})."

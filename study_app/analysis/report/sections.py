@@ -11,14 +11,6 @@ import pandas as pd
 
 from study_app.analysis.contrasts import answer, question
 from study_app.analysis.data.measures import LEVELS, number_or_none
-from study_app.analysis.data.motion import (
-    OF_REACHES,
-    OF_TRIALS,
-    REACH_DEFINITIONS,
-    TRIAL_DEFINITIONS,
-    MovementQuartiles,
-    Performance,
-)
 from study_app.analysis.data.study_tables import By, Study, group_assignment, group_counts, group_means
 from study_app.analysis.findings import all_findings
 from study_app.analysis.findings.finding import FOUND, Answer, Finding
@@ -30,7 +22,9 @@ from study_app.analysis.planning import WANTED
 from study_app.analysis.planning.power_curves import interval as share_interval
 from study_app.analysis.planning.smallest_differences import MOST_SD, detectable_difference
 from study_app.analysis.questions import MEASURES
-from study_app.analysis.report.methods import language_words, late_exclusions
+from study_app.analysis.report.background_table import background_table
+from study_app.analysis.report.methods import language_text, late_exclusions
+from study_app.analysis.report.motion_section import within_limits_text
 from study_app.analysis.report.questions_in_full import changed_questions
 from study_app.analysis.results import (
     VERDICTS_MEAN,
@@ -40,7 +34,7 @@ from study_app.analysis.results import (
     QuestionResult,
     Results,
     ScoreResult,
-    incomplete_words,
+    incomplete_answers_sentence,
     lead_phrase,
     missing_sentences,
     name,
@@ -53,9 +47,10 @@ from study_app.analysis.wording import counted, listed, ms, number, significant
 from study_app.discovery import by_name
 from study_app.number_text import capitalised
 from study_app.protocol.descriptions import limit_label
-from study_app.protocol.model import RULES, quoted_title
+from study_app.protocol.model import RULES
 from study_app.protocol.orders import Evenness
 from study_app.protocol.participants import RecordedSessions
+from study_app.protocol.quantities import quoted_title
 from study_app.store.exclusions import dated_reversals, describe_exclusion
 from study_app.store.merged import folders_of
 from study_app.store.session_progress import MISSING_PERCENT, MissingTrials, broken_limits
@@ -113,7 +108,7 @@ def limits(study: Study, results: Results) -> tuple[str, ...]:
 def _general_sentences(study: Study, results: Results) -> Iterator[str]:
     decided = results.decided
     if not study.revealed:
-        key, shown = _sealed_key_words(study), "only counts and comparisons that do not depend on their order"
+        key, shown = _sealed_key_text(study), "only counts and comparisons that do not depend on their order"
         if study.own_codes or study.sites:
             shown = "only counts"
         yield (
@@ -189,7 +184,7 @@ def _general_sentences(study: Study, results: Results) -> Iterator[str]:
         )
 
 
-def _sealed_key_words(study: Study) -> str:
+def _sealed_key_text(study: Study) -> str:
     """Return a clause on the sealed key or, in a merged study, on the keys that are open and sealed."""
     if not study.sites:
         return "The key is sealed"
@@ -243,14 +238,14 @@ def _low_power_sentences(results: Results) -> Iterator[str]:
         beyond = f"a difference of {MOST_SD:g} SD" if smallest > MOST_SD else "the largest difference on the scale"
         smallest *= sd
         if smallest > min(MOST_SD * sd, largest):
-            yield f"{lead}: {people} are too few to find even {beyond} with {power}."
+            yield f"{lead}: with {people}, even {beyond} cannot be detected with {power}."
             continue
         kind, size = ("difference", number(smallest))
         if result.ratio:
             kind, size = "ratio", f"{number(math.exp(smallest))} (or at most {number(math.exp(-smallest))})"
         yield (
-            f"{lead}: with {people} and the observed variation between them, a mean {kind} must be at least {size} to "
-            f"be detected with {power}; the confidence interval shows which {kind}s remain possible."
+            f"{lead}: with {people} and the observed standard deviation, the true mean {kind} must be at least {size} "
+            f"to be detected with {power}; the confidence interval shows which {kind}s are compatible with the data."
         )
 
 
@@ -388,15 +383,15 @@ def _answer_or_sealed(finding: Finding[Any]) -> Answer:
 
 
 def false_claims_sentence(participants: int) -> str:
-    """Return a sentence on the share of reports that claim an effect although there is none, for this sample size."""
+    """Return a sentence on the proportion of reports that falsely claim an effect, for this sample size."""
     n = min(CLAIMS, key=lambda size: abs(size - participants))
     claims, studies = CLAIMS[n]
-    share, low, high = (
+    proportion, low, high = (
         number(100 * value, 1) for value in (claims / studies, *share_interval(claims / studies, studies))
     )
     return (
         f"In {studies} simulated studies with {n} participants, three liquids, seven delays and no true effect, "
-        f"{share} % of the reports claimed a difference or a noticed delay ({claims} reports, 95 % confidence "
+        f"{proportion} % of the reports claimed a difference or a noticed delay ({claims} reports, 95 % confidence "
         f"interval {low} to {high} %; liquid-study validate-report)."
     )
 
@@ -429,7 +424,7 @@ def _block_parts(
     if sentences := presentation_sentences(result):
         yield "presentations", lambda: [paragraph(" ".join(sentences))]
     if result.incomplete:
-        yield "missing answers", lambda: [paragraph(incomplete_words(result), "soft")]
+        yield "missing answers", lambda: [paragraph(incomplete_answers_sentence(result), "soft")]
     effects, *others = all_findings()
     yield effects.what, effects(result, results, pictures).section
     yield "figure showing the answers", lambda: drawn_figure(pictures, result.kind)
@@ -579,7 +574,6 @@ def _reversed_exclusion_sentences(study: Study) -> Iterator[str]:
                 )
 
 
-_UNITS: Final = {"s": "s", "m": "m", "mm": "mm", "n": "N", "percent": "%"}
 _SHOWN: Final = 20
 """The most exclusions, doubts and sessions that the page lists; report.json lists all of them."""
 
@@ -603,7 +597,7 @@ def conduct(study: Study, results: Results) -> Iterator[str]:
         yield bullets(
             [f"{tombstone.at[:10]}, recorded by {tombstone.by}: {tombstone.reason}" for tombstone in study.withdrawn]
         )
-    if languages := language_words(study):
+    if languages := language_text(study):
         yield paragraph(f"Languages of the participants' texts: {languages}.")
     masking = Counter(map(str, study.participants["motors_masked"].dropna()))
     if masking:
@@ -620,6 +614,10 @@ def conduct(study: Study, results: Results) -> Iterator[str]:
     if study.left_out:
         verb = "was" if study.left_out == 1 else "were"
         exclusions.append(f"{counted(study.left_out, 'session')} {verb} not completed and therefore not analysed")
+    if study.damaged_sessions:
+        verb, receipts = ("is", "its receipt is") if study.damaged_sessions == 1 else ("are", "their receipts are")
+        sessions = counted(study.damaged_sessions, "session")
+        exclusions.append(f"{sessions} {verb} not included because {receipts} missing or damaged")
     yield bullets(_first_lines(exclusions)) if exclusions else paragraph("There are no exclusions.")
     if rules := rule_sentences(study, results):
         yield bullets(rules)
@@ -634,6 +632,7 @@ def conduct(study: Study, results: Results) -> Iterator[str]:
         )
     yield from _delivered_delays_part(study, results)
     yield from _trial_orders_part(results)
+    yield from _block_orders_part(results)
 
 
 def groups(study: Study, results: Results, by: By = "group") -> Iterator[str]:
@@ -643,6 +642,7 @@ def groups(study: Study, results: Results, by: By = "group") -> Iterator[str]:
         return
     yield heading(2, f"{by.capitalize()}s")
     yield table((by.capitalize(), "participants"), [[group, str(count)] for group, count in counts.items()])
+    yield from background_table(study, list(counts), by)
     means = group_means(study, by)
     for result in results.blocks:
         if rows := [mean for mean in means if mean.block == result.id]:
@@ -740,7 +740,7 @@ def _delivered_delays_part(study: Study, results: Results) -> Iterator[str]:
     if not results.delivered:
         return
     yield heading(3, "Were the delays presented as specified?")
-    blocks = {result.id: result for result in results.blocks}
+    blocks = {result.id: result for result in results.trial_blocks}
 
     def shown(cell: Callable[[Delivered], str]) -> Callable[[Delivered], str]:
         return cell if study.revealed else lambda _delivered: "sealed"
@@ -764,7 +764,7 @@ def _delivered_delays_part(study: Study, results: Results) -> Iterator[str]:
         ("mean error", shown(lambda delivered: _signed_ms(delivered.error_mean_ms))),
         ("worst trial", shown(lambda delivered: _signed_ms(delivered.error_worst_ms))),
         ("trials", trials),
-        ("within limits", _within_limits),
+        ("within limits", within_limits_text),
         words=2,
     )
     limits = study.protocol.get("limits", {})
@@ -810,16 +810,14 @@ def _limit_text(name: str, limit: float) -> str:
     return f"{quantity or words.replace('_', ' ')} {value}".lstrip()
 
 
-def _within_limits(delivered: Delivered) -> str:
-    return f"{delivered.valid} of {delivered.judged}" if delivered.judged else "not measured"
-
-
 def _signed_ms(value: float | None) -> str:
     return "–" if value is None else f"{'+' if value > 0 else ''}{number(value, 1)} ms"
 
 
 def _trial_orders_part(results: Results) -> Iterator[str]:
-    blocks = [(result, counts) for result in results.blocks if (counts := results.orders.get(result.id)) is not None]
+    blocks = [
+        (result, counts) for result in results.trial_blocks if (counts := results.orders.get(result.id)) is not None
+    ]
     blocks = [(result, counts) for result, counts in blocks if counts.orders and len(counts.codes) >= 2]
     if not blocks:
         return
@@ -832,105 +830,25 @@ def _trial_orders_part(results: Results) -> Iterator[str]:
     yield paragraph("The tables show how often each condition occurred in each position of its block.", "soft")
 
 
-def _evenness_sentence(counts: Evenness) -> str:
-    cells, after = [count for line in counts.positions for count in line], counts.after_another
-    places = f"positions were not balanced; each condition occurred {min(cells)} to {max(cells)} times in each position"
-    if counts.positions_even:
-        places = f"each condition occurred {counted(cells[0], 'time')} in each position"
-    times = "equally often" if counts.follows_even else f"{min(after)} to {max(after)} times"
-    return f"{places} and followed every other condition {times}."
-
-
-def motion(results: Results) -> Iterator[str]:
-    """Yield the section on motion and force; nothing without blocks of statements."""
-    if not results.blocks:
+def _block_orders_part(results: Results) -> Iterator[str]:
+    counts = results.block_orders
+    if counts is None:
         return
-    yield heading(2, "Motion and force")
-    measured = results.performance
-    if measured is None:
-        yield paragraph("Motion and force are shown only after unblinding, because they reveal liquids and delays.")
-        return
-    for result in results.blocks:
-        measures = [
-            measure
-            for measure in (*OF_TRIALS, *OF_REACHES)
-            if any(_movement_measures(measured, result, measure=measure))
-        ]
-        rows = _motion_rows(result, measured, measures, results.delivered)
-        if rows:
-            yield heading(3, result.title)
-            head = (settings_noun(result).capitalize(), "n", *map(_measure_label, measures), "trials within limits")
-            yield table(head, rows)
-            if result.id not in measured.reaching:
-                yield paragraph(
-                    "This block does not contain a reaching task, so no movement times, overshoots or submovements "
-                    "are reported.",
-                    "soft",
-                )
-            elif not measured.recorded_in(result.id):
-                yield paragraph(
-                    "Without readable recordings of this block, reaching measures are not available.", "soft"
-                )
-    yield paragraph(_recordings_sentence(measured))
-    recorded = any(measured.recorded_in(result.id) for result in results.blocks)
-    definitions = TRIAL_DEFINITIONS | (REACH_DEFINITIONS if recorded else {})
-    yield bullets(f"{_measure_label(measure)}: {words}." for measure, words in definitions.items())
-    yield paragraph(
-        "The tables show the median across participants (with quartiles) of each participant's own median. “Trials "
-        "within limits” shows how many of the measured trials met the protocol's limits; the other columns "
-        "include all trials. These measures are not tested.",
-        "soft",
+    titles = {result.id: result.title for result in results.trial_blocks}
+    titles |= {level.block: level.title for level in results.levels}
+    yield heading(3, "Block orders")
+    yield paragraph(f"{counted(counts.orders, 'order').capitalize()}: {_evenness_sentence(counts, 'block')}")
+    lines = enumerate(counts.positions, start=1)
+    yield table(
+        ("Position", *(titles[block] for block in counts.codes)),
+        [[str(place), *map(str, line)] for place, line in lines],
     )
 
 
-def _movement_measures(measured: Performance, result: BlockResult, **fields: str) -> Iterator[MovementQuartiles]:
-    """Yield the movement measures of a block whose fields have the given values."""
-    for moved in measured.moved:
-        if moved.block == result.id and all(getattr(moved, field) == value for field, value in fields.items()):
-            yield moved
-
-
-def _motion_rows(
-    result: BlockResult, measured: Performance, measures: Sequence[str], delivered: Sequence[Delivered]
-) -> list[list[str]]:
-    within_limits = {setting.code: _within_limits(setting) for setting in delivered if setting.block == result.id}
-    rows = []
-    for setting in result.settings:
-        measures_by_name = {
-            moved.measure: moved for moved in _movement_measures(measured, result, code=setting.code) if moved.n
-        }
-        if measures_by_name:
-            n = max(moved.n for moved in measures_by_name.values())
-            cells = [
-                _quartiles_text(measures_by_name[measure]) if measure in measures_by_name else "–"
-                for measure in measures
-            ]
-            rows.append([name(result, setting.code), str(n), *cells, within_limits[setting.code]])
-    return rows
-
-
-def _quartiles_text(moved: MovementQuartiles) -> str:
-    digits = 2 if moved.measure.endswith(("_s", "_n", "_m", "percent")) else 1
-    return f"{number(moved.median, digits)} ({number(moved.q1, digits)}–{number(moved.q3, digits)})"
-
-
-def _measure_label(measure: str) -> str:
-    words, _, unit = measure.rpartition("_")
-    if unit not in _UNITS:
-        return measure.replace("_", " ")
-    return f"{words.replace('_', ' ')}, {_UNITS[unit]}"
-
-
-def _recordings_sentence(measured: Performance) -> str:
-    if not measured.trials:
-        return "The study does not contain any reaching trials, so reaching measures are not available."
-    text = f"Reaching measures are based on the recordings of {measured.recorded} of {measured.trials} reaching trials"
-    if measured.unread:
-        text += f" (reasons for the others: {'; '.join(measured.unread)})"
-    if not measured.judged:
-        return f"{text}. No data are available on whether trials met the protocol's limits."
-    if not measured.invalid:
-        return f"{text}. All trials with measured timing met the protocol's limits."
-    verb = "is" if measured.invalid == 1 else "are"
-    invalid = f"{counted(measured.invalid, 'trial').capitalize()} exceeded the protocol's limits but {verb}"
-    return f"{text}. {invalid} included."
+def _evenness_sentence(counts: Evenness, noun: str = "condition") -> str:
+    cells, after = [count for line in counts.positions for count in line], counts.after_another
+    places = f"positions were not balanced; each {noun} occurred {min(cells)} to {max(cells)} times in each position"
+    if counts.positions_even:
+        places = f"each {noun} occurred {counted(cells[0], 'time')} in each position"
+    times = "equally often" if counts.follows_even else f"{min(after)} to {max(after)} times"
+    return f"{places} and followed every other {noun} {times}."

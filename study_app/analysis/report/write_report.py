@@ -18,7 +18,7 @@ from markupsafe import Markup
 from study_app import __version__
 from study_app.analysis.contrasts import contrast_rows, contrast_section
 from study_app.analysis.data.blocks import Setting
-from study_app.analysis.data.study_tables import Study, group_counts, load_study
+from study_app.analysis.data.study_tables import DAMAGED, Study, group_counts, load_study
 from study_app.analysis.evaluate import evaluate
 from study_app.analysis.export.table_files import credit_lines, study_head, table_files
 from study_app.analysis.export.tables import exported_tables
@@ -36,7 +36,8 @@ from study_app.analysis.planning.preregistration import deviations, preregistrat
 from study_app.analysis.planning.preregistration import deviations_section as preregistration_section
 from study_app.analysis.report import sections
 from study_app.analysis.report.first_page import cards, figures_shown, first_page, presented_in
-from study_app.analysis.report.methods import methods, version_words
+from study_app.analysis.report.methods import methods, version_text
+from study_app.analysis.report.motion_section import motion_section
 from study_app.analysis.report.questions_in_full import appendix
 from study_app.analysis.report.r_script import r_script
 from study_app.analysis.report.study_figures import block_figure_tasks
@@ -65,7 +66,7 @@ from study_app.store.versions import recorded_contents
 from study_app.workers.shared_tasks import SharedTasks
 
 _OF_FORMAT_2: Final = {
-    Results: frozenset({"questions", "scores", "levels", "contrasts"}),
+    Results: frozenset({"questions", "scores", "levels", "contrasts", "block_orders"}),
     Setting: frozenset({"link", "view"}),
     ContrastResult: frozenset({"cells"}),
 }
@@ -143,7 +144,7 @@ def tests_csv(results: Results) -> bytes:
 def motion_csv(results: Results) -> bytes:
     """Return a CSV table with one row per measure of motion and force and setting."""
     moved = () if results.performance is None else results.performance.moved
-    blocks = {block.id: block for block in results.blocks}
+    blocks = {block.id: block for block in results.trial_blocks}
     delivered = {(setting.block, setting.code): setting for setting in results.delivered}
     return csv_bytes(
         _MOTION,
@@ -388,7 +389,7 @@ def _render_page(
         ("What the verdicts mean", lambda: sections.verdicts_mean(results)),
         ("Groups", lambda: sections.groups(study, results)),
         ("Sites", lambda: sections.groups(study, results, "site")),
-        ("Motion and force", lambda: sections.motion(results)),
+        ("Motion and force", lambda: motion_section(results)),
         ("Planned exclusions", lambda: sections.planned_section(planned, sealed=not study.revealed)),
         ("How the study was run", lambda: sections.conduct(study, results)),
         ("Preregistration", lambda: preregistration_section(study)),
@@ -449,7 +450,7 @@ def _facts_sentences(study: Study) -> str:
     notes += [] if planned is None else [f"{planned} were planned"]
     notes_sentence = f" {capitalised('; '.join(notes))}." if notes else ""
     sample = f"{people[:1].upper()}{people[1:]}{group_note}"
-    return f"Study {study.name}, {version_words(study)}. {sample}.{notes_sentence} {dates}"
+    return f"Study {study.name}, {version_text(study)}. {sample}.{notes_sentence} {dates}"
 
 
 _EXCLUSION_REASONS: Final = {
@@ -467,9 +468,12 @@ def _why_not_included(study: Study) -> str:
     absent = rows[~rows["participant"].isin(study.people)]
     rules = {row.participant: row.rule_or_person for row in study.exclusions if row.trial is None}
     excluded = set(absent.loc[absent["excluded"], "participant"])
+    damaged = set(absent.loc[absent["status"] == DAMAGED, "participant"])
     reasons = [
         _EXCLUSION_REASONS.get(rules.get(person, ""), "a researcher's decision")
         if person in excluded
+        else "damaged session"
+        if person in damaged
         else "unfinished session"
         for person in sorted(set(absent["participant"]))
     ]
@@ -491,7 +495,7 @@ def _reproduction_sentences(study: Study, results: Results) -> Iterator[str]:
     bound = decided.equivalence_bound
     rows = [
         ("Analysis decided before the first session", "yes" if decided.binding else "no; all results are exploratory"),
-        ("Alpha", decided.alpha_words()),
+        ("Alpha", decided.alpha_text()),
         *(
             [
                 ("Equivalence bound for statements", "none" if bound is None else bound_text(bound)),

@@ -184,8 +184,8 @@ class _Likelihood:
 
         Under the null hypothesis all effects are 0.
         """
-        shares = np.cumsum(self._totals)[:-1] / self._totals.sum()
-        cuts = np.log(shares / (1 - shares))
+        proportions = np.cumsum(self._totals)[:-1] / self._totals.sum()
+        cuts = np.log(proportions / (1 - proportions))
         sds = 1 if self._slope_predictor is None else 2
         start = np.array(
             [cuts[0], *np.log(np.maximum(np.diff(cuts), 0.05)), *np.zeros(self.effects), *[1.0, 0.5][:sds]]
@@ -220,14 +220,14 @@ class _Likelihood:
         below = np.zeros((len(shift), self.categories + 1, shift.shape[1]))
         below[:, 1:-1] = expit(cuts[None, :, None] - shift[:, None, :])
         below[:, -1] = 1.0
-        share = np.maximum(np.diff(below, axis=1), _SMALLEST)
+        proportion = np.maximum(np.diff(below, axis=1), _SMALLEST)
         density = below * (1.0 - below)
-        at_upper, at_lower = density[:, 1:] / share, density[:, :-1] / share
-        logs = self._counts @ np.log(share).reshape(self._counts.shape[1], -1) + self._log_weights
+        at_upper, at_lower = density[:, 1:] / proportion, density[:, :-1] / proportion
+        logs = self._counts @ np.log(proportion).reshape(self._counts.shape[1], -1) + self._log_weights
         largest = logs.max(axis=1, keepdims=True)
         likelihoods = np.exp(logs - largest)
         person_likelihoods = likelihoods.sum(axis=1, keepdims=True)
-        weights = (self._counts.T @ (likelihoods / person_likelihoods)).reshape(share.shape)
+        weights = (self._counts.T @ (likelihoods / person_likelihoods)).reshape(proportion.shape)
         upper_gradient, lower_gradient = (weights * at_upper).sum(axis=2), (weights * at_lower).sum(axis=2)
         cut_gradient = upper_gradient[:, :-1].sum(axis=0) - lower_gradient[:, 1:].sum(axis=0)
         steps = np.exp(parameters[1 : self.categories - 1])

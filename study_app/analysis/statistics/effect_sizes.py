@@ -57,9 +57,11 @@ def hedges_g(first: Array, second: Array) -> EffectSize | None:
     n, m = len(first), len(second)
     if min(n, m) < 2 or (sd := _pooled_sd(first, second)) < _SAME:
         return None
-    d, freedom, root = float(first.mean() - second.mean()) / sd, n + m - 2, math.sqrt(n * m / (n + m))
-    bias = math.exp(gammaln(freedom / 2) - gammaln((freedom - 1) / 2)) / math.sqrt(freedom / 2)
-    low, high = _noncentrality_interval(d * root, freedom)
+    d, degrees_of_freedom, root = float(first.mean() - second.mean()) / sd, n + m - 2, math.sqrt(n * m / (n + m))
+    bias = math.exp(gammaln(degrees_of_freedom / 2) - gammaln((degrees_of_freedom - 1) / 2)) / math.sqrt(
+        degrees_of_freedom / 2
+    )
+    low, high = _noncentrality_interval(d * root, degrees_of_freedom)
     return EffectSize(name="g", value=bias * d, low=bias * low / root, high=bias * high / root, t=d * root)
 
 
@@ -68,16 +70,16 @@ def _pooled_sd(first: Array, second: Array) -> float:
     return math.sqrt(squares / (len(first) + len(second) - 2))
 
 
-def _noncentrality_interval(t: float, freedom: int) -> tuple[float, float]:
+def _noncentrality_interval(t: float, degrees_of_freedom: int) -> tuple[float, float]:
     """Return the 95 % interval of the noncentrality of the t distribution, given an observed t."""
-    tail, reach = (1 - _LEVEL) / 2, 10.0 + 3 * abs(t)
+    tail, half_width = (1 - _LEVEL) / 2, 10.0 + 3 * abs(t)
 
     def excess(shift: float, p: float) -> float:
-        below = float(nctdtr(freedom, shift, t))
+        below = float(nctdtr(degrees_of_freedom, shift, t))
         return (float(shift < t) if math.isnan(below) else below) - p
 
     def noncentrality(p: float) -> float:
-        return float(brentq(excess, t - reach, t + reach, (p,)))
+        return float(brentq(excess, t - half_width, t + half_width, (p,)))
 
     return noncentrality(1 - tail), noncentrality(tail)
 
@@ -96,12 +98,12 @@ def cliffs_delta(first: Array, second: Array) -> EffectSize | None:
     of_rows, of_columns = float(((rows - delta) ** 2).sum()), float(((columns - delta) ** 2).sum())
     of_cells = float(((signs - delta) ** 2).sum())
     variance = (m**2 * of_rows + n**2 * of_columns - of_cells) / (n * m * (n - 1) * (m - 1))
-    least = (1 - delta**2) / (n * m - 1)
-    return _sign_effect_size(delta, max(variance, least), n + m - 2, min(n, m))
+    minimum = (1 - delta**2) / (n * m - 1)
+    return _delta_with_interval(delta, max(variance, minimum), n + m - 2, min(n, m))
 
 
 def paired_delta(differences: Array) -> EffectSize | None:
-    """Return the share of positive differences minus the share of negative ones.
+    """Return the proportion of positive differences minus the proportion of negative differences.
 
     None if there are fewer than two, or all are zero.
     """
@@ -109,22 +111,23 @@ def paired_delta(differences: Array) -> EffectSize | None:
     signs = np.where(np.abs(differences) < _SAME, 0.0, np.sign(differences))
     if n < 2 or not signs.any():
         return None
-    return _sign_effect_size(float(signs.mean()), float(signs.var(ddof=1)) / n, n - 1, n)
+    return _delta_with_interval(float(signs.mean()), float(signs.var(ddof=1)) / n, n - 1, n)
 
 
-def _sign_effect_size(delta: float, variance: float, freedom: int, cases: int) -> EffectSize:
-    """Return delta with its interval, limited to −1 to 1.
+def _delta_with_interval(delta: float, variance: float, degrees_of_freedom: int, cases: int) -> EffectSize:
+    """Return Cliff's delta with its interval, limited to −1 to 1.
 
-    At ±1, where the variance is zero, it ends at the bound of Clopper and Pearson (1934) for ``cases`` of ``cases``.
+    At ±1, where the variance is zero, the inner limit follows from the Clopper–Pearson (1934) limit for ``cases``
+    successes in ``cases`` trials.
     """
     if 1 - abs(delta) < _SAME:
         end = 2 * ((1 - _LEVEL) / 2) ** (1 / cases) - 1
         ends = (end, 1.0) if delta > 0 else (-1.0, -end)
         return EffectSize(name="Cliff's delta", value=delta, low=ends[0], high=ends[1])
-    t = float(stdtrit(freedom, (1 + _LEVEL) / 2))
-    reach = t * math.sqrt(variance) * math.sqrt((1 - delta**2) ** 2 + t**2 * variance)
-    middle, below = delta - delta**3, 1 - delta**2 + t**2 * variance
-    low, high = (middle - reach) / below, (middle + reach) / below
+    t = float(stdtrit(degrees_of_freedom, (1 + _LEVEL) / 2))
+    half_width = t * math.sqrt(variance) * math.sqrt((1 - delta**2) ** 2 + t**2 * variance)
+    centre, denominator = delta - delta**3, 1 - delta**2 + t**2 * variance
+    low, high = (centre - half_width) / denominator, (centre + half_width) / denominator
     return EffectSize(name="Cliff's delta", value=delta, low=max(-1.0, low), high=min(1.0, high))
 
 
@@ -140,17 +143,19 @@ def jzs_bayes_factor(t: float, n: int, m: int | None = None, scale: float = PRIO
     scale : float
         Scale of the Cauchy prior of the standardised difference.
     """
-    freedom, size = (n - 1, float(n)) if m is None else (n + m - 2, n * m / (n + m))
+    degrees_of_freedom, size = (n - 1, float(n)) if m is None else (n + m - 2, n * m / (n + m))
 
     def log_likelihood(g: float) -> float:
-        return -0.5 * math.log1p(size * g) - (freedom + 1) / 2 * math.log1p(t**2 / ((1 + size * g) * freedom))
+        return -0.5 * math.log1p(size * g) - (degrees_of_freedom + 1) / 2 * math.log1p(
+            t**2 / ((1 + size * g) * degrees_of_freedom)
+        )
 
     def log_density(log_g: float) -> float:
         g = math.exp(log_g)
         prior = math.log(scale) - 0.5 * math.log(2 * math.pi) - 0.5 * log_g - scale**2 / (2 * g)
         return log_likelihood(g) + prior - none
 
-    none = -(freedom + 1) / 2 * math.log1p(t**2 / freedom)
+    none = -(degrees_of_freedom + 1) / 2 * math.log1p(t**2 / degrees_of_freedom)
     peak = max(log_density(float(log_g)) for log_g in np.linspace(-12, 25, 371))
     area = quad(lambda log_g: math.exp(log_density(log_g) - peak), -12, 25, limit=400, points=(-4, 0, 4))[0]
     return math.exp(min(math.log(area) + peak, LARGEST_LOG))

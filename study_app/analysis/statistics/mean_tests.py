@@ -176,7 +176,7 @@ def p_differs(means: Means, alternative: str) -> DifferencePs:
 
 @cache
 def smallest_shift(*sizes: int, alpha: float, alternative: str, power: float, most: float = math.inf) -> float:
-    """Return the mean difference [SD] that all tests show in the share ``power`` of simulated studies.
+    """Return the mean difference [SD] that all tests show in the proportion ``power`` of simulated studies.
 
     A study has pairs, or two groups of these ``sizes``, with normal numbers; ``alternative`` is "greater" or
     "two-sided". The difference is infinite if a thousand standard errors are too few, or if the t tests alone need
@@ -195,15 +195,15 @@ def smallest_shift(*sizes: int, alpha: float, alternative: str, power: float, mo
 
 @cache
 def equivalence_power(*sizes: int, alpha: float, bound: float) -> float:
-    """Return the share of simulated studies without a difference that are shown to be within ±``bound`` [SD].
+    """Return the proportion of simulated studies without a difference that are shown to be within ±``bound`` [SD].
 
     A study has pairs, or two groups of these ``sizes``, with normal numbers.
     """
-    shares = []
+    proportions = []
     for means in _simulated_means(sizes, resamples_for(alpha)):
         p = [test(-bound) for side in (means, means.opposite()) for test in (side.p_t, side.p_bootstrap)]
-        shares.append(np.max(p, axis=0) <= alpha)
-    return float(np.concatenate(shares).mean())
+        proportions.append(np.max(p, axis=0) <= alpha)
+    return float(np.concatenate(proportions).mean())
 
 
 def _simulated_means(sizes: tuple[int, ...], resamples: int) -> Iterator[Means]:

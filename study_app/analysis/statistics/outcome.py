@@ -27,7 +27,7 @@ DRAWS: Final = 9999
 
 _MOST_DRAWS: Final = 199_999
 _LARGEST_SHARE: Final = 0.05
-"""The smallest p that permutations can give, corrected for its family, is at most this share of alpha."""
+"""The smallest p that permutations can give, corrected for its family, is at most this proportion of alpha."""
 
 SAMPLES: Final = 1999
 """Bootstrap samples of an interval."""
@@ -124,18 +124,20 @@ def alpha_of_looks(looks: tuple[int, ...], alpha: float, spending: str) -> tuple
     The cumulative sums of a study's data are a random walk; its density within the bounds of earlier looks is
     integrated numerically (Armitage, McPherson & Rowe 1969, J. R. Stat. Soc. A 132, 235–244).
     """
-    shares = np.array(looks) / looks[-1]
-    spent = alpha * np.log1p((math.e - 1) * shares)
+    proportions = np.array(looks) / looks[-1]
+    spent = alpha * np.log1p((math.e - 1) * proportions)
     if spending == "obrien-fleming":
-        spent = 4 * ndtr(ndtri(alpha / 4) / np.sqrt(shares))
+        spent = 4 * ndtr(ndtri(alpha / 4) / np.sqrt(proportions))
     nodes, node_weights = np.polynomial.legendre.leggauss(_NODES)
     alphas, places, weights, last_share = [], np.zeros(1), np.ones(1), 0.0
-    for share, alpha_due in zip(shares, np.diff(spent, prepend=0.0), strict=True):
-        bound = float(brentq(_crossing_excess, 0.0, 40.0, (places, weights, math.sqrt(share - last_share), alpha_due)))
+    for proportion, alpha_due in zip(proportions, np.diff(spent, prepend=0.0), strict=True):
+        bound = float(
+            brentq(_crossing_excess, 0.0, 40.0, (places, weights, math.sqrt(proportion - last_share), alpha_due))
+        )
         inner_places = bound * nodes
-        density = _normal_density(inner_places[:, None], places, math.sqrt(share - last_share)) @ weights
-        places, weights, last_share = inner_places, density * bound * node_weights, share
-        alphas.append(float(2 * ndtr(-bound / math.sqrt(share))))
+        density = _normal_density(inner_places[:, None], places, math.sqrt(proportion - last_share)) @ weights
+        places, weights, last_share = inner_places, density * bound * node_weights, proportion
+        alphas.append(float(2 * ndtr(-bound / math.sqrt(proportion))))
     return tuple(alphas)
 
 
@@ -154,12 +156,12 @@ def error_of_every_report(looks: tuple[int, ...], alpha: float, spending: str) -
     reached = np.searchsorted(looks, reports, side="right") - 1
     nodes, node_weights = np.polynomial.legendre.leggauss(_NODES)
     error, places, weights, last_share = 0.0, np.zeros(1), np.ones(1), 0.0
-    for share, level in zip(reports / looks[-1], levels[reached], strict=True):
-        bound, step = float(-ndtri(level / 2)) * math.sqrt(share), math.sqrt(share - last_share)
+    for proportion, level in zip(reports / looks[-1], levels[reached], strict=True):
+        bound, step = float(-ndtri(level / 2)) * math.sqrt(proportion), math.sqrt(proportion - last_share)
         error += _crossing_excess(bound, places, weights, step, 0.0)
         inner_places = bound * nodes
         density = _normal_density(inner_places[:, None], places, step) @ weights
-        places, weights, last_share = inner_places, density * bound * node_weights, share
+        places, weights, last_share = inner_places, density * bound * node_weights, proportion
     return error
 
 
@@ -220,7 +222,7 @@ def monte_carlo_p(is_extreme: NDArray[np.bool_], seed: int, least: float) -> tup
 
 
 def p_of_draws(drawn: NDArray[np.floating], observed: NDArray[np.floating]) -> Array:
-    """Return p (…): the share of random statistics (draws, …) that are at least as large as the observed ones (…).
+    """Return p (…): the proportion of random statistics (draws, …) that are at least as large as the observed ones (…).
 
     If no draw is as large, p follows from a Pearson type III distribution with the first three moments of the draws, so
     that verdicts at a small alpha do not depend on the number of draws.

@@ -272,9 +272,9 @@ def _friedman_p(ranks: Whole, squares: int, draws: int, seed: int) -> tuple[floa
         return float(tails[np.searchsorted(support, squares)]), float(tails[-1]), "exact permutation"
     if n > DRAWN_UP_TO:
         return None, None, _APPROXIMATE
-    least = math.exp((1 - n) * math.lgamma(k + 1))
+    minimum = math.exp((1 - n) * math.lgamma(k + 1))
     (sums,) = _permuted_sums(ranks[None], draws, seed)
-    return monte_carlo_p(_sums_of_squares(sums, n) >= squares, seed, least)
+    return monte_carlo_p(_sums_of_squares(sums, n) >= squares, seed, minimum)
 
 
 @lru_cache(maxsize=1024)

@@ -42,9 +42,9 @@ def kappa(tables: ArrayLike) -> Array:
     """
     counts = np.asarray(tables, dtype=np.float64)
     n = counts.sum(axis=(-2, -1), keepdims=True)
-    shares = np.divide(counts, n, out=np.zeros_like(counts), where=n > 0)
-    agreed = np.trace(shares, axis1=-2, axis2=-1)
-    expected = (shares.sum(axis=-2) * shares.sum(axis=-1)).sum(axis=-1)
+    proportions = np.divide(counts, n, out=np.zeros_like(counts), where=n > 0)
+    agreed = np.trace(proportions, axis1=-2, axis2=-1)
+    expected = (proportions.sum(axis=-2) * proportions.sum(axis=-1)).sum(axis=-1)
     exists = (n[..., 0, 0] > 0) & (expected < 1.0)
     return np.where(exists, (agreed - expected) / np.where(exists, 1 - expected, 1.0), np.nan)
 
@@ -176,8 +176,8 @@ def _kappa_with_interval(
 ) -> tuple[float | None, Interval | None, str]:
     """Return kappa over decided answers, its interval, and the reason if there is none.
 
-    The interval is from a bootstrap of the share of correct answers (Gaffke 2005) with an additional participant, whose
-    answers are all incorrect for the lower end and all correct for the upper end; so it is not empty if all
+    The interval is from a bootstrap of the proportion of correct answers (Gaffke 2005) with an additional participant,
+    whose answers are all incorrect for the lower end and all correct for the upper end; so it is not empty if all
     participants agree. The agreement expected by chance is fixed at its observed value.
     """
     is_decided = (given >= 0) & (right >= 0)
@@ -201,8 +201,8 @@ def _kappa_with_interval(
     lowest, highest = (weights[:, :n] @ correct + extra_correct for extra_correct in (0.0, extra_answers))
     expected = _chance_agreement(tables.sum(axis=0))
     low, high = (
-        (float(np.quantile(shares / all_decided, end)) - expected) / (1.0 - expected)
-        for shares, end in ((lowest, 0.025), (highest, 0.975))
+        (float(np.quantile(proportions / all_decided, end)) - expected) / (1.0 - expected)
+        for proportions, end in ((lowest, 0.025), (highest, 0.975))
     )
     method = (
         "bootstrap over participants and one additional participant, who is always incorrect (lower end) or always "
@@ -213,8 +213,8 @@ def _kappa_with_interval(
 
 def _chance_agreement(table: Array) -> float:
     """Return the proportion of agreement expected by chance, from a table of counts."""
-    shares = table / table.sum()
-    return float((shares.sum(axis=0) * shares.sum(axis=1)).sum())
+    proportions = table / table.sum()
+    return float((proportions.sum(axis=0) * proportions.sum(axis=1)).sum())
 
 
 def _hit_rates(given: Whole, truth: Sequence[int | None]) -> tuple[HitRate, ...]:

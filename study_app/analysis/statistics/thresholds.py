@@ -65,7 +65,7 @@ class Threshold(Outcome):
 
     @property
     def half_way(self) -> float | None:
-        """The share of agreement at the threshold according to the curve."""
+        """The proportion of agreement at the threshold according to the curve."""
         return None if self.guess is None or self.lapse is None else (1 + self.guess - self.lapse) / 2
 
 
@@ -160,10 +160,10 @@ def _fit_pooled_answers(
     answers: Chandler & Bate 2007, Biometrika 94, 167–183).
     """
     low, span, people = float(levels[0]), float(np.ptp(levels)), len(yes)
-    least, most, count = _WIDTHS
+    minimum, maximum, count = _WIDTHS
     uniform = (1 / len(_RATES),) * len(_RATES)
     median, factor = _WIDTH_PRIOR
-    widths = geometric(least * span, most * span, count)
+    widths = geometric(minimum * span, maximum * span, count)
     grid = Grid(
         family="logistic",
         thresholds=evenly(low - span, low + 2 * span, _THRESHOLDS),
@@ -192,7 +192,7 @@ def _dispersion(posterior: Posterior, levels: Array, yes: Array, asked: Array) -
     """
     _, log_yes, log_no = tables(posterior.grid, tuple(levels.tolist()))
     thresholds = posterior.grid.thresholds
-    first, last = (int(np.searchsorted(np.cumsum(posterior.marginal), share)) for share in (0.025, 0.975))
+    first, last = (int(np.searchsorted(np.cumsum(posterior.marginal), proportion)) for proportion in (0.025, 0.975))
     first = min(first, len(thresholds) - 2)
     last = min(max(last, first + 1), len(thresholds) - 1)
     at_ends = []
@@ -272,7 +272,7 @@ def deviances(successes: ArrayLike, n: ArrayLike, expected: ArrayLike) -> Array:
 
 
 def p_of_fit(successes: ArrayLike, n: ArrayLike, expected: ArrayLike) -> float:
-    """Return the share of simulated answers (k,) with at least the observed deviance: (1 + #{D* ≥ D})/1000."""
+    """Return the proportion of simulated answers (k,) with at least the observed deviance: (1 + #{D* ≥ D})/1000."""
     draw = np.random.default_rng(SEED)
     drawn = draw.binomial(np.asarray(n, np.int64), np.asarray(expected, float), (SETS, np.size(expected)))
     simulated = deviances(drawn, n, expected).sum(axis=-1)
@@ -283,7 +283,7 @@ def p_of_fit(successes: ArrayLike, n: ArrayLike, expected: ArrayLike) -> float:
 def drift(successes: ArrayLike, expected: ArrayLike) -> float | None:
     """Return the correlation of trial number and deviance residual; None if either does not vary.
 
-    ``successes`` (n,) are in trial order; ``expected`` (n,) are the shares that the function predicts.
+    ``successes`` (n,) are in trial order; ``expected`` (n,) are the proportions that the function predicts.
     """
     y, psi = np.asarray(successes, float), np.asarray(expected, float)
     residuals = np.sign(y - psi) * np.sqrt(deviances(y, np.ones_like(y), psi))
