@@ -330,6 +330,8 @@ def rebuild(session: Path) -> None:
         click.echo(
             f"the journal ends with an incomplete line of {counted(rebuilt.torn_bytes, 'byte')}, which has been kept"
         )
+    for path in rebuilt.lost:
+        click.echo(f"warning: {path} is missing and cannot be rebuilt; restore it from a backup", err=True)
     if not (rebuilt.rewritten or rebuilt.swept):
         click.echo("nothing to do: every table agrees with the journal")
 

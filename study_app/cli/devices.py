@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from study_app.devices.falcon.device import FalconDevice
 
 _WIDTH = 100
-_PREPARING = "Preparing …"
+_PREPARING = "Preparing…"
 _FIRMWARE = click.option("--firmware", type=click.Path(path_type=Path), metavar="PATH", help="Firmware file.")
 DEVICE = click.option("--device", "name", default="falcon", show_default=True, metavar="NAME", help="The device.")
 _OFF = "off"
@@ -104,9 +104,9 @@ def doctor(name: str, faults: tuple[str, ...], to: Path | None, device_options: 
     for line in report_lines(diagnosis):
         click.echo(line)
     if to is not None:
-        from study_app.store.support import write_support
+        from study_app.store.support import write_support_archive
 
-        write_support(to, "\n".join(report_lines(diagnosis)).strip() + "\n")
+        write_support_archive(to, "\n".join(report_lines(diagnosis)).strip() + "\n")
         click.echo(f"Written: {to}")
     exit_if(not diagnosis.well)
 

@@ -107,7 +107,7 @@ def accuracy(scene: str | None, liquid: str | None, path: str, to: Path | None, 
         raise click.UsageError(f"nothing can be measured: {'; '.join(notes)}")
     make_output_folder(to)
     name = "stirring" if path == _DEFAULT_PATH else path
-    with progress(lambda text: click.echo(f"{text} …", err=True)) as show:
+    with progress(lambda text: click.echo(f"{text}…", err=True)) as show:
         measured = measure(numerical, physical, motion, named=name, notes=notes, progress=show)
     _present_evidence(accuracy_evidence(measured), to, with_text=False)
 
@@ -119,7 +119,7 @@ def _print_survey(file: str | None, to: Path | None) -> None:
 
     make_output_folder(to)
     scenes = load_scenes(file or _REAL)
-    with progress(lambda text: click.echo(f"{text} …", err=True)) as show:
+    with progress(lambda text: click.echo(f"{text}…", err=True)) as show:
         errors = survey_scenes(scenes, show)
     if not errors:
         raise click.UsageError(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -94,7 +95,7 @@ def power(
     from study_app.analysis.planning.threshold_studies import plans
     from study_app.protocol.load import load
     from study_app.session.simulated.rehearsal import condition_features
-    from study_app.store.files import make_folder
+    from study_app.store.files import is_there, make_folder
 
     study = load(protocol)
     if trials and not plans(study, trials):
@@ -102,8 +103,6 @@ def power(
             f"--trials cannot be used: {study.study.name} does not measure thresholds, d′, ratings or magnitude "
             f"estimation in a main block"
         )
-    if to is not None:
-        make_folder(to, waits=False)
     is_given = click.get_current_context().get_parameter_source("sizes") is not ParameterSource.DEFAULT
     if is_given and study.analysis is not None and (looks := study.analysis.looks):
         raise click.UsageError(
@@ -113,6 +112,9 @@ def power(
     sizes = sizes if is_given else planned_sizes(study)
     estimate: PowerEstimate | None = None
     cancelled = False
+    is_new_folder = to is not None and not is_there(to)
+    if to is not None:
+        make_folder(to, waits=False)  # before the simulation, which takes minutes
     try:
         with progress() as show, executor_for(workers) as executor:
             for estimate in estimate_power(
@@ -130,6 +132,10 @@ def power(
                     show(done, estimate.studies / estimate.asked)
     except KeyboardInterrupt:
         cancelled = True
+    finally:
+        if to is not None and is_new_folder and estimate is None:
+            with suppress(OSError):
+                to.rmdir()
     if estimate is not None:
         _write_estimate(estimate, to)
     if cancelled:

@@ -36,7 +36,7 @@ def kinds_markdown() -> str:
         ("Limiters", ("bit", "limiter", "column", "meaning"), _limiter_rows()),
         ("Trigger codes", ("code", "journal event"), ((str(code), f"`{name}`") for name, code in CODES.items())),
         ("Devices", ("`--device`", "device", "kind", "options"), _device_rows()),
-        ("Checks of a device, in order", ("`devices doctor`", "without it", "cause; remedy"), _check_rows()),
+        ("Checks of a device, in order", ("`devices doctor`", "symptom if it fails", "cause; remedy"), _check_rows()),
         (
             "Templates",
             ("`--template`", "title", "question"),
@@ -47,7 +47,7 @@ def kinds_markdown() -> str:
 
 
 def delayed_force_markdown() -> str:
-    """Return Markdown tables of the delivered share of a delayed force, and of the longest delay that delivers 95 %."""
+    """Return Markdown tables of the delivered proportion of a delayed force and the longest delay with 95 %."""
     entries = [entry for entry in stored_table() if entry.estimator == "kalman"]
     delays = [delay for delay in sorted({entry.delay_ms for entry in entries}) if delay >= _LEAST_DELAY_MS]
     remaining = {(entry.liquid, entry.hand, entry.delay_ms): f"{entry.left_percent:.0f}" for entry in entries}
@@ -94,7 +94,7 @@ def _instrument_rows() -> Iterator[tuple[str, ...]]:
         caveat = f"; from memory: {table['from_memory']}" if "from_memory" in table else ""
         scores = ", ".join(f"`{score}`" for score in table["scores"])
         texts = ", ".join(table["languages"]) or "yours"
-        yield f"`{name}`", texts, scores, f"{table['source']}; {table['compared']}{caveat}"
+        yield f"`{name}`", texts, scores, f"{table['source']}. Compared: {table['compared']}{caveat}"
 
 
 def _effect_rows() -> Iterator[tuple[str, ...]]:

@@ -39,12 +39,12 @@ MEANS: Final[dict[_Means, str]] = {"no": "No", "headphones": "Headphones", "nois
 QUIETEST_DB, LOUDEST_DB, USUAL_DB = 30, 85, 60
 """Sound pressure levels of masking noise [dB]; above 85 dB hearing is at risk (Directive 2003/10/EC)."""
 _Verdict: TypeAlias = Literal["ok", "warning", "failure"]
-_MIN_FRESH_SHARE = 0.5  # share of ticks in which the device had a new sample
+_MIN_FRESH_SHARE = 0.5  # proportion of ticks in which the device had a new sample
 RATE_WARNING, RATE_FAILURE = 0.02, 0.5  # relative error of the servo's rate
 _MIN_REFRESH_HZ = 50.0
 _SLOW_PROBE_S = 0.1
 _TABLES_BYTES = 20_000_000
-_MAX_TICK_SHARE = 0.2  # share of a tick that the force model may take
+_MAX_TICK_SHARE = 0.2  # proportion of a tick that the force model may take
 _EQUAL_ERROR_RATIO = 1.1  # greatest ratio of two errors that count as equal
 _PROPERTY_NAMES = {"delay_s": "delay", "count_m": "encoder count", "mass_kg": "mass"}
 _SPACE_FACTOR = 3  # required free space as a multiple of a session of the expected length
@@ -75,7 +75,7 @@ class PredictedDelivery:
     """The predicted loss of main trials because the safety layer withholds too much force.
 
     ``missing`` of the ``asked`` trials of intervals would not be delivered, and ``out`` of the ``judged`` other trials
-    would violate limits. ``limit_percent`` is the limit on the withheld share of the force [%].
+    would violate limits. ``limit_percent`` is the limit on the withheld proportion of the force [%].
     """
 
     missing: int
@@ -97,14 +97,14 @@ class PredictedDelivery:
 class Measurements:
     """The measurements before a session.
 
-    ``fresh_share`` is the share of the servo's ticks in which the device had a new sample, ``sample_age_s`` the age of
-    the newest sample when read (95th percentile). ``probe_s`` is the time to write a file to the disk of the results,
-    None if that failed for the reason ``probe_fault``; ``free_bytes`` is None if unknown. ``tick_s`` is the time of a
-    tick with the most expensive scene of the study, None if not measured; ``key_hash`` is the hash of the study's
-    sealed key, None before its first session. ``lateness_ns`` (n,) is the lateness of every tick [ns], ``grant`` the
-    priority that the system grants the servo's thread. ``dynamics`` are the device's, with its measured delay,
-    ``delay_ticks`` is the delay that the servo uses now. ``withheld`` is the share of the force that limits and
-    passivity controller are expected to withhold in the fastest stroke of a task, by liquid; None if it was not
+    ``fresh_share`` is the proportion of the servo's ticks in which the device had a new sample, ``sample_age_s`` the
+    age of the newest sample when read (95th percentile). ``probe_s`` is the time to write a file to the disk of the
+    results, None if that failed for the reason ``probe_fault``; ``free_bytes`` is None if unknown. ``tick_s`` is the
+    time of a tick with the most expensive scene of the study, None if not measured; ``key_hash`` is the hash of the
+    study's sealed key, None before its first session. ``lateness_ns`` (n,) is the lateness of every tick [ns],
+    ``grant`` the priority that the system grants the servo's thread. ``dynamics`` are the device's, with its measured
+    delay, ``delay_ticks`` is the delay that the servo uses now. ``withheld`` is the proportion of the force that limits
+    and passivity controller are expected to withhold in the fastest stroke of a task, by liquid; None if it was not
     computed. ``delivery`` is the predicted loss of a simulated participant, None if it was not computed.
     ``velocity_errors`` are the relative error of the velocity, and the error that it would have if all device dynamics
     were known; None if all are known. ``outlets`` are the streams and ports to other programs; ``video`` is the state
@@ -144,8 +144,8 @@ class Measurements:
 class Check:
     """One result of the pre-flight: the verdict, the value, and an explanation.
 
-    ``share`` is the measured value as a share of its limit, None without a limit. ``advice`` is a sentence with the
-    remedy or, for a failure, the reason why no session can begin.
+    ``share`` is the measured value as a proportion of its limit, None without a limit. ``advice`` is a sentence with
+    the remedy or, for a failure, the reason why no session can begin.
     """
 
     name: str
@@ -199,10 +199,10 @@ def _warning_unless(
 
 def _servo_checks(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
     """Yield the checks of the device's response, its force delay and the servo's rate."""
-    share = f"{100 * facts.fresh_share:.0f} %"
-    about = f"{facts.device} sends a new sample in {share} of the ticks"
+    proportion = f"{100 * facts.fresh_share:.0f} %"
+    about = f"{facts.device} sends a new sample in {proportion} of the ticks"
     if facts.timing.ticks == 0 or facts.fresh_share < _MIN_FRESH_SHARE:
-        advice = f"{facts.device} sends a new sample in only {share} of the ticks: check its cable and power"
+        advice = f"{facts.device} sends a new sample in only {proportion} of the ticks: check its cable and power"
         yield Check("Device", "failure", "not responding", about=about, advice=advice)
     else:
         yield Check("Device", "ok", "responding", about=about)
@@ -277,10 +277,10 @@ def _screen_and_disk_checks(facts: Measurements, protocol: Protocol) -> Iterator
     """Yield the checks of screen, disk, key and videos."""
     limit_ms, screen = protocol.limits.delay_error_ms, facts.screen
     delay_ms = (facts.sample_age_s + 1 / max(screen.refresh_hz, 1.0)) * 1e3  # the age of a sample plus one frame
-    about, share = f"in addition to the requested delay (limit: {limit_ms:g} ms)", delay_ms / limit_ms
+    about, proportion = f"in addition to the requested delay (limit: {limit_ms:g} ms)", delay_ms / limit_ms
     advice = "Trials would be invalid: use a screen with a higher refresh rate."
     yield _warning_unless(
-        "Visual delay", f"up to {delay_ms:.1f} ms", about, advice, passed=delay_ms <= limit_ms, share=share
+        "Visual delay", f"up to {delay_ms:.1f} ms", about, advice, passed=delay_ms <= limit_ms, share=proportion
     )
 
     value, about = f"{screen.refresh_hz:.1f} Hz, {100 * screen.scaling:.0f} %", "refresh rate and scaling of the "
@@ -353,13 +353,13 @@ def _outlet_checks(facts: Measurements, _protocol: Protocol) -> Iterator[Check]:
 def _cost_checks(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
     """Yield the checks of computing time, unknown properties of the device, withheld force, and the row of a square."""
     if facts.tick_s is not None:
-        share = facts.tick_s * protocol.device.rate_hz
+        proportion = facts.tick_s * protocol.device.rate_hz
         value, about = (
             f"{facts.tick_s * 1e9:.0f} ns per tick",
-            f"the most demanding scene uses {100 * share:.2g} % of each tick",
+            f"the most demanding scene uses {100 * proportion:.2g} % of each tick",
         )
-        advice, passed = "Remove an effect from the scene.", share <= _MAX_TICK_SHARE
-        yield _warning_unless("Scene cost", value, about, advice, passed=passed, share=share)
+        advice, passed = "Remove an effect from the scene.", proportion <= _MAX_TICK_SHARE
+        yield _warning_unless("Scene cost", value, about, advice, passed=passed, share=proportion)
 
     if facts.velocity_errors and facts.dynamics.unknown and descriptor_of(facts.device).kind == "felt":
         current_percent, known_percent = (100 * error for error in facts.velocity_errors)
@@ -380,9 +380,11 @@ def _cost_checks(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
             about += ": " + ", ".join(
                 f"{name} {100 * share_withheld:.1f} %" for name, share_withheld in sorted(facts.withheld.items())
             )
-        share, value = most_percent / limit_percent, f"at most {most_percent:.1f} %"
+        proportion, value = most_percent / limit_percent, f"at most {most_percent:.1f} %"
         advice = "Trials with such strokes would be invalid."
-        yield _warning_unless("Force withheld", value, about, advice, passed=most_percent <= limit_percent, share=share)
+        yield _warning_unless(
+            "Force withheld", value, about, advice, passed=most_percent <= limit_percent, share=proportion
+        )
 
     if facts.delivery is not None and facts.delivery.asked + facts.delivery.judged:
         lost = facts.delivery.missing + facts.delivery.out

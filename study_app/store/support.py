@@ -39,13 +39,13 @@ These files do not contain participant IDs, answers, liquid parameters or keys.
 """
 
 
-def write_support(path: Path, diagnosis: str = "") -> None:
-    """Write the zip to ``path``, whole or not at all; ``diagnosis`` is the report on a device.
+def write_support_archive(path: Path, diagnosis: str = "") -> None:
+    """Write the support archive (zip) to ``path`` atomically; ``diagnosis`` is the text of a device's diagnosis.
 
     Raises
     ------
     StoreError
-        It cannot be written.
+        The archive cannot be written.
     """
     content = io.BytesIO()
     with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as archive:

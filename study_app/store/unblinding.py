@@ -15,7 +15,7 @@ from typing import Final
 
 from study_app.errors import StoreError, as_argument
 from study_app.protocol.blocks import block_titles
-from study_app.protocol.model import quoted_title
+from study_app.protocol.quantities import quoted_title
 from study_app.store import receipt
 from study_app.store.blinded.blinding import (
     Codes,

@@ -103,7 +103,10 @@ class SimulatedParticipant(ABC):
 
     @abstractmethod
     def _perceived_features(self, trial: int | None) -> TrialFeatures:
-        """Return the features of a trial's last presentation; those of no trial for a form."""
+        """Return the features perceived in the trial's last presentation.
+
+        For a form, ``trial`` is None and the features do not matter: those of the last trial or none.
+        """
 
     @abstractmethod
     def _sensed_magnitudes(self, block: Block) -> Mapping[int, Sequence[float]]:

@@ -40,9 +40,9 @@ def predicted_delivery(protocol: Protocol, delay_ticks: int) -> PredictedDeliver
     """
     with _late_rig(protocol, delay_ticks) as rig:
         failing_scenes = _FailingScenes(protocol, rig)
-        shares = {block.id: _lost_fraction(protocol, block, failing_scenes) for block in protocol.main_blocks}
+        proportions = {block.id: _lost_fraction(protocol, block, failing_scenes) for block in protocol.main_blocks}
     return max(
-        (_predict_session(variant.protocol, shares) for variant in variants(protocol)),
+        (_predict_session(variant.protocol, proportions) for variant in variants(protocol)),
         key=lambda prediction: (prediction.missing, prediction.out),
     )
 
@@ -77,7 +77,7 @@ def _late_rig(protocol: Protocol, delay_ticks: int) -> Rig:
 def _withheld_shares(
     rig: Rig, scene: Scene, task: AnyTask, workspace_m: tuple[float, float, float]
 ) -> tuple[float, ...]:
-    """Return the share of a scene's force that is withheld in each of `_MOTIONS` simulated motions of a task.
+    """Return the proportion of a scene's force that is withheld in each of `_MOTIONS` simulated motions of a task.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ def _withheld_shares(
     """
     servo, hand = rig.servo, hand_of(rig.device)
     assert hand is not None  # noqa: S101 - a scripted device has one
-    reader, shares = servo.telemetry.reader(), list[float]()
+    reader, proportions = servo.telemetry.reader(), list[float]()
     for seed in range(_MOTIONS):
         path_s, path_m = task_path(task, workspace_m, min(task.expected_s, _MAX_TASK_S), seed)
         hand.reach_to(*path_m[0].tolist())
@@ -108,8 +108,8 @@ def _withheld_shares(
             permitted_n += float(in_liquid["permitted_n"].sum())
             withheld_n += float(in_liquid["withheld_n"].sum())
         servo.rest()
-        shares.append(withheld_n / permitted_n if permitted_n > 0.0 else 0.0)
-    return tuple(shares)
+        proportions.append(withheld_n / permitted_n if permitted_n > 0.0 else 0.0)
+    return tuple(proportions)
 
 
 class _FailingScenes:
@@ -124,8 +124,8 @@ class _FailingScenes:
         if (cached := self._known.get((scene, task))) is not None:
             return cached
         protocol, limit = self._protocol, self._protocol.limits.withheld_percent / 100
-        shares = _withheld_shares(self._rig, scene, protocol.tasks[task], protocol.device.workspace_m)
-        self._known[scene, task] = mean(share > limit for share in shares)
+        proportions = _withheld_shares(self._rig, scene, protocol.tasks[task], protocol.device.workspace_m)
+        self._known[scene, task] = mean(proportion > limit for proportion in proportions)
         return self._known[scene, task]
 
 
@@ -144,7 +144,7 @@ def _lost_fraction(protocol: Protocol, block: Block, scenes: _FailingScenes) -> 
             prod(1 - (comparison if is_comparison else standard) for is_comparison in arrangement)
             for arrangement in design.arrangements
         ]
-        return mean((1 - share) ** attempts for share in delivered)
+        return mean((1 - proportion) ** attempts for proportion in delivered)
 
     if block.standard is None:
         return mean(missing(0.0, failing_fraction(scene)) for scene in _extreme_scenes(protocol, block))

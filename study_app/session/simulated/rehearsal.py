@@ -520,9 +520,7 @@ def rehearse(
     folder = rehearsal_folder(workspace().results, study.study.name) if results is None else Path(results)
     check_study(StudyFolder(folder), study.study.name)
     participant_ids = [f"P{number:03d}" for number in range(1, participants + 1)]
-    ids_in_use = used_ids(StudyFolder(folder))
-    for participant in participant_ids:
-        ids_in_use.check_unused(participant, 1)
+    used_ids(StudyFolder(folder)).check_rehearsal(participant_ids)
     for participant, participant_group in simulated_groups(StudyFolder(folder), study, participant_ids, group).items():
         label = participant if participant_group is None else f"{participant} (group {participant_group})"
         lines: list[str] = []

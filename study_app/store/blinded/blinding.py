@@ -340,7 +340,7 @@ def _check_content(content: dict[str, Any]) -> None:
         or not all(map(_is_text_mapping, content["codes"].values()))
         or not isinstance(content["tables"]["liquids"], dict)
         or not _is_text_mapping(content.get("files", {}))
-        or not all(type(share) is int and share > 0 for share in content.get("groups", {}).values())
+        or not all(type(proportion) is int and proportion > 0 for proportion in content.get("groups", {}).values())
         or not all(isinstance(condition["delay_ms"], int | float) for condition in conditions)
     ):
         raise ValueError("its codes or conditions are invalid")

@@ -347,9 +347,8 @@ def refuse_special_files(path: Path) -> None:
 
 def cannot_read(path: Path, error: OSError) -> StoreError:
     """Return a one-line error that names ``path``, the system's reason and the remedies."""
-    return StoreError(
-        f"{path} cannot be read ({system_message(error)}): correct its permissions, or restore it from a backup"
-    )
+    remedy = "" if isinstance(error, FileNotFoundError) else "correct its permissions, or "
+    return StoreError(f"{path} cannot be read ({system_message(error)}): {remedy}restore it from a backup")
 
 
 def open_regular(path: Path, *, largest_bytes: float = _MAX_FILE_BYTES) -> BufferedReader:

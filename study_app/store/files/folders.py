@@ -96,7 +96,7 @@ class StudyFolder:
     fingerprints = _FixedPath(FINGERPRINTS)
     """The fingerprint of every session that ended."""
     withdrawals = _FixedPath("withdrawals.jsonl")
-    """A tombstone for each participant whose data were erased."""
+    """A record for each participant whose data were erased."""
     preregistration = _FixedPath(PREREGISTRATION)
     """The plan of the study, if it was preregistered."""
     blinding = _FixedPath("blinding")

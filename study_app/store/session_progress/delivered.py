@@ -280,7 +280,7 @@ def broken_interval_limits(
 ) -> Iterator[str]:
     """Yield the key of each limit in the study's file that an interval violates.
 
-    For an ``adjusted`` interval the sent share of the force is compared with 1, whichever quantity is varied.
+    For an ``adjusted`` interval the sent proportion of the force is compared with 1, whichever quantity is varied.
     """
     max_error_percent = limits.level_error_percent
     if presented.vary is not None and presented.vary not in OF_CONDITION and max_error_percent is not None:

@@ -3,7 +3,7 @@
 import contextlib
 import re
 import shutil
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -324,6 +324,17 @@ class UsedIds:
             )
         if (participant, number) in self.held:
             raise self.refusal(participant, number)
+
+    def check_rehearsal(self, participants: Sequence[str]) -> None:
+        """Raise StoreError if a session or withdrawal has the ID of one of a rehearsal's ``participants``."""
+        used = {participant.lower() for participant in (*(held for held, _ in self.held), *self.withdrawn)}
+        if taken := [participant for participant in participants if participant.lower() in used]:
+            several = len(participants) > 1
+            ids = f"IDs {participants[0]} to {participants[-1]}" if several else f"ID {taken[0]}"
+            raise StoreError(
+                f"{self.path} already contains participant {taken[0]}, and the rehearsal uses the {ids}: specify a new "
+                "folder with --results, or delete this one if it contains only rehearsals; nothing was changed"
+            )
 
     def refusal(self, participant: str, number: int) -> StoreError:
         """Return the error for a used id, with the three possible remedies."""

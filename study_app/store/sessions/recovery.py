@@ -57,6 +57,7 @@ from study_app.store.tables.study_files import (
     update_participants,
     write_description,
     write_participants,
+    write_study_files,
 )
 
 RESTORE = "restore the journal from a backup"
@@ -65,17 +66,19 @@ _MAX_GAP_S = 366 * 86400.0
 """Longest plausible gap [s]: beyond it the wall clock was or is wrong."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Rebuilt:
     """The result of `rebuild_session`.
 
     ``rewritten`` files were missing or differed from the journal, ``swept`` were temporary files of a killed program;
-    ``torn_bytes`` at the journal's end are an incomplete line, and were not changed.
+    ``torn_bytes`` at the journal's end are an incomplete line, and were not changed. ``lost`` files are missing, and
+    the journal does not contain their contents.
     """
 
     rewritten: tuple[Path, ...]
     swept: tuple[Path, ...]
     torn_bytes: int
+    lost: tuple[Path, ...]
 
 
 def reopen_store(
@@ -206,8 +209,9 @@ def rebuild_session(session_folder: Path) -> Rebuilt:
     """Recreate the files derived from a session's journal.
 
     These are its tables, the study's table of participants, the receipt's status and the checksums and fingerprint of a
-    finished session. Correct files are not changed. Recreated checksums or fingerprints are noted permanently in
-    ``rebuilt.txt``: they prove nothing about earlier changes.
+    finished session; a missing description of the study is recreated from a receipt. Correct files are not changed.
+    Recreated checksums or fingerprints are noted permanently in ``rebuilt.txt``: they prove nothing about earlier
+    changes.
 
     Raises
     ------
@@ -233,10 +237,14 @@ def rebuild_session(session_folder: Path) -> Rebuilt:
         rewritten += _update_receipt(folder, contents.lines)
         write_participants(study_folder, place.study)
         rewritten += [table] if _read_if_file(table) != before else []
+        if not is_there(study_folder.description):
+            write_study_files(study_folder)
+            rewritten += [study_folder.description] if is_there(study_folder.description) else []
         ended = isinstance(contents.lines[-1], events.SessionEnded)
         if ended:
             rewritten += _update_proofs(place, contents.lines, rewritten)
-        return Rebuilt(tuple(rewritten), swept, contents.torn_bytes)
+        lost = () if is_there(folder.receipt) else (folder.receipt,)
+        return Rebuilt(rewritten=tuple(rewritten), swept=swept, torn_bytes=contents.torn_bytes, lost=lost)
 
 
 def _refuse_truncated_journal(place: Place, lines: Sequence[events.Event]) -> None:

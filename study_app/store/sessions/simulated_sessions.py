@@ -74,10 +74,9 @@ class SimulatedStudy:
     ) -> None:
         self.folder = StudyFolder(Path(results))
         check_study(self.folder, protocol.study.name)
-        used = used_ids(self.folder)
         for participant in participants:
             check_participant(participant)
-            used.check_unused(participant, 1)
+        used_ids(self.folder).check_rehearsal(participants)
         make_folder(self.folder.path)
         self.key = open_or_draw_key(
             self.folder.path, protocol, stream(seed, "blinding").random, StudySource.split(source).liquids

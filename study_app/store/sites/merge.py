@@ -33,7 +33,7 @@ from study_app.store.files.atomic import (
     temporary_path,
     write_file,
 )
-from study_app.store.files.folders import ID_PATTERN, ReportProgress, StudyFolder
+from study_app.store.files.folders import ID_PATTERN, ReportProgress, SessionFolder, StudyFolder
 from study_app.store.integrity.checksums import is_system_file
 from study_app.store.integrity.folder_lock import (
     create_locked_folder,
@@ -42,6 +42,8 @@ from study_app.store.integrity.folder_lock import (
     lock_folder,
     refuse_if_open,
 )
+from study_app.store.journals import journal
+from study_app.store.journals.journal_events import start_of
 from study_app.store.merged import FOLDER, Merged, Site, merged_above, read_merged
 from study_app.store.tables.study_files import described_study, row_of
 from study_app.store.withdrawals import describe_session, tombstones
@@ -182,8 +184,8 @@ def _read_source(name: str, path: Path) -> _Source:
     sessions = [session for session in study.sessions() if not is_never_begun(session.path)]
     for session in sessions:
         refuse_if_open(session.path)
-    receipts = [receipt.read(session.receipt) for session in sessions]
-    hashes = dict.fromkeys(str(session_receipt["protocol_hash"]) for session_receipt in receipts)
+    kinds = [_session_protocol(session) for session in sessions]
+    hashes = dict.fromkeys(protocol_hash for protocol_hash, _ in kinds)
     if len(hashes) > 1:
         raise StoreError(
             f"site {name}: sessions in {path} used {len(hashes)} different protocols (SHA-256 {', '.join(hashes)}): "
@@ -195,11 +197,24 @@ def _read_source(name: str, path: Path) -> _Source:
         state=state,
         study=study_name,
         protocol_hash=next(iter(hashes), ""),
-        pilot=any(session_receipt["pilot"] for session_receipt in receipts) if receipts else None,
+        pilot=any(pilot for _, pilot in kinds) if kinds else None,
         key=verified_key(study),
         withdrawals=len(tombstones(study)),
         begun={describe_session(session).begun or str(session.path): session.path for session in sessions},
     )
+
+
+def _session_protocol(session: SessionFolder) -> tuple[str, bool]:
+    """Return the hash of a session's protocol, and whether it is a pilot: of the receipt, or else of the journal."""
+    try:
+        session_receipt = receipt.read(session.receipt)
+        return str(session_receipt["protocol_hash"]), bool(session_receipt["pilot"])
+    except StoreError:
+        lines = journal.scan(session.journal).lines if is_there(session.journal) else []
+        if not lines:
+            raise
+        start = start_of(lines)
+        return start.protocol_hash, start.pilot
 
 
 def _check_same_protocol(sources: tuple[_Source, ...], protocol_hash: str) -> None:

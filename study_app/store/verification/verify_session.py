@@ -623,11 +623,12 @@ def _check_facts(
 
 @dataclass(frozen=True, slots=True)
 class Discrepancy:
-    """A file that differs from what was recorded, with the remedy."""
+    """A file that differs from what was recorded, with the remedy; ``used`` shows whether it is still analysed."""
 
     path: Path
     what: str
     remedy: str
+    used: bool = True
 
     def __str__(self) -> str:
         return f"{self.path} {self.what}: {self.remedy}"

@@ -28,7 +28,7 @@ from study_app.store.blinded.blinding import Key, complete_protocol, open_events
 from study_app.store.files import csv_files
 from study_app.store.files.atomic import is_there, read_own, read_regular, temporary_files
 from study_app.store.files.columns import EXCLUSIONS
-from study_app.store.files.folders import StudyFolder
+from study_app.store.files.folders import StudyFolder, check_study_name
 from study_app.store.integrity.checksums import Proofs, checked_line, place_of, read_list, unreadable_lines
 from study_app.store.integrity.folder_lock import is_open
 from study_app.store.journals import journal
@@ -108,7 +108,7 @@ def _proof_of_site(proof: Proof, prefix: str) -> Proof:
 def _verify_study(folder: Path, copy: tuple[Path, Proof] | None, findings: Findings) -> Sessions:
     study = StudyFolder(folder)
     name = described_study(study)
-    if name is None:
+    if name is None and (name := _recorded_study(study)) is None:
         raise StoreError(
             f"{folder} is not a study folder ({study.description.name} is missing): specify one such as results/rek2024"
         )
@@ -393,6 +393,9 @@ def _compare_proofs(
 
 def _check_description(study: StudyFolder, findings: Findings) -> None:
     """Compare the description with the one that this version writes for the study in one of the receipts."""
+    if not is_there(study.description):
+        findings.error(study.description, "is missing; the rebuild command creates it")
+        return
     current = read_own(study.description, study.path)
     opened = bool(blinding.reveals(study.path))
     sealed = not (opened or has_sealed_columns(current))
@@ -415,6 +418,14 @@ def _check_description(study: StudyFolder, findings: Findings) -> None:
         )
     else:
         findings.error(study.description, "does not match the study in the receipts")
+
+
+def _recorded_study(study: StudyFolder) -> str | None:
+    """Return the name of the study in one of the receipts; None if no receipt contains one."""
+    for protocol in _published_protocols(study):
+        with contextlib.suppress(KeyError, TypeError, ValueError):  # reported for the receipt
+            return check_study_name(protocol["study"]["name"])
+    return None
 
 
 def _published_protocols(study: StudyFolder) -> Iterator[dict[str, Any]]:
