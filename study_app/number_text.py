@@ -139,22 +139,24 @@ def duration_figure(seconds: float) -> tuple[str, str]:
 
 def exact_duration(least_s: float, most_s: float) -> str:
     """Return durations of the file in its notation: "20 to 90 s", "2.5 s"; whole minutes as "2 min"."""
-    (least, least_unit), (most, unit) = (
+    (minimum, least_unit), (maximum, unit) = (
         (f"{one / 60:g}", "min") if one and one % 60 == most_s % 60 == 0 else (f"{one:.12g}", "s")
         for one in (least_s, most_s)
     )
     if least_s == most_s:
-        return f"{most} {unit}"
-    return f"{least} to {most} {unit}" if least_unit == unit else f"{least} {least_unit} to {most} {unit}"
+        return f"{maximum} {unit}"
+    return f"{minimum} to {maximum} {unit}" if least_unit == unit else f"{minimum} {least_unit} to {maximum} {unit}"
 
 
 def duration_range(least_s: float, most_s: float) -> str:
     """Return "15 to 32 min", "55 min to 1 h 10 min", or one duration if both read the same."""
-    least, most = duration(least_s), duration(most_s)
-    if least == most:
-        return most
+    minimum, maximum = duration(least_s), duration(most_s)
+    if minimum == maximum:
+        return maximum
     number, unit = duration_figure(least_s)
-    return f"{number} to {most}" if most.endswith(f" {unit}") and " h " not in most else f"{least} to {most}"
+    return (
+        f"{number} to {maximum}" if maximum.endswith(f" {unit}") and " h " not in maximum else f"{minimum} to {maximum}"
+    )
 
 
 def grouped(number: int) -> str:
@@ -162,7 +164,7 @@ def grouped(number: int) -> str:
     return f"{number:,}".replace(",", THIN_SPACE)
 
 
-def duration_words(seconds: float) -> str:
+def duration_text(seconds: float) -> str:
     """Return a short time with a suitable unit: "62 µs", "1.4 ms"."""
     micros = seconds * 1e6
     return f"{micros:.0f} µs" if micros < 1000 else f"{micros / 1000:.2g} ms"

@@ -382,8 +382,8 @@ class DesignerHeader(QWidget):
                 self.study.clear()
                 for study in state.studies:
                     self.study.add_study(study, opened=study.source == state.chosen)
-                self.study.addItem("New study …", NEW)
-                self.study.addItem("Open file …", OPEN)
+                self.study.addItem("New study…", NEW)
+                self.study.addItem("Open file…", OPEN)
                 self.study.setCurrentIndex(self.study.findData(state.chosen) if state.chosen else -1)
         is_open = bool(state.chosen)
         for part in (self.problems, self.undo, self.redo, self.play, self.save):

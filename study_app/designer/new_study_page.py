@@ -680,7 +680,7 @@ class NoStudyCard(Card):
 
     def __init__(self) -> None:
         super().__init__(padding=28, gap=12)
-        self.new = ActionButton("plus", "New study …", cap=key_cap("new"), role="primary")
+        self.new = ActionButton("plus", "New study…", cap=key_cap("new"), role="primary")
         self.new.setAccessibleName(command_tip("new"))
         self.new.setToolTip(command_tip("new"))
         parts = (
@@ -778,7 +778,7 @@ class NewStudyPage(Themed, QWidget):
         self.back = IconButton("chevron_left", "Back", role="plain")
         self.back.clicked.connect(self.given_up)
         aside = cut_text("Choose what you want to find out. You can change everything later.", "label", "text2")
-        self.file = ActionButton("file", "From a file …")
+        self.file = ActionButton("file", "From a file…")
         self.file.clicked.connect(self._open_file)
         parts = (self.back, label("New study", "title"), (aside, 1), self.file)
         head = hbox(*parts, spacing=12, margins=(SHADOW, 0, SHADOW, 0))

@@ -86,7 +86,7 @@ class DeleteCard(Prompt):
         self.gaps = ActionButton("", "Leave gaps", height=40)
         self.gaps.clicked.connect(lambda: self.answered.emit(DeleteElement(path, "gaps")))
         self.other = make_dense(Choice(), "Use a different one instead", 40)
-        self.other.setPlaceholderText("Use another …")
+        self.other.setPlaceholderText("Use another…")
         self.other.setMinimumWidth(180)
         for name in names(document, str(path[0])) if len(path) == 2 else ():
             if name != path[1]:

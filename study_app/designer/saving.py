@@ -297,7 +297,7 @@ class Saving(QObject):
 def _banner_notice(opened: Document) -> Notice | None:
     """Return the notice on a study that is read-only, or whose file another program changed; otherwise None."""
     if opened.read_only:
-        return Notice(opened.read_only, (("copy", "Make a copy …"),))
+        return Notice(opened.read_only, (("copy", "Make a copy…"),))
     try:
         changed = opened.changed_outside()
     except StudyError as error:

@@ -47,7 +47,7 @@ def version_chip(standing: Standing, known: Iterable[Run]) -> VersionChip:
     """Return the version chip of a study; ``known`` are the versions that were run."""
     known = tuple(known)
     tip = "\n".join(f"Version {run.version}: {run_counts(run)}" for run in known)
-    save = f"Save {standing.version} …" if standing.needs_confirmation else "Save"
+    save = f"Save {standing.version}…" if standing.needs_confirmation else "Save"
     if not standing.last_version:
         text = "Piloted" if any(run.pilots for run in known) else "Rehearsed" if known else "Not yet run"
         return VersionChip(

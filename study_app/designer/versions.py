@@ -183,7 +183,7 @@ class SaveCard(Prompt):
         self.name.setPlaceholderText("lowercase letters and digits")
         self.refusal = label("", "label", "bad", wraps=True)
         self.changes = ActionButton("", "Show in Changes", role="plain", height=40)
-        self.another = ActionButton("copy", "Save as another study …", height=40)
+        self.another = ActionButton("copy", "Save as another study…", height=40)
         self.save = ActionButton("save", "", role="primary", height=40)
         self._of_version = label("Version", "label")
         self._of_name = label("Short name", "label")

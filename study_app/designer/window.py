@@ -151,7 +151,7 @@ OUTLINE_PX, DRAWER_PX = 284, 320
 DRAWER_BELOW, ONE_PANE_BELOW = 1400, 1130
 _GAP = 14 - 2 * SHADOW
 _FORM_SHARE = 44
-"""Share of the width that the form takes beside the pane [%]."""
+"""Proportion of the width that the form takes beside the pane [%]."""
 
 
 class _PathStep(PressedByEnter):

@@ -36,7 +36,7 @@ LEAVE_S: Final = 0.5  # a read or a write takes a few milliseconds at most
 _SILENT_NS: Final = 40_000_000  # after 50 ms without a new position the servo ends the force
 SECONDS: Final = 3.0
 _LEAST_HZ: Final = 900.0
-_MOVE: Final = "Hold the handle and move it a little …"
+_MOVE: Final = "Hold the handle and move it a little…"
 _CHUNK_S = 0.25
 
 COMMON: Final[list[tuple[Any, ...]]] = [

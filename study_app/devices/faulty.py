@@ -45,7 +45,7 @@ FAULTS = np.dtype(
         ("write", np.intp),
         ("clock", np.intp),
         # permitted faults, written by the host
-        ("share", np.float64, (len(KINDS),)),  # share of each kind of fault; all 0: no faults
+        ("share", np.float64, (len(KINDS),)),  # fraction of each kind of fault; all 0: no faults
         ("least", np.int64, (len(KINDS),)),  # least and greatest number of readings of a fault
         ("most", np.int64, (len(KINDS),)),
         ("gap", np.int64, (2,)),  # least and greatest number of sound readings between two faults
@@ -104,13 +104,13 @@ class FaultyDevice:
     def allow(self, faults: dict[int, tuple[float, int, int]], gap: tuple[int, int]) -> None:
         """Permit these kinds of faults from the next one on.
 
-        ``faults`` gives for each kind its share of all faults, and its least and greatest number of readings. ``gap``
-        is the least and greatest number of sound readings between two faults.
+        ``faults`` gives for each kind its fraction of all faults, and its least and greatest number of readings.
+        ``gap`` is the least and greatest number of sound readings between two faults.
         """
         state = self.state
         state.share = 0.0
-        for kind, (share, least, most) in faults.items():
-            state.share[kind], state.least[kind], state.most[kind] = share, least, most
+        for kind, (proportion, minimum, maximum) in faults.items():
+            state.share[kind], state.least[kind], state.most[kind] = proportion, minimum, maximum
         if not self.jumps:
             state.share[JUMP] = 0.0
         state.gap = gap

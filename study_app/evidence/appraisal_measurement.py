@@ -67,7 +67,7 @@ def errors(scene: Scene) -> Errors:
             for name, parameters in _MOTIONS
         ]
         force_n = max(newtons for _, newtons in differences)
-        wake = max(share for share, _ in differences) if "wake" in compared_effects else None
+        wake = max(proportion for proportion, _ in differences) if "wake" in compared_effects else None
     left_out = tuple(effect for effect in liquid.effects if effect not in compared_effects)
     return Errors(wake=wake, force_n=force_n, lag_s=_filter_lag_s(scene), left_out=left_out)
 
@@ -118,8 +118,8 @@ def _largest_differences(scene: Scene, motion: Motion) -> tuple[float, float]:
     force_n = np.column_stack([table[f"f{axis}_n"] for axis in "xyz"])
     largest_mps = float(reference.size_mps.max())
     difference_mps = float(np.linalg.norm(wake_mps - reference.wake_mps, axis=1).max())
-    share = difference_mps / largest_mps if largest_mps > 0 else 0.0
-    return share, float(np.linalg.norm(force_n - reference.force_n, axis=1).max())
+    proportion = difference_mps / largest_mps if largest_mps > 0 else 0.0
+    return proportion, float(np.linalg.norm(force_n - reference.force_n, axis=1).max())
 
 
 def withheld_share(scene: Scene, stroke: Stroke, dynamics: Dynamics) -> float:
@@ -150,6 +150,6 @@ def appraise(question: Question | DeliveryQuestion, send: Send, stop: Stop) -> E
     if stop():
         return None
     stroke = question.stroke
-    share = withheld_share(question.scene, stroke, question.dynamics) if stroke is not None else None
+    proportion = withheld_share(question.scene, stroke, question.dynamics) if stroke is not None else None
     velocity = velocity_errors(question.scene, question.dynamics) if question.dynamics.unknown else None
-    return replace(errors(question.scene), withheld=share, velocity=velocity)
+    return replace(errors(question.scene), withheld=proportion, velocity=velocity)

@@ -44,7 +44,7 @@ from study_app.lab.identify.measured_force import vectors_x
 from study_app.number_text import counted
 
 _SETTLED: Final = 2 / 3
-"""Share of the strokes after which the flow no longer depends on their start."""
+"""Proportion of the strokes after which the flow no longer depends on their start."""
 
 
 class Causes(NamedTuple):
@@ -76,27 +76,28 @@ class Expected(NamedTuple):
 
 def expected(scene: Scene, delay_ticks: int = ASSUMED_TICKS) -> Expected:
     """Measure a scene's cost and predict its error; with several liquids, the greatest error."""
-    share, error_n, causes, against = _scene_errors(resolve(scene), delay_ticks)
+    proportion, error_n, causes, against = _scene_errors(resolve(scene), delay_ticks)
     cost_ns = measure(scene).scene_ns
-    return Expected(cost_ns=cost_ns, error_share=share, error_n=error_n, causes=causes, against=against)
+    return Expected(cost_ns=cost_ns, error_share=proportion, error_n=error_n, causes=causes, against=against)
 
 
 def error_report(scene: Scene, delay_ticks: int = ASSUMED_TICKS) -> str:
     """Return the expected error on a device with a delay as one line of text."""
     error_share, error_n, causes, against = _scene_errors(resolve(scene), delay_ticks)
-    shares = (
-        f"{name} {f'{100 * share:.2g} %' if share > ROUNDING else 'none'}" for name, share in causes._asdict().items()
+    proportions = (
+        f"{name} {f'{100 * proportion:.2g} %' if proportion > ROUNDING else 'none'}"
+        for name, proportion in causes._asdict().items()
     )
     return (
         f"expected error in the fastest strokes with a delay of {counted(delay_ticks, 'tick')}: {error_n:.2g} N, "
-        f"{100 * error_share:.2g} % of the force; causes: {', '.join(shares)}; reference: {against}"
+        f"{100 * error_share:.2g} % of the force; causes: {', '.join(proportions)}; reference: {against}"
     )
 
 
 def acting_report(scene: Scene) -> str:
-    """Return, for each liquid, the share of each part of its force that acts on the hand after two and three ticks.
+    """Return, for each liquid, the proportion of each part of its force that acts on the hand after 2 and 3 ticks.
 
-    If ``kalman`` would have a smaller error than the scene's estimator, its shares are added.
+    If ``kalman`` would have a smaller error than the scene's estimator, its proportions are added.
     """
     lines: list[str] = []
     if scene.velocity.kind == "given":
@@ -128,7 +129,7 @@ def _acting_by_delay(scene: Scene, velocity: Velocity) -> dict[int, Acting]:
 def _acting_text(by_ticks: Mapping[int, Acting]) -> str:
     return "; ".join(
         f"with {ticks} ticks of delay, the hand receives "
-        f"{' and '.join(f'{share:.0f} % of the {part}' for part, share in acting.parts.items())} "
+        f"{' and '.join(f'{proportion:.0f} % of the {part}' for part, proportion in acting.parts.items())} "
         f"(error {acting.error:.2g} %)"
         for ticks, acting in by_ticks.items()
     )

@@ -160,12 +160,12 @@ def measured_drag_n(liquid: Liquid, diameter_m: float, speed_mps: Floats) -> Flo
     """
     reynolds_per_mps = liquid.density_kg_m3 * diameter_m / (liquid.viscosity_pa_s or math.nan)
     points = np.log(np.array(DRAG_POINTS))
-    least, most = DRAG_POINTS[0][0], DRAG_POINTS[-1][0]
+    minimum, maximum = DRAG_POINTS[0][0], DRAG_POINTS[-1][0]
     reynolds = speed_mps * reynolds_per_mps
-    clipped = np.clip(reynolds, least, most)
+    clipped = np.clip(reynolds, minimum, maximum)
     coefficient = np.exp(PchipInterpolator(points[:, 0], points[:, 1])(np.log(clipped)))
     pressure_kg_m = 0.5 * liquid.density_kg_m3 * math.pi * (diameter_m / 2) ** 2
-    force_n: Floats = pressure_kg_m * coefficient * speed_mps * np.maximum(speed_mps, least / reynolds_per_mps)
+    force_n: Floats = pressure_kg_m * coefficient * speed_mps * np.maximum(speed_mps, minimum / reynolds_per_mps)
     return force_n
 
 
@@ -247,7 +247,7 @@ RELATIVE: Final = 0.05
 PERCEPTIBLE_N: Final = 0.05
 """The accuracy target: max(5 % of the force, 0.05 N), below the smallest difference of force that people feel, 7 %."""
 ROUNDING: Final = 1e-9
-"""Errors below this share of the force are rounding errors, and count as equal."""
+"""Errors below this proportion of the force are rounding errors, and count as equal."""
 
 
 class Error(NamedTuple):
@@ -261,7 +261,7 @@ class Error(NamedTuple):
     rms: float
     most: float
     direction_deg: float
-    target: float  # max(5 %, 0.05 N) as a share of the true force
+    target: float  # max(5 %, 0.05 N) as a proportion of the true force
 
 
 def error_of(forces_n: Sequence[Floats], truth: Truth) -> Error:

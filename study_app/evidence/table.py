@@ -153,11 +153,11 @@ def paced_steps(
 ) -> Iterator[int]:
     """Yield 0, 1, 2 … for ``seconds``, with a pause after each, and report progress once per percent."""
     began_s, shown, number = time.perf_counter(), -1, 0
-    while (share := (time.perf_counter() - began_s) / seconds) < 1:
+    while (proportion := (time.perf_counter() - began_s) / seconds) < 1:
         if ending.is_set():
             raise KeyboardInterrupt
-        if int(100 * share) > shown:
-            shown = int(100 * share)
+        if int(100 * proportion) > shown:
+            shown = int(100 * proportion)
             progress(f"{shown:3} %")
         yield number
         number += 1

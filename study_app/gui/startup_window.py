@@ -17,7 +17,7 @@ from study_app.gui.widgets.labels import figures, label
 from study_app.number_text import clock_text
 
 LONG_AFTER_S = 4.0
-_STEP = "Preparing the device and the force model …"
+_STEP = "Preparing the device and the force model…"
 FIRST_TIME = (
     "The force model is being compiled. This happens once after each installation or update and takes about a minute."
 )

@@ -189,12 +189,12 @@ def _displayed_parameter(scene: Scene, name: str) -> Parameter:
         row = dataclasses.replace(row, name=name, label=f"{row.label} {axis[0]}")
     value = value_of(scene, name)
     default = value if default is None else default
-    least, most = _lab_range(scene, table, field, row)
+    minimum, maximum = _lab_range(scene, table, field, row)
     known = [float(number) for number in (value, default) if isinstance(number, int | float)]
     return dataclasses.replace(
         row,
-        least=min([least, *known]),
-        most=max([most, *known]),
+        least=min([minimum, *known]),
+        most=max([maximum, *known]),
         default=default if default is None else float(default),
         shown_unit=row.shown_unit or row.unit,
     )
@@ -217,13 +217,13 @@ def _default_value(scene: Scene, table: str, field: str, row: Parameter) -> Any:
 
 def _lab_range(scene: Scene, table: str, field: str, row: Parameter) -> tuple[float, float]:
     """Return the lab's range, which is the model's where the lab does not define one."""
-    least, most = row.least, row.most
+    minimum, maximum = row.least, row.most
     for bound in _model_of(scene, table).model_fields[field].metadata:
         if row.least == LEAST and getattr(bound, "ge", None) is not None:
-            least = float(bound.ge)
+            minimum = float(bound.ge)
         if row.most == MOST and getattr(bound, "le", None) is not None:
-            most = float(bound.le)
-    return least, most
+            maximum = float(bound.le)
+    return minimum, maximum
 
 
 _HALF_REACH_M: Final = 0.05

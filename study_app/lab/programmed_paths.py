@@ -18,7 +18,7 @@ TITLES: Final = {
     "zigzag": "Turns of 90°",
     "reach": "Back-and-forth reaches",
 }
-REACHED: Final = 0.85  # maximum share of the workspace that a path fills
+REACHED: Final = 0.85  # maximum proportion of the workspace that a path fills
 _APPROACH_MPS: Final = 0.08
 _SHORTEST_APPROACH_S: Final = 0.5
 _REST_S: Final = 2.0
@@ -62,7 +62,7 @@ def lead_to_path(motion: Motion, from_m: Any) -> Motion:
     distance_m = motion.position_m[0] - np.asarray(from_m, np.float64)
     approach_s = max(float(np.linalg.norm(distance_m)) / _APPROACH_MPS, _SHORTEST_APPROACH_S)
     t_s = np.arange(round(approach_s * _RATE_HZ)) / _RATE_HZ
-    share = (t_s / approach_s)[:, np.newaxis]
-    smooth = share**3 * (10 - 15 * share + 6 * share**2)  # minimum jerk: at rest at both ends
+    proportion = (t_s / approach_s)[:, np.newaxis]
+    smooth = proportion**3 * (10 - 15 * proportion + 6 * proportion**2)  # minimum jerk: at rest at both ends
     position_m = np.concatenate([from_m + smooth * distance_m, motion.position_m])
     return Motion(np.concatenate([t_s, motion.t_s + len(t_s) / _RATE_HZ]), position_m)

@@ -176,7 +176,7 @@ def _compute(expected: Mapping[str, str], fn: Callable[..., _T], args: tuple[Any
     if differing:
         raise WorkerError(
             f"the worker on {socket.gethostname()} has {differing}: install the same versions on every worker, because "
-            "results could differ"
+            "results could otherwise differ"
         )
     return _run_case(fn, args, kwargs)
 

@@ -1,4 +1,4 @@
-"""The client of a worker process, which sends orders and receives answers without ever waiting for the process."""
+"""The client of a worker process, which sends requests and receives replies without ever waiting for the process."""
 
 import threading
 from contextlib import suppress
@@ -6,25 +6,25 @@ from multiprocessing.connection import wait
 from multiprocessing.process import BaseProcess
 from typing import Final, Generic, TypeVar
 
-from study_app.workers.server import CONTEXT, Crashed, Refused, serve_orders
+from study_app.workers.server import CONTEXT, Crashed, Refused, serve_requests
 
 PATIENCE_S: Final = 3.0
 """How long a process may take to end before it is killed [s]."""
 
-_Order = TypeVar("_Order")
-_Answer = TypeVar("_Answer")
+_Request = TypeVar("_Request")
+_Reply = TypeVar("_Reply")
 
 
-class WorkerClient(Generic[_Order, _Answer]):
-    """A worker process that carries out orders, one after the other.
+class WorkerClient(Generic[_Request, _Reply]):
+    """A worker process that runs requests, one after the other.
 
-    A new order or `stop` asks the current one to stop early; the task decides whether to do so.
+    A new request or `stop` asks the current one to stop early; the task decides whether to do so.
 
     Parameters
     ----------
     task : str
-        The function that carries out an order (see `study_app.workers.server.Task`), as "package.module:function",
-        which only the process imports. Orders and answers are pickled.
+        The function that runs a request (see `study_app.workers.server.Task`), as "package.module:function",
+        which only the process imports. Requests and replies are pickled.
     background : bool
         Whether the process gets the lowest priority.
 
@@ -35,25 +35,25 @@ class WorkerClient(Generic[_Order, _Answer]):
     """
 
     def __init__(self, task: str, *, name: str, background: bool = False) -> None:
-        orders_end, self._orders = CONTEXT.Pipe(duplex=False)
-        self._answers, answers_end = CONTEXT.Pipe(duplex=False)
+        requests_end, self._requests = CONTEXT.Pipe(duplex=False)
+        self._replies, replies_end = CONTEXT.Pipe(duplex=False)
         self.process: BaseProcess = CONTEXT.Process(
-            target=serve_orders,
-            args=(orders_end, answers_end, task),
+            target=serve_requests,
+            args=(requests_end, replies_end, task),
             kwargs={"background": background},
             name=name,
             daemon=True,
         )
-        with orders_end, answers_end:
+        with requests_end, replies_end:
             self.process.start()
-        self._order_count = 0
-        self._open_orders: list[int] = []
+        self._request_count = 0
+        self._open_requests: list[int] = []
         self._closed = False
         self._ending_thread: threading.Thread | None = None
 
     @property
     def works(self) -> bool:
-        """Whether orders can be sent."""
+        """Whether requests can be sent."""
         return not self._closed and self.process.is_alive()
 
     @property
@@ -61,51 +61,51 @@ class WorkerClient(Generic[_Order, _Answer]):
         """Whether the process has ended."""
         return not self.process.is_alive()
 
-    def order(self, order: _Order) -> int:
-        """Send an order; return the number that its answers have. Answers to earlier orders may still arrive."""
-        self._order_count += 1
-        self._open_orders.append(self._order_count)
-        self._send((self._order_count, order))
-        return self._order_count
+    def order(self, request: _Request) -> int:
+        """Send a request; return the number that its replies have. Replies to earlier requests may still arrive."""
+        self._request_count += 1
+        self._open_requests.append(self._request_count)
+        self._send((self._request_count, request))
+        return self._request_count
 
     def stop(self) -> None:
-        """Ask the current order to stop early."""
+        """Ask the current request to stop early."""
         self._send(None)
 
-    def answers(self, wait_s: float = 0.0) -> list[tuple[int, _Answer | Refused | Crashed]]:
-        """Return the answers since the last call, with the numbers of their orders.
+    def answers(self, wait_s: float = 0.0) -> list[tuple[int, _Reply | Refused | Crashed]]:
+        """Return the replies since the last call, with the numbers of their requests.
 
-        The last answer to an order is the result of its task, `Refused`, or `Crashed` if the process ended.
+        The last reply to a request is the result of its task, `Refused`, or `Crashed` if the process ended.
 
         Parameters
         ----------
         wait_s : float
-            Maximum time to wait for the first answer [s].
+            Maximum time to wait for the first reply [s].
         """
         if self._closed:
             return []
-        answers: list[tuple[int, _Answer | Refused | Crashed]] = []
+        replies: list[tuple[int, _Reply | Refused | Crashed]] = []
         with suppress(EOFError, OSError):
-            wait([self._answers], wait_s)
-            while self._answers.poll():
-                number, answer, last = self._answers.recv()
-                answers.append((number, answer))
+            wait([self._replies], wait_s)
+            while self._replies.poll():
+                number, reply, last = self._replies.recv()
+                replies.append((number, reply))
                 if last:
-                    self._open_orders.remove(number)
-            return answers
+                    self._open_requests.remove(number)
+            return replies
         if self.process.is_alive():  # the process has closed its end of the pipe and is about to end
-            return answers
-        answers += [(number, Crashed(self.process.exitcode)) for number in self._open_orders]
-        self._open_orders = []
-        return answers
+            return replies
+        replies += [(number, Crashed(self.process.exitcode)) for number in self._open_requests]
+        self._open_requests = []
+        return replies
 
     def close(self) -> None:
-        """Ask the process to end, even during an order; a thread kills it after `PATIENCE_S`."""
+        """Ask the process to end, even during a request; a thread kills it after `PATIENCE_S`."""
         if self._closed:
             return
         self._closed = True
-        self._orders.close()
-        self._answers.close()
+        self._requests.close()
+        self._replies.close()
         self.process.terminate()
         self._ending_thread = threading.Thread(
             target=self._end_process, name=f"{self.process.name} ending", daemon=True
@@ -123,7 +123,7 @@ class WorkerClient(Generic[_Order, _Answer]):
             self.process.kill()
             self.process.join()
 
-    def _send(self, message: tuple[int, _Order] | None) -> None:
+    def _send(self, message: tuple[int, _Request] | None) -> None:
         if not self._closed:
             with suppress(BrokenPipeError, ConnectionResetError):
-                self._orders.send(message)
+                self._requests.send(message)

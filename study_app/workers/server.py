@@ -1,7 +1,7 @@
-"""The worker process, which carries out orders one after the other until its client has ended.
+"""The worker process, which runs requests one after the other until its client ends.
 
-Processes are spawned and ignore Ctrl+C, which the terminal sends to all processes of a program. An order is answered by
-the values of its task, and by `Refused` or `Crashed` if it fails.
+Processes are spawned and ignore Ctrl+C, which the terminal sends to all processes of a program. The replies to a
+request are the values of its task, and `Refused` or `Crashed` if it fails.
 """
 
 import signal
@@ -24,18 +24,18 @@ from study_app.errors import MissingExtra, StudyError, naming_the_extra
 from study_app.workers.one_thread import compute_in_one_thread
 
 Send: TypeAlias = Callable[[Any], object]
-"""Sends an answer that is not the last one."""
+"""Sends a reply that is not the last one."""
 Stop: TypeAlias = Callable[[], bool]
-"""Returns whether to stop early, since the client requested it, sent another order, or has ended."""
+"""Returns whether to stop early, since the client asked for it, sent another request, or has ended."""
 Task: TypeAlias = Callable[[Any, Send, Stop], object]
-"""Carries out an order and returns the last answer; a `StudyError` becomes the answer `Refused`."""
+"""Runs a request and returns the last reply; a `StudyError` becomes the reply `Refused`."""
 _STOP: Final = None
 _END: Final = object()
 
 
 @dataclass(frozen=True, slots=True)
 class Refused:
-    """An order could not be carried out, with the reason and without partial effects.
+    """A request could not be run, with the reason and without partial effects.
 
     ``stopped`` means that it was asked to stop; ``lacks_extra`` means that libraries of an extra are not installed.
     """
@@ -47,7 +47,7 @@ class Refused:
 
 @dataclass(frozen=True, slots=True)
 class Crashed:
-    """The process ended before it had carried out the order.
+    """The process ended before it had finished the request.
 
     ``exit_code`` is negative if a signal ended it, and 1 after an exception, which the terminal shows.
     """
@@ -63,7 +63,7 @@ class Crashed:
 
 
 class Stopped(StudyError):
-    """An order stopped early, by request or because of another order."""
+    """A request stopped early, because the client asked for it or sent another request."""
 
 
 class _WorkerProcess(SpawnProcess):
@@ -94,41 +94,41 @@ def ignore_interrupts() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
-def serve_orders(orders: Connection, answers: Connection, task: str, *, background: bool) -> None:
-    """Carry out orders (number, order) until the client has ended; send answers (number, answer, is_last)."""
+def serve_requests(requests: Connection, replies: Connection, task: str, *, background: bool) -> None:
+    """Run requests (number, request) until the client ends, and send replies (number, reply, is_last)."""
     ignore_interrupts()
     if background:
         psutil.Process().nice(getattr(psutil, "IDLE_PRIORITY_CLASS", 19))
         compute_in_one_thread()
     waiting: SimpleQueue[Any] = SimpleQueue()
-    # Orders are read immediately, since a full pipe would block the client's window.
-    threading.Thread(target=_read_orders, args=(orders, waiting), name="orders", daemon=True).start()
-    with suppress(ModuleNotFoundError):  # the first order reports the error
+    # Requests are read immediately, since a full pipe would block the client's window.
+    threading.Thread(target=_read_requests, args=(requests, waiting), name="requests", daemon=True).start()
+    with suppress(ModuleNotFoundError):  # the first request reports the error
         resolve_name(task)
     with suppress(BrokenPipeError, ConnectionResetError):
         while (received := waiting.get()) is not _END:
             if received is _STOP:
-                continue  # the order to stop has ended
-            number, order = received
+                continue  # the request to be stopped has already finished
+            number, request = received
             try:
                 with naming_the_extra():
                     carry_out: Task = resolve_name(task)
-                    last_answer = carry_out(order, partial(_send, answers, number), lambda: not waiting.empty())
+                    last_reply = carry_out(request, partial(_send, replies, number), lambda: not waiting.empty())
             except Exception as exception:
                 if not isinstance(error := explain_error(exception), StudyError):
                     raise
-                last_answer = Refused(str(error), isinstance(error, Stopped), isinstance(error, MissingExtra))
-            answers.send((number, last_answer, True))
+                last_reply = Refused(str(error), isinstance(error, Stopped), isinstance(error, MissingExtra))
+            replies.send((number, last_reply, True))
 
 
-def _send(answers: Connection, number: int, answer: object) -> None:
-    answers.send((number, answer, False))
+def _send(replies: Connection, number: int, reply: object) -> None:
+    replies.send((number, reply, False))
 
 
-def _read_orders(orders: Connection, waiting: SimpleQueue[Any]) -> None:
+def _read_requests(requests: Connection, waiting: SimpleQueue[Any]) -> None:
     try:
         with suppress(EOFError, OSError):
             while True:
-                waiting.put(orders.recv())
+                waiting.put(requests.recv())
     finally:
         waiting.put(_END)

@@ -524,7 +524,7 @@ class SessionBridge(QObject):
         """Reconnect the device in the background; the force stays off until the operator resumes."""
         if self.parts.reconnect is not None and self.runner.state.lost_device:
             if not self.reconnecting.busy:
-                self._reconnection = "Connecting the device …"
+                self._reconnection = "Connecting the device…"
                 self.reconnecting.run(self.parts.reconnect)
             self._show_view()
 

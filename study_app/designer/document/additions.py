@@ -589,7 +589,10 @@ def _number_rows(document: Mapping[str, Any], path: Path, max_depth: int) -> Ite
 
 
 def number_row(document: Mapping[str, Any], path: Path, field: Path) -> Row:
-    """Return the row of the number that a series varies; ``field`` may be a path in the element's original."""
+    """Return the row of the number in which a series of copies differs.
+
+    ``field`` may be a path in the element that was copied.
+    """
     number = next((row for row in number_rows(document, path) if row.path[2:] == field[2:]), None)
     if number is None:
         raise Refused("choose one of this element's numeric fields")

@@ -254,9 +254,9 @@ def short_note(document: Mapping[str, Any], path: Path) -> str:
     if path[0] != "tasks":
         return ""
     numbers = {key: number for key, number in value.items() if isinstance(number, int | float)}
-    for least, most in (("min_s", "max_s"), ("duration_s", "duration_s")):
-        if least in numbers and most in numbers:
-            return exact_duration(numbers[least], numbers[most])
+    for minimum, maximum in (("min_s", "max_s"), ("duration_s", "duration_s")):
+        if minimum in numbers and maximum in numbers:
+            return exact_duration(numbers[minimum], numbers[maximum])
     return f"{numbers['count']:g} targets" if "count" in numbers else ""
 
 

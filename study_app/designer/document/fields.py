@@ -749,7 +749,10 @@ def _unit_suffix(key: str) -> str:
 
 
 def _plain_text(description: str) -> str:
-    """Return a description without line breaks and markup; a table's description is a docstring."""
+    """Return a description without line breaks or markup.
+
+    A table's description is its docstring, which contains both.
+    """
     return re.sub("`(.+?)`", "“\\1”", " ".join(description.replace("``", "").split()))
 
 
@@ -831,7 +834,7 @@ def _initial_tables(document: Mapping[str, Any], path: Path, node: _Node) -> lis
         table = table_of(node_at(document, table_path), {})
         required = () if table is None else table.get("required", ())
         name = f"{element_noun(path[-1])}_{number + 1}"
-        text = _in_languages(document, label_of(name))
+        text = _text_in_each_language(document, label_of(name))
         known = {"id": name, "text": text}
         tables.append({key: known.get(key) or initial_value(document, (*table_path, key)) for key in required})
     return tables
@@ -847,10 +850,10 @@ def _initial_text(document: Mapping[str, Any], path: Path, node: _Node, *, local
         return next((letter for letter in string.ascii_uppercase if letter not in used), "Z")
     name = table.get("id", path[-2]) if isinstance(table, Mapping) else path[-2]
     text = _new_text(path[-3]) if isinstance(name, int) else f"New {name_label(str(name)).lower()}"
-    return _in_languages(document, text) if localised else text
+    return _text_in_each_language(document, text) if localised else text
 
 
-def _in_languages(document: Mapping[str, Any], text: str) -> Any:
+def _text_in_each_language(document: Mapping[str, Any], text: str) -> Any:
     languages = languages_of(document)
     return dict.fromkeys(languages, text) if len(languages) > 1 else text
 

@@ -284,7 +284,7 @@ class AddInstrument(Request):
         codes, available = languages_of(context.study.document), Instrument(self.name).table["languages"]
         missing_languages, announcement = [language_name(code) for code in codes if code not in available], ""
         if 0 < len(missing_languages) < len(codes):
-            hint = "The next problem (F8), or “Write …” at the study's languages, lists them"
+            hint = "The next problem (F8), or “Write…” at the study's languages, lists them"
             announcement = f"The program does not include the {' and '.join(missing_languages)} texts. {hint}."
         return Step(f"Add {self.name}", (*edits, Set(path, table)), path, announcement=announcement, entry=path)
 

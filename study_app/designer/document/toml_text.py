@@ -223,7 +223,7 @@ class Spans:
     def owned_start(self, node: Node) -> int:
         """Return the start of a header or key including its line and the comments directly above."""
         index = self._line_index(node)
-        return self._with_comments(node.start, self.line_end(self._lines[index - 1]) if index else 0)
+        return self._start_with_comments(node.start, self.line_end(self._lines[index - 1]) if index else 0)
 
     def _line_index(self, node: Node) -> int:
         return bisect_right(self._starts, node.start) - 1
@@ -231,12 +231,12 @@ class Spans:
     def _line_start(self, position: int) -> int:
         return self.text.rfind("\n", 0, position) + 1
 
-    def _with_comments(self, position: int, floor: int) -> int:
-        """Return the start of the comments directly above the line of ``position``, not before ``floor``."""
-        start = max(self._line_start(position), floor)
-        while start > floor:
+    def _start_with_comments(self, position: int, earliest: int) -> int:
+        """Return the start of the comments directly above the line of ``position``, but not before ``earliest``."""
+        start = max(self._line_start(position), earliest)
+        while start > earliest:
             above = self._line_start(start - 1)
-            if above < floor or not _COMMENT.match(self.text, above) or _RULER.match(self.text, above):
+            if above < earliest or not _COMMENT.match(self.text, above) or _RULER.match(self.text, above):
                 break
             start = above
         return start
@@ -249,7 +249,7 @@ class Spans:
         while (entry := self._by_path.get((*path, index))) is not None:
             line = self._line_start(entry.start)
             own_line = line >= floor and not self.text[line : entry.start].strip()
-            start = self._with_comments(entry.start, floor) if own_line else entry.start
+            start = self._start_with_comments(entry.start, floor) if own_line else entry.start
             comma = _COMMA.match(self.text, entry.end)
             after = comma.end() if comma else entry.end
             tail = _TAIL.match(self.text, after)

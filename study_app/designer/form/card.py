@@ -585,7 +585,7 @@ class FormCard(Card):
                 yield (section_key, inner, _editor_structure(row)), partial(self._make_row, row), row
             if section.absent and not self.read_only:
                 added = tuple(
-                    (row.path[len(form.path) :], row.label + " …" * (row.path[::2] in _SOURCES), row.help)
+                    (row.path[len(form.path) :], row.label + "…" * (row.path[::2] in _SOURCES), row.help)
                     for row in section.absent
                 )
                 yield ("adds", section_key, added), partial(_AddKeys, added, self._add_key), None
@@ -709,7 +709,7 @@ class FormCard(Card):
         next_index = next((next_index for next_index, field in enumerate(fields, start=1) if field.hasFocus()), 0)
         to_write = (field for field in (*fields[next_index:], *fields[:next_index]) if self._is_to_write(field))
         if (field := next(to_write, None)) is None:
-            self.show_note("Every text is written in every language.")
+            self.show_note("No texts are missing.")
         else:
             self._focus_typed(field)
             field.selectAll()

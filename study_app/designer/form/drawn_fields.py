@@ -432,7 +432,8 @@ def _phase_widths(phases: tuple[_Phase, ...], total_px: float) -> list[float]:
     spare_px, total = max(0.0, total_px - sum(least_widths)), sum(phase.duration_s for phase in phases) or 1.0
     scale = min(1.0, total_px / sum(least_widths))
     return [
-        scale * least + spare_px * phase.duration_s / total for least, phase in zip(least_widths, phases, strict=True)
+        scale * minimum + spare_px * phase.duration_s / total
+        for minimum, phase in zip(least_widths, phases, strict=True)
     ]
 
 

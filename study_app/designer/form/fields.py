@@ -398,9 +398,9 @@ class Field(Themed, QWidget):
         self.setFocus(Qt.FocusReason.OtherFocusReason)
 
     def minimumSizeHint(self) -> QSize:
-        least = super().minimumSizeHint()
+        minimum = super().minimumSizeHint()
         beside_px = 0 if self.extra is None else self.extra.beside_px
-        return QSize(max(beside_px, self.extra.sizeHint().width()), least.height()) if beside_px else least
+        return QSize(max(beside_px, self.extra.sizeHint().width()), minimum.height()) if beside_px else minimum
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
@@ -578,8 +578,8 @@ class ChoiceField(Field):
             hidden.hide()
 
     def minimumSizeHint(self) -> QSize:
-        least = super().minimumSizeHint()
-        return least if None in {self.segments, self.list} else QSize(NARROWEST_LIST, least.height())
+        minimum = super().minimumSizeHint()
+        return minimum if None in {self.segments, self.list} else QSize(NARROWEST_LIST, minimum.height())
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)

@@ -95,9 +95,9 @@ def form_of(study: Study, path: Path, to_write: tuple[Path, ...] = ()) -> Form:
     if path == STUDY_LANGUAGES:
         return Form(
             path=path,
-            title="Texts in every language" if to_write else "Every text is written in every language",
+            title="Texts in every language" if to_write else "No texts are missing",
             icon="list",
-            kind="Enter leads to the next missing text",
+            kind="Press Enter to go to the next missing text",
             sections=tuple(_text_sections(study, to_write, places)),
             around=tuple((place, title_of(document, place)) for place in (FIRST, path)),
             lists_texts=True,

@@ -281,7 +281,7 @@ class EntriesField(EntryList):
     def __init__(self, row: FormRow) -> None:
         super().__init__(row)
         name = f"Add to {row.label}"
-        self.names = _AdditionList(name, "Add …") if row.kind == "references" or row.additions else None
+        self.names = _AdditionList(name, "Add…") if row.kind == "references" or row.additions else None
         if self.names is not None:
             self.names.chosen.connect(self.asked)
             self.add: QWidget = self.names
@@ -414,7 +414,7 @@ class LanguageListField(EntryList):
         super().__init__(row)
         self.make_read_only()
         self.copies: dict[str, ActionButton] = {}
-        self.names = _AdditionList("Add a language to every text", "Language …")
+        self.names = _AdditionList("Add a language to every text", "Language…")
         self.names.chosen.connect(lambda code: self.asked.emit(ChangeLanguage("add", code)))
         self.box.addWidget(self.names, 0, Qt.AlignmentFlag.AlignLeft)
         self.setFocusProxy(self.names)
@@ -431,7 +431,7 @@ class LanguageListField(EntryList):
             description = f"{entry.title}, {entry.note}, {index + 1} of {len(codes)}"
             entry_row = self.add_row(description, title, note, faulty=bool(entry.faults))
             if entry.target:
-                write_button = small_button("", "Write …", height=32)
+                write_button = small_button("", "Write…", height=32)
                 write_button.setAccessibleName(f"Write the texts that are missing in {entry.title}")
                 write_button.clicked.connect(partial(self.open_entry, index))
                 entry_row.line.addWidget(write_button)

@@ -199,7 +199,7 @@ def is_right_to_left(code: str) -> bool:
 
 def new_element_label(section: str) -> str:
     """Return the label of the choice that adds an element to a section and refers to it."""
-    return f"New {label_of(element_noun(section)).lower()} …"
+    return f"New {label_of(element_noun(section)).lower()}…"
 
 
 def choice_label(choice: Choice, default: object) -> str:

@@ -1,7 +1,7 @@
 """Editors of special keys: sentences, order, scale points, kind and list of questions, hypotheses."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import combinations
 from typing import Any, Final, Literal
@@ -412,6 +412,8 @@ _RELATIONS: Final = (
     (None, "is different from"), ("higher", "is higher than"), ("lower", "is lower than"), ("equal", "is equal to"),
 )  # fmt: skip
 DEFAULT_BOUND, DEFAULT_RATIO = 0.5, 1.25
+_WIDE_RANGE, _SHARE_OF_RANGE = 10.0, 0.05
+"""On scales with a wider range, the default bound is this share of the range."""
 _NOTHING_TO_COMPARE: Final = (
     "A hypothesis compares two main blocks, two conditions of a block, or two groups. Add a second block, condition or "
     "group first."
@@ -426,7 +428,8 @@ _ONE_RESULT: Final = (
 class Compared:
     """A block, or a condition or group in a block, with its measures, each as ID and label.
 
-    A group with a ``pair`` of blocks or conditions (``pair_of`` is the key) is one side of an interaction.
+    A group with a ``pair`` of blocks or conditions (``pair_of`` is the key) is one side of an interaction. ``ranges``
+    are the differences between the largest and the smallest value of measures, if they are limited.
     """
 
     key: str  # the key that lists it in a hypothesis: "blocks", "conditions" or "groups"
@@ -436,6 +439,7 @@ class Compared:
     measures: tuple[tuple[str, str], ...]
     pair_of: str = ""
     pair: tuple[str, ...] = ()
+    ranges: Mapping[str, float] = field(default_factory=dict, compare=False)
 
     @property
     def place(self) -> tuple[object, ...]:
@@ -467,11 +471,15 @@ class Comparable:
 
 
 def _comparable(study: Study, _row: Row) -> Comparable:
-    form_measures = _form_measures(study)
+    form_measures, ranges = _form_measures(study), _ranges_of_measures(study)
     all_items = tuple(
-        item
-        if item.key == "conditions"
-        else replace(item, measures=(*item.measures, *form_measures.get(item.block, ())))
+        replace(
+            item,
+            measures=item.measures
+            if item.key == "conditions"
+            else (*item.measures, *form_measures.get(item.block, ())),
+            ranges=ranges.get(item.block, {}),
+        )
         for item in _comparable_items(study)
     )
     all_items += tuple(_interaction_sides(all_items))
@@ -543,6 +551,26 @@ def _form_measures(study: Study) -> dict[str, tuple[tuple[str, str], ...]]:
         for block in protocol.blocks_followed_by(name):
             measures_by_block[block] = (*measures_by_block.get(block, ()), *measures)
     return measures_by_block
+
+
+def _ranges_of_measures(study: Study) -> dict[str, dict[str, float]]:
+    """Return for each main block the ranges of its questions and scores, and of the forms after it as FORM/ID."""
+    protocol = valid_part(study).protocol
+    if protocol is None:
+        return {}
+    ranges: dict[str, dict[str, float]] = {}
+    for block in protocol.main_blocks:
+        asked = {"": protocol.questionnaire_of(block.id)} if block.design is None else {}
+        for name, form in protocol.forms.items():
+            if block.id in protocol.blocks_followed_by(name):
+                asked[f"{name}/"] = form
+        ranges[block.id] = {
+            f"{prefix}{measure}": extent
+            for prefix, questionnaire in asked.items()
+            if questionnaire is not None
+            for measure, extent in questionnaire.ranges(protocol.scales, protocol.study.languages[0]).items()
+        }
+    return ranges
 
 
 def _interaction_sides(compared: Sequence[Compared]) -> Iterator[Compared]:
@@ -653,7 +681,10 @@ class Hypothesis(QWidget):
         """
         before = self.value.get("bound")
         if relation == "equal" and before is None:
-            return DEFAULT_RATIO if measure in {"threshold", "pse"} else DEFAULT_BOUND
+            if measure in {"threshold", "pse"}:
+                return DEFAULT_RATIO
+            extent = next((item.ranges[measure] for item in self.known if measure in item.ranges), 0.0)
+            return _SHARE_OF_RANGE * extent if extent > _WIDE_RANGE else DEFAULT_BOUND
         keeps_direction = relation is not None and _relation(self.value) != "equal"
         return before if relation == "equal" or keeps_direction else None
 

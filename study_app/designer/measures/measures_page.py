@@ -15,7 +15,7 @@ from study_app.gui.widgets import Card, add_parts, label, vbox
 _OUTDATED = "These numbers describe the last valid version of the study. Correct the problems to update them."
 FACTS_MAX_PX, FACTS_MIN_PX = 366, 190
 FACTS_SHARE, HIGH_MIN_PX = 0.3, 940
-"""Greatest share of the window's height for the cards; window height from which two rows fit completely [px]."""
+"""Greatest proportion of the window's height for the cards; window height from which two rows fit completely [px]."""
 
 
 class _MeasureCards(QScrollArea):
@@ -112,7 +112,7 @@ class FactsRow(_MeasureCards):
         self.fit_height(0, 0)
 
     def fit_height(self, window_px: int, left_px: int) -> None:
-        """Set the height that the cards need, at most ``left_px`` if positive, otherwise a share of the window."""
+        """Set the height that the cards need, at most ``left_px`` if positive, otherwise a proportion of the window."""
         self._window_px, self._left_px = window_px, left_px
         largest = FACTS_MAX_PX if window_px >= HIGH_MIN_PX else max(FACTS_MIN_PX, round(FACTS_SHARE * window_px))
         largest = left_px if left_px > 0 else largest

@@ -159,8 +159,8 @@ def _text_verdicts(study: Study, facts: Facts) -> Sequence[Verdict]:
 
 def _times(counts: Collection[int]) -> str:
     """Return how often something occurs: "1 time", "1 to 2 times"."""
-    least, most = min(counts), max(counts)
-    return counted(most, "time") if least == most else f"{least} to {most} times"
+    minimum, maximum = min(counts), max(counts)
+    return counted(maximum, "time") if minimum == maximum else f"{minimum} to {maximum} times"
 
 
 def _balance_card(study: Study, protocol: Protocol, block: Block) -> list[MeasureCard]:

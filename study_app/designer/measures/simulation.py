@@ -16,7 +16,7 @@ from study_app.protocol.warnings import imprecise, threshold_plan
 from study_app.workers.client import WorkerClient
 from study_app.workers.server import Send, Stop, Stopped
 
-WAITING: Final = "simulating …"
+WAITING: Final = "simulating…"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -110,7 +110,7 @@ def run_simulation(order: Simulation, send: Send, stop: Stop) -> Simulated:
 
         def show_progress(text: str) -> None:
             check()
-            send(replace(simulated, waiting=f"{text} …"))
+            send(replace(simulated, waiting=f"{text}…"))
 
         show_progress("predicting which trials can be delivered")
         simulated = replace(simulated, lost=predicted_delivery(protocol, ASSUMED_TICKS).sentences)

@@ -92,7 +92,7 @@ def revealing_texts(study: Study, protocol: Protocol) -> tuple[Revealing, ...]:
 
 
 def _telltale_words(protocol: Protocol) -> set[str]:
-    """Return the names of the conditions and liquids that main blocks compare, and their delays with unit."""
+    """Return the names of the conditions and liquids that main blocks compare, and their delays with units."""
     telltales: set[str] = set()
     for block in protocol.main_blocks:
         names = protocol.conditions_in(block.id)

@@ -83,7 +83,7 @@ class Gain(NamedTuple):
 def regularity(samples: Any, rate_hz: float) -> Regularity:
     """Return the loop's timing from samples (n,).
 
-    It consists of the lateness and duration of a tick (median, 99 %, greatest) [ms], the share of ticks with a new
+    It consists of the lateness and duration of a tick (median, 99 %, greatest) [ms], the fraction of ticks with a new
     position, the longest time between two new positions [ms], and the least and greatest delay [ticks].
     """
     new_ns = samples.time_ns[samples.fresh == 1]

@@ -299,8 +299,8 @@ def _report_lines(results: Found, day: str) -> Iterator[str]:
     yield f"| lateness of a tick [ms] | {_table_row(loop.lateness_ms, 3)} |"
     yield f"| duration of a tick, including reading and writing [ms] | {_table_row(loop.busy_ms, 3)} |"
     yield ""
-    least, most = loop.delay_ticks
-    delay = f"{least}" if least == most else f"{least} to {most}"
+    minimum, maximum = loop.delay_ticks
+    delay = f"{minimum}" if minimum == maximum else f"{minimum} to {maximum}"
     yield (
         f"Of {loop.ticks} ticks, {100 * loop.new_share:.2f} % had a new position; new positions were at most "
         f"{loop.longest_gap_ms:.2f} ms apart. The driver's delay was {delay} ticks. The servo skipped "

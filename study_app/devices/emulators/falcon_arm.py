@@ -121,9 +121,9 @@ def _excess_per_rad(arms: Any, arm: int, x: float, y: float, z: float) -> float:
 
 @kernel
 def encoder_count(arms: Any, arm: int) -> int:
-    """Return the encoder's count from its zero, for the last angle."""
-    counted: int = math.floor((arms.angle_rad[arm] - arms.zero_rad[arm]) / arms.rad_per_count + 0.5)
-    return counted
+    """Return an arm's encoder count, relative to its zero, at the current angle."""
+    count: int = math.floor((arms.angle_rad[arm] - arms.zero_rad[arm]) / arms.rad_per_count + 0.5)
+    return count
 
 
 @kernel

@@ -100,11 +100,12 @@ class Faults:
             raise DeviceError(f"the probability of the fault '{name}' must be from 0 to 1, not {chance}")
         self._state.chance[_chance_index(name)] = chance
 
-    def once(self, name: str, times: int = 1) -> None:
+    def schedule(self, name: str, times: int = 1) -> None:
         """Make the fault occur at the next ``times`` opportunities."""
         self._state.due[_chance_index(name)] = times
 
-    def happened(self, name: str) -> int:
+    def occurrences(self, name: str) -> int:
+        """Return how often the fault has occurred."""
         return int(self._state.happened[_chance_index(name)])
 
     def on(self, name: str, on: bool = True) -> None:
@@ -120,7 +121,7 @@ class Faults:
     def is_on(self, name: str) -> bool:
         return bool(self._state[_checked_switch(name)])
 
-    def last(self, *, delay_s: float | None = None, stall_s: float | None = None) -> None:
+    def set_durations(self, *, delay_s: float | None = None, stall_s: float | None = None) -> None:
         """Set the delay of a late reply and the duration of a stall [s]; a stall of 0 s skips one packet."""
         if delay_s is not None:
             self._state.delay_ns = round(delay_s * 1e9)

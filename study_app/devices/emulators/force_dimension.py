@@ -176,7 +176,7 @@ def _get_velocity(x_at: int, y_at: int, z_at: int, device: int) -> int:
     return 0
 
 
-def _not_available(out_at: int, device: int) -> int:
+def _not_available(address: int, device: int) -> int:
     return -1
 
 
@@ -184,10 +184,10 @@ def _get_buttons(device: int) -> Any:
     return np.uint32(_emulated_at(device).reading.buttons)
 
 
-def _get_status(out_at: int, device: int) -> int:
+def _get_status(status_address: int, device: int) -> int:
     state = _emulated_at(device)
-    _word_at(out_at + 4 * FORCE).value = state.force_on
-    _word_at(out_at + 4 * FORCE_OFF_CAUSE).value = 0 if state.force_on != 0 else _VELOCITY_THRESHOLD
+    _word_at(status_address + 4 * FORCE).value = state.force_on
+    _word_at(status_address + 4 * FORCE_OFF_CAUSE).value = 0 if state.force_on != 0 else _VELOCITY_THRESHOLD
     return 0
 
 

@@ -168,7 +168,7 @@ class FalconDevice(FramedDevice):
 
     @property
     def _broken_share(self) -> float:
-        """The share of packets without a complete reply."""
+        """The fraction of packets without a complete reply."""
         requests, replies = self.counters["requests"], self.counters["replies"]
         return max(requests - replies - 1, 0) / max(requests, 1)
 

@@ -107,7 +107,7 @@ class Inverse3Device(FramedDevice):
         )
 
     def _force_scale(self) -> Any:
-        return service.force_scale(self._host, (self._port, *service.PORTS))
+        return service.request_force_scale(self._host, (self._port, *service.PORTS))
 
 
 def address(where: str) -> tuple[str, int, str]:

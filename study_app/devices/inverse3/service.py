@@ -154,8 +154,10 @@ def shortened(value: Any) -> str:
     return reprlib.repr(value)[:80]
 
 
-def force_scale(host: str, ports: tuple[int, ...] = PORTS) -> Any:
-    """Return the service's answer about the setting devices/force_scale, the multiplier of all forces, or None.
+def request_force_scale(host: str, ports: tuple[int, ...] = PORTS) -> Any:
+    """Return the service's reply about the setting devices/force_scale, or None if it does not reply.
+
+    The setting is the multiplier of all forces.
 
     Documented: "Filters" 3.5.x (the key), "Settings Reference" 3.5.x (GET /settings/KEY).
     """
@@ -165,8 +167,8 @@ def force_scale(host: str, ports: tuple[int, ...] = PORTS) -> Any:
 def check_force_scale(answer: Any) -> float:
     """Return the multiplier of all forces in an answer; raise an error unless it is 1.
 
-    The form of the answer is not documented. A bare number is understood, and an object with the number under
-    ``value`` or ``devices/force_scale``.
+    The format of the answer is not documented. A bare number, or an object that contains the number under ``value`` or
+    ``devices/force_scale``, is accepted.
     """
     scale = answer.get("value", answer.get("devices/force_scale")) if isinstance(answer, dict) else answer
     if type(scale) not in {int, float}:  # a bool is not a number

@@ -110,8 +110,8 @@ def velocity_mps(displacement: Displacement) -> Vector:
 def _speed(deflection: int) -> float:
     """Return the speed for a deflection [m/s]: 0 in the dead zone, then proportional up to the maximum."""
     excess = min(abs(deflection), FULL_DEFLECTION) - DEAD_DEFLECTION
-    share = max(excess, 0) / (FULL_DEFLECTION - DEAD_DEFLECTION)
-    return FULL_SPEED_MPS * (share if deflection > 0 else -share)
+    proportion = max(excess, 0) / (FULL_DEFLECTION - DEAD_DEFLECTION)
+    return FULL_SPEED_MPS * (proportion if deflection > 0 else -proportion)
 
 
 _UDEV_RULES: Final = (

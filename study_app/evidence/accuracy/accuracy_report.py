@@ -38,7 +38,7 @@ _SLANT_PT: Final = 4.0
 """Rise of labels per decade of time, so that hairlines from the left pass below the points to the right."""
 
 _ROUNDED: Final = 1e-5
-"""Errors below this share of the force are rounding errors, which are drawn in a separate strip."""
+"""Errors below this proportion of the force are rounding errors, which are drawn in a separate strip."""
 
 _LOOKS: Final[dict[str, dict[str, Any]]] = {
     "tick": {"marker": "o", "facecolor": "#0b65a3"},
@@ -234,21 +234,23 @@ class _Panel:
         axes.yaxis.set_minor_formatter(NullFormatter())
         axes.set_title("Error [% of the force]", fontsize=_SMALL, pad=4, x=-0.075)
         axes.axhline(target, color=style.TEXT, linewidth=0.9, linestyle=(0, (5, 2)))
-        share = f"{100 * RELATIVE:g} %" if target <= 100 * RELATIVE else f"{PERCEPTIBLE_N:g} N"
+        proportion = f"{100 * RELATIVE:g} %" if target <= 100 * RELATIVE else f"{PERCEPTIBLE_N:g} N"
         offset: dict[str, Any] = {"textcoords": "offset points", "fontsize": _SMALL}
-        axes.annotate(f"target {share}", (axes.get_xlim()[0], target), (3, 2), va="bottom", **offset)
+        axes.annotate(f"target {proportion}", (axes.get_xlim()[0], target), (3, 2), va="bottom", **offset)
         axes.annotate("1 ms", (_BUDGET_NS, axes.get_ylim()[1]), (2, 0), va="top", **offset)
         for row in shown:
             self._draw_point(axes, row)
-            least = min(100 * other.error.rms for other in self._rows if other.candidate is row.candidate)
-            axes.plot([row.ns_per_ms] * 2, [least, 100 * row.error.rms], color=style.TEXT_SOFT, linewidth=0.6, zorder=3)
+            minimum = min(100 * other.error.rms for other in self._rows if other.candidate is row.candidate)
+            axes.plot(
+                [row.ns_per_ms] * 2, [minimum, 100 * row.error.rms], color=style.TEXT_SOFT, linewidth=0.6, zorder=3
+            )
         self._draw_labels(axes, shown)
         if self._solved and not self._numerical:
-            least, greatest = min(self._solved), max(self._solved)
+            minimum, greatest = min(self._solved), max(self._solved)
             axes.axvspan(
-                least, greatest, 0, _SOLVER_HIGH, facecolor=style.GRID, edgecolor=style.TEXT_SOFT, linewidth=0.8
+                minimum, greatest, 0, _SOLVER_HIGH, facecolor=style.GRID, edgecolor=style.TEXT_SOFT, linewidth=0.8
             )
-            foot = (least, axes.get_ylim()[0])
+            foot = (minimum, axes.get_ylim()[0])
             axes.annotate("fluid solver", foot, (-2, 3), rotation=90, ha="right", va="bottom", **offset)
 
     def _draw_rounding_errors(self, axes: Axes, main: Axes) -> None:

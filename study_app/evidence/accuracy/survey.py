@@ -127,7 +127,7 @@ def survey_evidence(found: tuple[Surveyed, ...]) -> Evidence:
     highest = max(it.case.reynolds for it in (*load_tables(), *training(), *held_out()))
     liquids = []
     for it in found:
-        least, greatest = it.solver_reynolds
+        minimum, greatest = it.solver_reynolds
         checked_mps = min(it.speed_mps, highest * it.mps_per_reynolds)
         cells = (
             it.liquid,
@@ -135,7 +135,7 @@ def survey_evidence(found: tuple[Surveyed, ...]) -> Evidence:
             it.model,
             _format_percent(it.creeping),
             _format_percent(it.steady),
-            _format_percent(it.solver) + (f" (Re {_format_range(least, greatest)})" if it.solver is not None else ""),
+            _format_percent(it.solver) + (f" (Re {_format_range(minimum, greatest)})" if it.solver is not None else ""),
             f"{checked_mps:.2g} m/s" if it.model == "unsteady drag" else "–",
             _format_percent(_relative_law_spread(it.reynolds)),
             _format_percent(it.expected.causes.law),

@@ -336,8 +336,8 @@ def _steady_markdown(table: SolvedTable) -> str:
     for reynolds, solved, coarse, narrow in zip(*(it.tolist() for it in table.columns.values()), strict=True):
         others = [coarse, narrow, clift(reynolds), MITTAL.get(reynolds), _measured_drag_coefficient(reynolds)]
         others += [law(reynolds) * 24 / reynolds for law in LAWS.values()]
-        shares = ["" if it is None else _format_signed(it / solved - 1) for it in (*others, _CONSTANT)]
-        rows.append((f"{reynolds:g}", f"{solved:.4g}", *shares))
+        proportions = ["" if it is None else _format_signed(it / solved - 1) for it in (*others, _CONSTANT)]
+        rows.append((f"{reynolds:g}", f"{solved:.4g}", *proportions))
     return Table(("Re", "C_d, solver", *names), rows).markdown()
 
 

@@ -75,8 +75,8 @@ class _SolvedMotion:
     def errors(self, constants: Constants) -> tuple[float, float]:
         """Return the RMS and the greatest error, relative to the RMS and the greatest force."""
         error_n = self._error_n(constants)
-        share = float(np.linalg.norm(error_n) / np.linalg.norm(self._force_n))
-        return share, float(np.abs(error_n).max() / np.abs(self._force_n).max())
+        proportion = float(np.linalg.norm(error_n) / np.linalg.norm(self._force_n))
+        return proportion, float(np.abs(error_n).max() / np.abs(self._force_n).max())
 
     def _error_n(self, constants: Constants) -> Floats:
         case = self._case
@@ -163,9 +163,9 @@ def law_fit_evidence(found: Refit) -> Evidence:
     motions = []
     for it in sorted(found.errors, key=lambda error: error.table.case.reynolds):
         errors = (it.fitted, it.left_out, it.program)
-        shares = ["held out" if error is None else f"{error[0]:.1%} ({error[1]:.1%})" for error in errors]
+        proportions = ["held out" if error is None else f"{error[0]:.1%} ({error[1]:.1%})" for error in errors]
         case = it.table.case
-        motions.append((case.title, case.liquid_id, f"{case.reynolds:.3g}", *shares))
+        motions.append((case.title, case.liquid_id, f"{case.reynolds:.3g}", *proportions))
     headings = ("motion", "liquid", "Re", "fitted to all", "left out of the fit", "program, 1 kHz")
     text = (
         f"{Table(('constant', 'fitted', 'in the program'), constants, left=1).markdown()}\n\n"

@@ -96,9 +96,9 @@ class VelocityProfile:
         viscosity = 1 / reynolds
         memory = np.zeros_like(t)
         for begin, end in self._panels():
-            least, most = (np.sqrt(np.maximum(t - it, 0.0)) for it in (end, begin))
-            roots = np.multiply.outer((most - least) / 2, _NODES) + ((most + least) / 2)[:, np.newaxis]
-            memory += (most - least) * (self.acceleration(t[:, np.newaxis] - roots**2) @ _WEIGHTS)
+            minimum, maximum = (np.sqrt(np.maximum(t - it, 0.0)) for it in (end, begin))
+            roots = np.multiply.outer((maximum - minimum) / 2, _NODES) + ((maximum + minimum) / 2)[:, np.newaxis]
+            memory += (maximum - minimum) * (self.acceleration(t[:, np.newaxis] - roots**2) @ _WEIGHTS)
         prompt = 3 * math.pi * viscosity * self.speed(t) + math.pi / 12 * self.acceleration(t)
         force: Floats = prompt + 1.5 * math.sqrt(math.pi * viscosity) * memory
         return force

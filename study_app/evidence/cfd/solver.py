@@ -43,7 +43,7 @@ FAST_REYNOLDS: Final = 50.0
 _REYNOLDS: Final = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0)
 
 PERMITTED: Final = 0.02
-"""Greatest difference, as a share of the greatest force: from the coarse solution, and from the exact linear one."""
+"""Greatest difference from the coarse and from the exact linear solution, as a proportion of the greatest force."""
 
 
 def solve(to: Path, executor: Executor, progress: Callable[[str], None]) -> tuple[Path, ...]:

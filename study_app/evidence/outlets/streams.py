@@ -263,8 +263,8 @@ def _ratio_of(active: Sequence[NDArray[np.int64]], rest: Sequence[NDArray[np.int
 def streams_evidence(streams: Streamed, ratios: Sequence[Ratio]) -> Evidence:
     """Return the results as text."""
     p50_us, p50_ms, p99_ms = (
-        float(np.percentile(values, share)) if len(values) else math.nan
-        for values, share in ((streams.errors_us, 50), (streams.arrivals_ms, 50), (streams.arrivals_ms, 99))
+        float(np.percentile(values, proportion)) if len(values) else math.nan
+        for values, proportion in ((streams.errors_us, 50), (streams.arrivals_ms, 50), (streams.arrivals_ms, 99))
     )
     lines = [
         f"streams received by another process for {streams.seconds:g} s",

@@ -125,13 +125,13 @@ LIQUIDS: Final = ("water", "honey", "oil")
 
 def _recognition() -> Iterator[DrawnStudies]:
     for n in (12, 24, 60):
-        for share in (0.5, 0.8):
-            name = f"honey recognised; water and oil named “water” in {100 * share:.0f} %, otherwise “oil”"
+        for proportion in (0.5, 0.8):
+            name = f"honey recognised; water and oil named “water” in {100 * proportion:.0f} %, otherwise “oil”"
             yield DrawnStudies(
                 name=name,
                 participants=n,
                 claim="water or oil recognised",
-                trial=_recognition_trial(n, share, known=(1,)),
+                trial=_recognition_trial(n, proportion, known=(1,)),
             )
         yield DrawnStudies(
             name="all three liquids named at random",
@@ -157,17 +157,18 @@ def _recognition_trial(n: int, share: float, known: tuple[int, ...]) -> Trial:
 
 def _equivalence() -> Iterator[DrawnStudies]:
     for bound in (0.5, 1.0):
-        share = bound / STEPS
+        proportion = bound / STEPS
         for description, other_differences in (("0", (0.0,)), ("−1, 0 or 1", (-1.0, 0.0, 0.0, 1.0))):
             name = (
-                f"one participant in {1 / share:.0f} differs by 6 points, the others by {description}, bound {bound:g}"
+                f"one participant in {1 / proportion:.0f} differs by 6 points, the others by {description}, "
+                f"bound {bound:g}"
             )
             for n in (14, 20, 30, 40):
                 yield DrawnStudies(
                     name=name,
                     participants=n,
                     claim=_EQUIVALENT,
-                    trial=_outlier_trial(n, share, other_differences, bound),
+                    trial=_outlier_trial(n, proportion, other_differences, bound),
                 )
     for members in (1, 4, 6):
         description = "one hypothesis" if members == 1 else f"{members} hypotheses"

@@ -223,12 +223,12 @@ class Rate:
             return "no" if self.hits else "yes"
         if not self.studies:
             return "too few studies"
-        lowest, highest, least, most = _PERMITTED_RANGES[self.limit]
+        lowest, highest, minimum, maximum = _PERMITTED_RANGES[self.limit]
         low, high = binomtest(self.hits, self.studies).proportion_ci(_CONFIDENCE, method="wilson")
         if high < lowest or low > highest:
             return "no"
         low, high = self.interval
-        return "yes" if low >= least and high <= most else "too few studies"
+        return "yes" if low >= minimum and high <= maximum else "too few studies"
 
 
 def report_rates_evidence(rates: Sequence[Rate], heading: str) -> Evidence:
@@ -236,8 +236,8 @@ def report_rates_evidence(rates: Sequence[Rate], heading: str) -> Evidence:
     rows = []
     for rate in sorted(rates, key=lambda rate: (rate.cell, rate.what, rate.participants)):
         low, high = (f"{100 * end:.1f}" for end in rate.interval)
-        share = (f"{100 * rate.share:.1f} %", f"{low} to {high} %", rate.studies)
-        rows.append((rate.cell, rate.participants, rate.what, *share, rate.limit, rate.holds))
+        proportion = (f"{100 * rate.share:.1f} %", f"{low} to {high} %", rate.studies)
+        rows.append((rate.cell, rate.participants, rate.what, *proportion, rate.limit, rate.holds))
     table = Table(("studies", "n", "what happened", "share", "95 % interval", "of", "limit", "holds"), rows, left=8)
     text = f"{heading}\n\n{table.markdown()}\n"
     cells = [

@@ -107,14 +107,14 @@ _MAX_HOURS: Final = 10_000.0
 _MIN_TICKS: Final = 1_000
 _MAX_ROUND_S: Final = 3600.0
 _MIN_ROUND_S: Final = 5.0
-_ROUGH_SHARE: Final = 0.35  # share of a round
+_ROUGH_SHARE: Final = 0.35  # proportion of a round
 _SETTLING_S: Final = 2.0  # time for a hand at rest, and its velocity estimate, to settle
-_MAX_REST_SHARE: Final = 0.4  # greatest share of a round for a rest; longer rests are omitted
+_MAX_REST_SHARE: Final = 0.4  # greatest proportion of a round for a rest; longer rests are omitted
 _CHECK_TICKS: Final = 1000  # at most between two checks; a wake has more elements, so that no error is evicted unseen
 _POLL_S: Final = 0.25  # longest time between two checks on a real clock [s]
 PATIENCE_S: Final = 10.0  # while the servo runs no tick
 
-# kind: share of all faults, fewest and most readings
+# kind: proportion of all faults, fewest and most readings
 _ROUGH_FAULTS: Final = {
     NON_FINITE: (4.0, 1, 8),
     GLITCH: (4.0, 1, 8),

@@ -158,7 +158,7 @@ def groups(seed: str = "stability", count: int | None = None) -> tuple[Group, ..
         changed_cases.append(changed_group(name, change, all_cases))
     changed_cases += [
         Group(
-            name,
+            _TITLES.get(name, name),
             tuple(
                 map(
                     change,
@@ -180,7 +180,11 @@ def groups(seed: str = "stability", count: int | None = None) -> tuple[Group, ..
     changed_cases.append(Group("let go in a gap of samples", evenly_chosen(in_gap, min(_CASES, count or _CASES))))
     for name in (*_MISJUDGED, *_MASSES):
         cases = tuple(case for case in map({**_CHANGES, **_MASSES}[name], releases) if case is not None)
-        changed_cases.append(Group(f"let go in mid-stroke, {name}", evenly_chosen(cases, min(_CASES, count or _CASES))))
+        changed_cases.append(
+            Group(
+                f"let go in mid-stroke, {_TITLES.get(name, name)}", evenly_chosen(cases, min(_CASES, count or _CASES))
+            )
+        )
     driven = "through the Falcon's driver"
     driven_held = evenly_chosen(
         tuple(_case_grid(("light", "middle", "firm"), (FALCON,), _FALCON_RATES_HZ, (1,))), count
@@ -281,6 +285,11 @@ _MASSES: Final[Mapping[str, Callable[[Case], Case]]] = {
     "mass doubled and halved every 150 ms": lambda case: dataclasses.replace(case, other_kg=2.0 * case.mass_kg),
 }
 """Changes of the handle's reported or real mass, made after the mass has been drawn."""
+_TITLES: Final = {
+    "least mass stated at half": "minimum mass reported as 0.5 times the true mass",
+    "least mass stated at 1.25 times": "minimum mass reported as 1.25 times the true mass",
+}
+"""Titles of groups whose older names remain part of the seeds of their cases."""
 
 
 def _case_grid(

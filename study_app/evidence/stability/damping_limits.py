@@ -27,24 +27,24 @@ _UNALTERED_NSPM: Final = 53.0
 oil has a secant of 55 N·s/m where it reaches 8 N at a scale of 10, so the limit removes only 4 % of this force. With
 "ewma", the limit is 75 % of the greatest stable damping of a free handle of 0.1 kg."""
 _UNALTERED_SHARE: Final = 0.75
-"""Greatest share of the stable damping under these conditions with another filter."""
+"""Greatest proportion of the stable damping under these conditions with another filter."""
 _UNALTERED_INERTIA_SHARE: Final = 0.85
-"""Share of this limit for added mass and history, so that those of honey are not limited either."""
+"""Proportion of this limit for added mass and history, so that those of honey are not limited either."""
 _INERTIA_SHARE: Final = 0.3
-"""Share of a drag limit for added mass and history under other conditions."""
+"""Proportion of a drag limit for added mass and history under other conditions."""
 _SHARE: Final = 0.5
-"""Share of the stable damping under other conditions: the slope of a quadratic law is twice its secant."""
+"""Proportion of the stable damping under other conditions: the slope of a quadratic law is twice its secant."""
 _FAST_SHARE: Final = 0.4
-"""Share of the stable damping above 1 kHz, where an encoder count corresponds to a greater speed and the slew limit
-permits a steeper force."""
+"""Proportion of the stable damping above 1 kHz, where an encoder count corresponds to a greater speed and the slew
+limit permits a steeper force."""
 _FAST_NSPM: Final = 40.0
 """Greatest limit above 1 kHz [N·s/m]."""
 _FAST_KALMAN_NSPM: Final = 22.0
 """Greatest limit above 1 kHz with "kalman" [N·s/m], which passes more of a release while a wake breaks."""
 _KALMAN_SHARE: Final = 0.64
-"""Share of the limits above with "kalman", up to 1 kHz, except where forces are not limited. With 1 and a delay one
-tick longer than assumed, a held handle was noisy in tar at 250 Hz, and a released one oscillated at 500 Hz; with 0.8, a
-released handle was noisy in gear oil at a scale of 40 with 3 ticks of delay."""
+"""Proportion of the limits above with "kalman", up to 1 kHz, except where forces are not limited. With 1 and a delay
+one tick longer than assumed, a held handle was noisy in tar at 250 Hz, and a released one oscillated at 500 Hz; with
+0.8, a released handle was noisy in gear oil at a scale of 40 with 3 ticks of delay."""
 _COUNT_N: Final = 0.25
 """The greatest force that one count of a Falcon's encoder may cause [N]."""
 _COUNT_M: Final = 38e-6
@@ -124,8 +124,8 @@ def _limit_nspm(velocity: Velocity, period_s: float, delay: int, *, unaltered: b
     The raw difference passes one encoder count on in full, EWMA according to `_weight`.
     """
     is_fast = period_s < NOMINAL_S
-    share = _UNALTERED_SHARE if unaltered else _FAST_SHARE if is_fast else _SHARE
-    limits = [share * boundary_nspm(velocity, period_s, delay)]
+    proportion = _UNALTERED_SHARE if unaltered else _FAST_SHARE if is_fast else _SHARE
+    limits = [proportion * boundary_nspm(velocity, period_s, delay)]
     if unaltered:
         limits.append(_UNALTERED_NSPM)
     if is_fast:

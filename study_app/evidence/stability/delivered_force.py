@@ -212,12 +212,12 @@ def acting_on_sine(case: Case, scene: Scene, frequency_hz: float = WHOLE.frequen
     settled = trace.t_s >= _SETTLED_S
     parts_n = _law_parts(scene, trace)
     regressors = np.column_stack([part_n[settled] for part_n in parts_n.values()])
-    shares = np.linalg.lstsq(regressors, (trace.acting_n @ DIRECTION)[settled], rcond=None)[0]
+    proportions = np.linalg.lstsq(regressors, (trace.acting_n @ DIRECTION)[settled], rcond=None)[0]
     model_n, sent_n = trace.asked_n[settled], trace.sent_n[settled]
     withheld = float(np.linalg.norm(model_n - sent_n, axis=1).sum() / np.linalg.norm(model_n, axis=1).sum())
     return Acting(
         error=_rms_error(trace, law_along(scene, trace) @ DIRECTION),
-        parts={name: 100 * float(share) for name, share in zip(parts_n, shares, strict=True)},
+        parts={name: 100 * float(proportion) for name, proportion in zip(parts_n, proportions, strict=True)},
         withheld=100 * withheld,
     )
 

@@ -1,4 +1,4 @@
-"""The share of a delayed force that the passivity controller passes, by liquid, hand and delay.
+"""The proportion of a delayed force that the passivity controller passes, by liquid, hand and delay.
 
 A hand moves a handle of about 0.1 kg at 1 kHz and one tick of delay along a sine of ±30 mm and at most 0.2 m/s. The
 force of the liquid, within the slope limits, reaches the passivity controller later, as if the liquid were on another
@@ -53,7 +53,7 @@ def measure_force_delays(
 
 
 def force_delay_evidence(entries: Sequence[Entry], file: str) -> Evidence:
-    """Return the remaining share [%] as a table, and the file that ``protocol.warnings.delayed_force`` reads.
+    """Return the remaining proportion [%] as a table, and the file that ``protocol.warnings.delayed_force`` reads.
 
     The table has one line per liquid, estimator and hand, and one column per delay.
     """
@@ -62,7 +62,9 @@ def force_delay_evidence(entries: Sequence[Entry], file: str) -> Evidence:
     lines = [f"{'remaining force [%], by delay [ms]':40}" + "".join(f"{delay:6g}" for delay in delays_ms)]
     for liquid, estimator, hand in dict.fromkeys(entry[:3] for entry in entries):
         percentages = (left_by_case.get((liquid, estimator, hand, delay), math.nan) for delay in delays_ms)
-        lines.append(f"{f'{liquid}, {estimator}, {hand}':40}" + "".join(f"{share:6.0f}" for share in percentages))
+        lines.append(
+            f"{f'{liquid}, {estimator}, {hand}':40}" + "".join(f"{proportion:6.0f}" for proportion in percentages)
+        )
     rows = [(*entry[:3], *(f"{value:g}" for value in entry[3:])) for entry in entries]
     return Evidence("\n".join(lines) + "\n", {file: Table(Entry._fields, rows).csv()})
 
@@ -75,14 +77,14 @@ def delayed_trace(case: Case) -> Any:
 
 def _entry(liquid: str, estimator: str, hand: str, delay_ms: float) -> Entry:
     case = Case(liquid=liquid, scale=scenes()[liquid].scale, estimator=estimator, hand=hand, force_delay_ms=delay_ms)
-    shares = [_shares(dataclasses.replace(case, mass_kg=mass_kg)) for mass_kg in _MASSES_KG]
+    proportions = [_shares(dataclasses.replace(case, mass_kg=mass_kg)) for mass_kg in _MASSES_KG]
     return Entry(
         liquid=liquid,
         estimator=estimator,
         hand=hand,
         delay_ms=delay_ms,
-        left_percent=round(100 * fmean(share.left for share in shares), 1),
-        withheld_percent=round(100 * fmean(share.withheld for share in shares), 1),
+        left_percent=round(100 * fmean(proportion.left for proportion in proportions), 1),
+        withheld_percent=round(100 * fmean(proportion.withheld for proportion in proportions), 1),
     )
 
 

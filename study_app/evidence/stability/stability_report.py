@@ -113,12 +113,12 @@ def _draw_unstable_shares(axes: Axes, off: Sequence[Verdict]) -> None:
         totals[verdict.case.rate_hz, verdict.case.delay] += 1
         unstable[verdict.case.rate_hz, verdict.case.delay] += verdict.grade == UNSTABLE
     rates_hz = sorted({rate_hz for rate_hz, _ in totals}, reverse=True)
-    shares = np.array([[unstable[r, d] / max(totals[r, d], 1) for r in rates_hz] for d in DELAYS])
+    proportions = np.array([[unstable[r, d] / max(totals[r, d], 1) for r in rates_hz] for d in DELAYS])
     axes.grid(visible=False)
-    axes.imshow(shares, cmap="Blues", vmin=0, vmax=1, aspect="auto", origin="lower")
-    for (row, column), share in np.ndenumerate(shares):
-        colour = "white" if share > 0.55 else style.TEXT
-        axes.text(column, row, f"{share:.0%}", ha="center", va="center", color=colour)
+    axes.imshow(proportions, cmap="Blues", vmin=0, vmax=1, aspect="auto", origin="lower")
+    for (row, column), proportion in np.ndenumerate(proportions):
+        colour = "white" if proportion > 0.55 else style.TEXT
+        axes.text(column, row, f"{proportion:.0%}", ha="center", va="center", color=colour)
     axes.set_xticks(range(len(rates_hz)), [f"{1e3 / rate_hz:g}" for rate_hz in rates_hz])
     axes.set_yticks(range(len(DELAYS)), [str(delay) for delay in DELAYS])
     axes.set_title("Unstable cases, safety off,\nby ticks of delay", pad=5)
@@ -164,8 +164,8 @@ _MOVING_S: Final = 1.2
 class Fidelity(NamedTuple):
     """One liquid in one loop, in the worst of its motions.
 
-    ``difference_n`` and ``force_n`` are RMS values [N] over a motion; ``beyond`` is the greatest share of ticks whose
-    force differs by more than the target.
+    ``difference_n`` and ``force_n`` are RMS values [N] over a motion; ``beyond`` is the greatest proportion of ticks
+    whose force differs by more than the target.
     """
 
     liquid: str
@@ -324,7 +324,9 @@ def verdict_text(verdict: Verdict) -> str:
         f"({1e3 * verdict.permitted_j:.2f} mJ permitted), the handle oscillates at {1e3 * verdict.swing_mps:.0f} mm/s, "
         f"the force above 40 Hz is {verdict.fast_n:.2f} N ({verdict.played_n:.2f} N {reference})"
     )
-    limiter_shares = [f"{name} {share:.1%}" for name, share in zip(LIMITER_NAMES, verdict.acted, strict=True) if share]
+    limiter_shares = [
+        f"{name} {proportion:.1%}" for name, proportion in zip(LIMITER_NAMES, verdict.acted, strict=True) if proportion
+    ]
     return (
         f"{text}; proportion of ticks on which each limiter was active: {', '.join(limiter_shares)}"
         if limiter_shares
@@ -386,9 +388,10 @@ def _limiter_lines(swept: Swept) -> Iterator[str]:
     cases = len(swept.on)
     yield f"{'with safety on':24}   in cases    in ticks"
     for k, name in enumerate(LIMITER_NAMES):
-        shares = [verdict.acted[k] for verdict in swept.on]
-        if any(shares):
-            yield f"  {name:22} {sum(share > 0 for share in shares) / cases:10.1%}  {sum(shares) / cases:10.2%}"
+        proportions = [verdict.acted[k] for verdict in swept.on]
+        if any(proportions):
+            acting = sum(proportion > 0 for proportion in proportions) / cases
+            yield f"  {name:22} {acting:10.1%}  {sum(proportions) / cases:10.2%}"
 
 
 def _fidelity_lines(fidelities: Sequence[Fidelity]) -> Iterator[str]:
@@ -438,5 +441,5 @@ def _cases_csv(swept: Swept) -> str:
         row = list(astuple(off.case))
         for verdict in (off, on):
             row += [verdict.grade, "; ".join(verdict.reasons), *(f"{getattr(verdict, name):.4g}" for name in _MEASURES)]
-        rows.append((*row, *(f"{share:.4g}" for share in on.acted)))
+        rows.append((*row, *(f"{proportion:.4g}" for proportion in on.acted)))
     return csv_text_of(rows)

@@ -216,8 +216,8 @@ def random_path(stroke_hz: float, rate_hz: float, seed: int = 1) -> Floats:
     """Return positions (2^15, 3) [m] of noise about strokes of a frequency; the motion fades in from rest at 0."""
     turns, power_m2 = _spectrum(rate_hz, stroke_hz)
     phase = np.random.default_rng(seed).uniform(0, 2 * math.pi, len(turns))
-    share = np.minimum(np.arange(_ROWS) / rate_hz / _FADE_IN_S, 1.0)
-    x_m = _signal(np.sqrt(2 * power_m2) * np.exp(1j * phase)) * share**2 * (3 - 2 * share)
+    proportion = np.minimum(np.arange(_ROWS) / rate_hz / _FADE_IN_S, 1.0)
+    x_m = _signal(np.sqrt(2 * power_m2) * np.exp(1j * phase)) * proportion**2 * (3 - 2 * proportion)
     path_m: Floats = np.outer(x_m, DIRECTION)
     return path_m
 

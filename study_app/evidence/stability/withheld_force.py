@@ -1,7 +1,7 @@
-"""The share of each liquid's force that passivity controller and slew limit withhold during and after fast motion.
+"""The proportion of each liquid's force that passivity controller and slew limit withhold during and after fast motion.
 
-The share is Σ|F_a - F_b| / Σ|F_a|, where F_a is the force after slope limit, fades and norm clamp, and F_b the force
-sent. A handle is moved along straight strokes A cos 2πft, which begin at rest; and along 0.9 s of such a stroke
+The proportion is Σ|F_a - F_b| / Σ|F_a|, where F_a is the force after slope limit, fades and norm clamp, and F_b the
+force sent. A handle is moved along straight strokes A cos 2πft, which begin at rest; and along 0.9 s of such a stroke
 followed by four seconds of slow stirring in circles of radius 30 mm, each second of which is evaluated. Each motion is
 imposed three times: on the position itself, whatever the force; by a hand that holds the handle firmly enough to follow
 a stroke of 8 Hz; and on a hand that holds it through the tissue of its fingers, in which it swings, so that strokes
@@ -67,7 +67,7 @@ MODES: Final = (_IMPOSED, _HELD, SHAKEN)
 
 
 class Withheld(NamedTuple):
-    """Withheld shares of one liquid's force: in each stroke of `STROKES`, and in each second after `QUICK`."""
+    """Withheld proportions of one liquid's force: in each stroke of `STROKES`, and in each second after `QUICK`."""
 
     liquid: str
     estimator: str
@@ -77,7 +77,7 @@ class Withheld(NamedTuple):
 
     @property
     def quick(self) -> float:
-        """The greatest share over all strokes that have a limit."""
+        """The greatest proportion over all strokes that have a limit."""
         return 0.0 if self.mode == SHAKEN else max(self.strokes)
 
     @property
@@ -86,8 +86,8 @@ class Withheld(NamedTuple):
 
     @property
     def lasting(self) -> float:
-        """The greatest share from one second after a shake onwards."""
-        return max(share for seconds in self.after for share in seconds[1:])
+        """The greatest proportion from one second after a shake onwards."""
+        return max(proportion for seconds in self.after for proportion in seconds[1:])
 
     @property
     def met(self) -> bool:
@@ -102,7 +102,7 @@ def measure_withheld_force(
     delay: int = 1,
     executor: Executor | None = None,
 ) -> tuple[Withheld, ...]:
-    """Return the withheld shares of liquids (by default all shipped ones), each at its own scale, at 1 kHz."""
+    """Return the withheld proportions of liquids (by default all shipped ones), each at its own scale, at 1 kHz."""
     shipped = [name for name in liquids() if name not in {"dense", "damper"}]
     planned = [
         (
@@ -121,7 +121,7 @@ def measure_withheld_force(
 
 
 def withheld_force_evidence(found: Sequence[Withheld]) -> Evidence:
-    """Return the table of shares in percent, and whether each limit is met."""
+    """Return the table of proportions in percent, and whether each limit is met."""
     text = "\n".join(_lines(found)) + "\n"
     return Evidence(text, {"withheld.txt": text}, missed=not all(withheld.met for withheld in found))
 
@@ -134,9 +134,9 @@ def _lines(found: Sequence[Withheld]) -> Iterator[str]:
         after = f"   in seconds 1 to {SECONDS} after {SHOWN_SHAKE}; maximum after the first second"
         yield f"{f'{estimator}, {mode}':21}{strokes}{after}"
         for row in rows:
-            after = "".join(f"{100 * share:7.1f}" for share in row.after[QUICK.index(SHOWN_SHAKE)])
+            after = "".join(f"{100 * proportion:7.1f}" for proportion in row.after[QUICK.index(SHOWN_SHAKE)])
             goals = "no goal" if row.liquid in _EXEMPT else _goal_text(row.met) + " afterwards" * (mode == SHAKEN)
-            strokes = "".join(f"{100 * share:11.1f}" for share in row.strokes)
+            strokes = "".join(f"{100 * proportion:11.1f}" for proportion in row.strokes)
             yield f"  {row.liquid:19}{strokes}  {after}{100 * row.lasting:10.1f}   {goals}"
     with_limits = [withheld for withheld in found if withheld.liquid not in _EXEMPT]
     lasting = max(withheld.lasting for withheld in with_limits)

@@ -195,7 +195,7 @@ class StudyFound:
 
 @dataclass(frozen=True, slots=True)
 class Rehearsed:
-    """The share of intervals delivered as requested, the number of findings of all checks, and the estimated values."""
+    """The proportion of intervals delivered as requested, the number of findings, and the estimated values."""
 
     delivered: float
     findings: int
@@ -512,7 +512,7 @@ def rehearse_known(known: Known, source: bytes, seed: int) -> Rehearsed:
 
 
 def percent(share: float) -> str:
-    """Return a share in percent."""
+    """Return a proportion in percent."""
     return f"{100 * share:.1f} %"
 
 
@@ -547,14 +547,14 @@ def coverage(name: str, studies: Sequence[StudyFound]) -> Iterator[Measure]:
         ("the group's", group_coverage, 1.0),
         ("participants'", people_coverage, _MAX_OWN_COVERAGE),
     ):
-        shares = [float(np.mean(study_coverage)) for study_coverage in covered if study_coverage]
-        if not shares:
+        proportions = [float(np.mean(study_coverage)) for study_coverage in covered if study_coverage]
+        if not proportions:
             continue
         yield Measure(
             study=name,
             what=f"coverage of {owner} 95 % intervals",
-            value=float(np.mean(shares)),
-            interval=share_interval(shares, max(map(len, covered))),
+            value=float(np.mean(proportions)),
+            interval=share_interval(proportions, max(map(len, covered))),
             least=MIN_COVERAGE,
             most=most,
             limit="at least 93 %" if most == 1.0 else f"93 to {100 * most:.0f} %",

@@ -3,8 +3,8 @@
 A person perceives a delay with Gaussian noise, whose spread follows from the person's just-noticeable difference. In
 ``delaydetect`` the person chooses the interval that seems more delayed. In ``rek2024`` the person rates the statement
 ``different`` after each delay by comparing the noisy delay with a personal criterion, as in the answer model of
-rehearsals. Both sets of answers are analysed as in the report. The figure shows the shares over the delay, and both
-thresholds over the criterion.
+rehearsals. Both sets of answers are analysed as in the report. The figure shows the proportions over the delay, and
+both thresholds over the criterion.
 """
 
 from collections.abc import Sequence
@@ -145,17 +145,17 @@ def draw(comparison: Compared) -> Figure:
     """Draw both panels."""
     figure = Figure(figsize=(style.PAGE_WIDTH_PT / 72, 3.6), layout="constrained")
     figure.suptitle(f"{TITLE}: SIMULATED participants, n = {comparison.people}", fontsize=7.5)
-    shares, thresholds = figure.subplots(1, 2)
-    shares.set(title="Answers at each delay", xlabel="Delay, ms", xticks=[0, 50, 75, 100, 125, 150, 200])
-    shares.set(ylim=(-0.03, 1.03), yticks=[0.0, 0.5, 0.75, 1.0])
-    shares.yaxis.set_major_formatter(PercentFormatter(1.0))
+    proportions, thresholds = figure.subplots(1, 2)
+    proportions.set(title="Answers at each delay", xlabel="Delay, ms", xticks=[0, 50, 75, 100, 125, 150, 200])
+    proportions.set(ylim=(-0.03, 1.03), yticks=[0.0, 0.5, 0.75, 1.0])
+    proportions.yaxis.set_major_formatter(PercentFormatter(1.0))
     criteria = [1000 * rating.criterion_s for rating in comparison.ratings if not rating.adapted_s]
     thresholds.set(title="Threshold, ms", xlabel="Mean criterion of the ratings, ms", xlim=(50, 175), xticks=criteria)
     thresholds.set(ylim=(0, 205), yticks=[0, 50, 100, 150, 200])
     delays, (middle, low, high) = np.linspace(1.0, 200.0, 200), comparison.detected_ms
     correct = success("weibull", np.log10(delays), np.log10(middle), LINEAR_WIDTH, GUESS, LAPSE)
-    shares.plot(delays, correct, color=style.TEXT, dashes=(4, 2), label=f"{FORCED_CHOICE}, correct")
-    shares.plot([middle], [GUESS + (1 - GUESS - LAPSE) / 2], "s", markersize=4, color=style.TEXT)
+    proportions.plot(delays, correct, color=style.TEXT, dashes=(4, 2), label=f"{FORCED_CHOICE}, correct")
+    proportions.plot([middle], [GUESS + (1 - GUESS - LAPSE) / 2], "s", markersize=4, color=style.TEXT)
     thresholds.axhspan(low, high, color=style.BAND, linewidth=0)
     thresholds.axhline(middle, color=style.TEXT, dashes=(4, 2), label=FORCED_CHOICE)
     thresholds.axhline(_THESIS_MS, color=style.TEXT_SOFT, linewidth=0.8, dashes=(1, 1.5), label="thesis, 125 ms")
@@ -178,10 +178,12 @@ def draw(comparison: Compared) -> Figure:
             label=label,
         )
         if not rating.adapted_s:
-            shares.plot(threshold.levels, np.array(threshold.yes) / threshold.asked, "o", markersize=3, color=colour)
+            proportions.plot(
+                threshold.levels, np.array(threshold.yes) / threshold.asked, "o", markersize=3, color=colour
+            )
             agree = success("logistic", delays, threshold.effect, threshold.width, threshold.guess, threshold.lapse)
-            shares.plot(delays, agree, color=colour, label=f"{LIKERT}, {criterion_ms:.0f} ms")
-    for axes in (shares, thresholds):
+            proportions.plot(delays, agree, color=colour, label=f"{LIKERT}, {criterion_ms:.0f} ms")
+    for axes in (proportions, thresholds):
         axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.18), ncols=2, frameon=False, fontsize=7.2)
     return figure
 

@@ -177,11 +177,11 @@ def _draw_panel(axes: Axes, delays: Delayed, screen: str, *, first: bool) -> Non
         offset = _LOAD_SPACING * (number - (len(delays.loads) - 1) / 2)
         for index, trial in enumerate(delays.on(screen, load)):
             _draw_trial(axes, trial, index + offset, top_ms)
-    for share, text in ((0.5, "½ frame"), (1.0, "1 frame")):
-        axes.axhline(share * frame_ms, color=style.ZERO, linewidth=0.8, linestyle=(0, (1, 1.5)), zorder=1)
+    for proportion, text in ((0.5, "½ frame"), (1.0, "1 frame")):
+        axes.axhline(proportion * frame_ms, color=style.ZERO, linewidth=0.8, linestyle=(0, (1, 1.5)), zorder=1)
         axes.annotate(
             text,
-            (1.0, share * frame_ms),
+            (1.0, proportion * frame_ms),
             (3, 0),
             xycoords=("axes fraction", "data"),
             textcoords="offset points",

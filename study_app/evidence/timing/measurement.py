@@ -278,7 +278,7 @@ class LoopTiming:
 
     @property
     def late_share(self) -> float:
-        """The share of deadlines that were missed by more than 1 ms."""
+        """The proportion of deadlines that were missed by more than 1 ms."""
         return self.late / max(self.ticks + self.overruns, 1)
 
 

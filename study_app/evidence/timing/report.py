@@ -104,15 +104,15 @@ def _draw_panel(axes: Axes, timing: Timed, level: Level, highest_us: float, *, f
     decades = np.log10(highest_us / _LOWEST_US)
     edges = np.logspace(np.log10(_LOWEST_US), np.log10(highest_us), round(_BINS_A_DECADE * decades) + 1)
     loops = [loop for loop in timing.loops if loop.grant.level == level]
-    least = 1 / max(loop.ticks for loop in timing.loops)
+    minimum = 1 / max(loop.ticks for loop in timing.loops)
     axes.set_xscale("log")
     axes.set_yscale("log")
     axes.set_xlim(_LOWEST_US, highest_us)
-    axes.set_ylim(0.6 * least, 1.4)
+    axes.set_ylim(0.6 * minimum, 1.4)
     for loop in loops:
         shares = np.histogram(np.clip(loop.lateness_ns * 1e-3, _LOWEST_US, None), edges)[0] / loop.ticks
-        axes.stairs(np.where(shares > 0, shares, 0.1 * least), edges, baseline=None, **_LOOKS[loop.kind])
-    _mark_tails(axes, loops, least)
+        axes.stairs(np.where(shares > 0, shares, 0.1 * minimum), edges, baseline=None, **_LOOKS[loop.kind])
+    _mark_tails(axes, loops, minimum)
     axes.axvline(LATE_NS * 1e-3, color=style.ZERO, linewidth=0.8, linestyle=(0, (1, 1.5)), zorder=1)
     axes.annotate("1 ms", (LATE_NS * 1e-3, 1.3), (2, -1), textcoords="offset points", va="top", fontsize=6.6)
     axes.xaxis.set_major_locator(FixedLocator([10.0**power for power in range(0, 8)]))

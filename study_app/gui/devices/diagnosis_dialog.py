@@ -19,12 +19,12 @@ from study_app.gui.widgets.boxes import STRETCH, hbox, vbox
 from study_app.gui.widgets.cards import Icon, Rule
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import label, set_ink
-from study_app.store.support import NAME, write_support
+from study_app.store.support import NAME, write_support_archive
 from study_app.store.workstation import MachineSettings
 from study_app.workers.server import Crashed, Refused
 
 _POLL_MS = 100
-_PREPARING = "Preparing … On first use the driver is compiled, which takes about a minute."
+_PREPARING = "Preparing… On first use the driver is compiled, which takes about a minute."
 _SIZE = QSize(820, 700)
 
 
@@ -77,7 +77,7 @@ class DiagnosisDialog(QDialog):
         self.sign = Icon("pulse", "accent", 26)
         self.again = ActionButton("repeat", "Run again")
         self.copy = ActionButton("copy", "Copy report")
-        self.support = ActionButton("save", "Save for support …")
+        self.support = ActionButton("save", "Save for support…")
         self.close_button = ActionButton("", "Cancel")
         self._lay_out(title)
         self._connect()
@@ -185,7 +185,7 @@ class DiagnosisDialog(QDialog):
     def save_support(self, path: Path) -> None:
         """Write a zip file with versions, settings, log, last error and report; show its path, or the error."""
         try:
-            write_support(path, self._report_text())
+            write_support_archive(path, self._report_text())
         except StoreError as error:
             self.saved.setText(as_sentence(str(error)))
         else:

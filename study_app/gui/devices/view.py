@@ -36,7 +36,7 @@ class _DeviceRow(QWidget):
         self.can = _text_label("text2")
         self.why = _text_label("warn")
         self.by = _text_label("text3", small=True)
-        self.diagnose = ActionButton("pulse", "Diagnose …", height=36)
+        self.diagnose = ActionButton("pulse", "Diagnose…", height=36)
         self.diagnose.setAccessibleName(f"Diagnose {shown.title}")
         self.diagnose.setVisible(shown.diagnosable)
         self.diagnose.clicked.connect(lambda: diagnose(self.name))
@@ -90,7 +90,7 @@ class _HelpCard(Card):
         super().__init__("Before the first session", gap=8)
         for paragraph in (
             "Connect the USB cable and the power adapter, then press “Refresh”.",
-            "“Diagnose …” opens the device, loads its firmware, homes it, tests it without force and reports any "
+            "“Diagnose…” opens the device, loads its firmware, homes it, tests it without force and reports any "
             "faults.",
             "“liquid-study devices calibrate” measures the device's force with a known weight.",
             "“liquid-study devices bench” tests any force-feedback device and takes ten minutes.",
@@ -221,7 +221,7 @@ class DevicesPlace(Place):
 
     def show_looking(self, looking: bool) -> None:
         self.refresh.setEnabled(not looking)
-        self.refresh.show_action("repeat", "Looking …" if looking else "Refresh")
+        self.refresh.show_action("repeat", "Looking…" if looking else "Refresh")
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)

@@ -59,20 +59,20 @@ _EMPTY_CELL: Final = re.compile(r"(?<=\|) *(?=\|)")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HelpEntry:
-    """A row of the list of pages: its page, title and anchor, and whether it ``heads`` a section."""
+    """A row of the list of pages: its page, title and anchor, and whether it is the heading of a section."""
 
     page: str
     title: str
-    heads: bool = False
+    is_heading: bool = False
     anchor: str = ""
 
 
 @cache
 def help_entries() -> tuple[HelpEntry, ...]:
     """Return the pages in the order of the sections, each page followed by its sections."""
-    rows = [HelpEntry(page=_FIRST_PAGE, title="Start page", heads=True)]
+    rows = [HelpEntry(page=_FIRST_PAGE, title="Start page", is_heading=True)]
     for section, pages in documentation.sections().items():
-        rows.append(HelpEntry(page=section, title=plain(documentation.title(section)), heads=True))
+        rows.append(HelpEntry(page=section, title=plain(documentation.title(section)), is_heading=True))
         rows += [HelpEntry(page=page, title=plain(documentation.title(page))) for page in pages]
     return tuple(rows)
 
@@ -281,7 +281,7 @@ class _PageReader(Coloured, QTextBrowser):
             self.page_asked.emit(self._path_from_docs(path.removesuffix(_SUFFIX)), anchor)
 
 
-LIST_WIDTH, ROW_PX, HEAD_PX = 280, 30, 40
+LIST_WIDTH, ROW_PX, HEADING_PX = 280, 30, 40
 PAGE, ANCHOR = Qt.ItemDataRole.UserRole, Qt.ItemDataRole.UserRole + 1
 _MOVE_KEYS = (Qt.Key.Key_Up, Qt.Key.Key_Down, Qt.Key.Key_PageUp, Qt.Key.Key_PageDown)
 _ENTER_KEYS = (Qt.Key.Key_Return, Qt.Key.Key_Enter)
@@ -294,35 +294,35 @@ class HelpPlace(Place):
         super().__init__()
         self._history: list[str] = []
         self._origin = ""
-        self.words = QLineEdit(placeholderText="Search the pages", clearButtonEnabled=True)
-        self.words.setAccessibleName("Search the pages")
-        self.words.setFont(font("label", weight=400))
+        self.search_field = QLineEdit(placeholderText="Search the pages", clearButtonEnabled=True)
+        self.search_field.setAccessibleName("Search the pages")
+        self.search_field.setFont(font("label", weight=400))
         self.list = QListWidget()
         self.list.setAccessibleName("Pages")
         self.list.setProperty("role", "links")
         self.list.setFrameShape(QFrame.Shape.NoFrame)
         self.list.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        self.nothing = label("No page contains these words.", "label", "text2", wraps=True)
+        self.no_results = label("No page contains these words.", "label", "text2", wraps=True)
         self.reader = _PageReader(documentation.folder() if folder is None else folder)
         self.back = ActionButton("chevron_left", "Back", height=38)
         self.back.setEnabled(False)
         self._lay_out()
-        self.words.textChanged.connect(lambda text: self._show_rows(matching_entries(text)))
-        self.words.installEventFilter(self)
+        self.search_field.textChanged.connect(lambda text: self._show_rows(matching_entries(text)))
+        self.search_field.installEventFilter(self)
         self.list.currentItemChanged.connect(self._open_chosen)
         self.reader.page_asked.connect(self.open_page)
         self.back.clicked.connect(self.go_back)
         self.back.setToolTip("Back (Alt+←); Esc returns to the page from which Help was opened")
         QShortcut(QKeySequence("Alt+Left"), self, self.go_back)
         QShortcut(QKeySequence("Esc"), self, self._go_to_origin)
-        QShortcut(QKeySequence(QKeySequence.StandardKey.Find), self, self.words.setFocus)
+        QShortcut(QKeySequence(QKeySequence.StandardKey.Find), self, self.search_field.setFocus)
         self._show_rows(help_entries())
         self.open_page(_FIRST_PAGE)
 
     def _lay_out(self) -> None:
         pages, page = Card(padding=14, gap=10), Card(padding=6, gap=0)
         pages.setFixedWidth(LIST_WIDTH)
-        add_parts(pages.column, self.words, self.nothing, (self.list, 1))
+        add_parts(pages.column, self.search_field, self.no_results, (self.list, 1))
         page.column.addWidget(self.reader, 1)
         head = hbox((label("Help", "title"), 1), self.back, margins=(SHADOW, 0, SHADOW, 0))
         body = hbox(pages, (page, 1), spacing=14)
@@ -374,11 +374,11 @@ class HelpPlace(Place):
                 item.setData(PAGE, row.page)
                 item.setData(ANCHOR, row.anchor)
                 item.setToolTip(plain_tip(row.title))
-                item.setFont(font("label", weight=600 if row.heads else 400))
-                item.setSizeHint(QSize(LIST_WIDTH - 60, HEAD_PX if row.heads else ROW_PX))
+                item.setFont(font("label", weight=600 if row.is_heading else 400))
+                item.setSizeHint(QSize(LIST_WIDTH - 60, HEADING_PX if row.is_heading else ROW_PX))
                 self.list.addItem(item)
-        self.nothing.setVisible(not rows)
-        self._select("" if self.words.text().strip() else self.reader.page)
+        self.no_results.setVisible(not rows)
+        self._select("" if self.search_field.text().strip() else self.reader.page)
 
     def _select(self, name: str) -> None:
         rows = [row for row in range(self.list.count()) if self.list.item(row).data(PAGE) == name]

@@ -294,8 +294,8 @@ class _FileCard(Card):
         else:
             self.pen = ActionButton("pen", "Continue", role="primary" if first else "", height=38)
             self.pen.setAccessibleName(f"Continue {title}, {Path(facts.source).stem}")
-            name = f"Discard the draft of {title}, {Path(facts.source).stem} …"
-            self.bin = IconButton("trash", name, "Discard the draft …", size=38, role="danger")
+            name = f"Discard the draft of {title}, {Path(facts.source).stem}…"
+            self.bin = IconButton("trash", name, "Discard the draft…", size=38, role="danger")
             self.bin.clicked.connect(lambda: self.discard.emit(facts))
             row = hbox((self.draft, 1), self.pen, self.bin, spacing=12)
             for part in (self.draft, self.pen, self.bin):

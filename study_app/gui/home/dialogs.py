@@ -97,7 +97,7 @@ class RehearsalDialog(Work):
     def _start_rehearsal(self) -> None:
         count = self.value("participants")
         self._done = 0
-        self.show_progress(f"0 of {count}: rehearsing …", 0.0)
+        self.show_progress(f"0 of {count}: rehearsing…", 0.0)
         try:
             self.worker = WorkerClient(TASK, name="rehearsal")
         except OSError as error:

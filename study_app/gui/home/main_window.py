@@ -307,7 +307,7 @@ class MainWindow(Themed, QMainWindow):
     ) -> None:
         """Show that a device failed, and offer to try again and, if possible, to diagnose it."""
         try_again = ActionButton("repeat", "Try again", role="primary")
-        other = None if diagnose is None else ActionButton("pulse", "Diagnose …")
+        other = None if diagnose is None else ActionButton("pulse", "Diagnose…")
         if other is not None and diagnose is not None:
             other.clicked.connect(diagnose)
         notice = Question(self, self.theme, title, sentence, try_again, back="Close", other=other)

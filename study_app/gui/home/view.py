@@ -107,10 +107,10 @@ class HomePlace(Place):
         self.sessions = SessionsCard()
         self.device = DeviceCard()
         self.lab = LabCard()
-        self.open_protocol = ActionButton("file", "Open protocol …", cap=key_cap("open"))
-        self.new_study = ActionButton("plus", "New study …", cap=key_cap("new"))
+        self.open_protocol = ActionButton("file", "Open protocol…", cap=key_cap("open"))
+        self.new_study = ActionButton("plus", "New study…", cap=key_cap("new"))
         self.folder = Elided("label", "text2")
-        self.waiting = label("Reading studies …", "card", "text2")
+        self.waiting = label("Reading studies…", "card", "text2")
         for button, action in ((self.open_protocol, "open"), (self.new_study, "new")):
             button.setToolTip(with_key(button.text(), action))
             button.setAccessibleName(button.toolTip())
@@ -404,10 +404,10 @@ class HomePlace(Place):
                 self.sessions.setMinimumHeight(_LOW_PX if low else LEAST_HEIGHT)
             self._invalidate_layouts()
             others = self._page.totalMinimumSize().height() - self.cards_area.minimumHeight()
-            least = min(whole, self.grid.row_height + beyond)
-            if fits := others + least <= self.area.viewport().height():
+            minimum = min(whole, self.grid.row_height + beyond)
+            if fits := others + minimum <= self.area.viewport().height():
                 break
-        self.cards_area.setMinimumHeight(least if fits else whole)
+        self.cards_area.setMinimumHeight(minimum if fits else whole)
         self.cards_area.setMaximumHeight(whole)
         self._invalidate_layouts()
         self._page.activate()

@@ -64,7 +64,9 @@ COMMANDS: Final = (
     Command("home", "Home", ("Alt+Home",), run=lambda page: page.leave_for_home()),
     Command("back", "Previous element", ("Alt+Left",), run=lambda page: page.ask("back")),
     Command("next question", "Text of the next question", ("Alt+PgDown",), run=lambda page: page.write_question(1)),
-    Command("question before", "Text of the previous one", ("Alt+PgUp",), run=lambda page: page.write_question(-1)),
+    Command(
+        "question before", "Text of the previous question", ("Alt+PgUp",), run=lambda page: page.write_question(-1)
+    ),
     Command("page", "Participant's page", ("Ctrl+Return",)),
     Command("leave page", "Leave the page", ("Escape",), within="page"),
     Command("language", "Show the page in the next language", ("Ctrl+L",)),
@@ -77,8 +79,8 @@ COMMANDS: Final = (
     Command("delete", "Delete", ("Delete",), within=_IN_LISTS, run=lambda page: page.delete()),
     Command("up", "Move up", ("Alt+Up",), run=lambda page: page.move_by(-1)),
     Command("down", "Move down", ("Alt+Down",), run=lambda page: page.move_by(1)),
-    Command("new", "New study …", ("Ctrl+N",), run=lambda page: page.begin_new()),
-    Command("open", "Open file …", ("Ctrl+O",), run=lambda page: page.header.open_file()),
+    Command("new", "New study…", ("Ctrl+N",), run=lambda page: page.begin_new()),
+    Command("open", "Open file…", ("Ctrl+O",), run=lambda page: page.header.open_file()),
     Command("save", "Save", ("Ctrl+S",), run=lambda page: page.finish("save")),
     Command("undo", "Undo", ("Ctrl+Z",), run=lambda page: page.finish("undo")),
     Command("redo", "Redo", ("Ctrl+Shift+Z", "Ctrl+Y"), run=lambda page: page.finish("redo")),
@@ -101,7 +103,7 @@ def keys_markdown() -> str:
         f"| {', '.join(command.key_labels)} | {command.words}{command.within and f' ({command.within})'} |"
         for command in COMMANDS
     )
-    return "\n".join(("| key | does |", "| --- | --- |", *rows, ""))
+    return "\n".join(("| key | action |", "| --- | --- |", *rows, ""))
 
 
 def add_commands(widget: QWidget, runs: Mapping[str, Callable[[], object]]) -> dict[str, QAction]:

@@ -89,7 +89,7 @@ def device_before_search(name: str) -> DeviceShown:
     device = _descriptor(name)
     icon = "device" if device is None else device.icon
     return DeviceShown(
-        name=name, title=title_of(name), icon=icon, tone="neutral", sign="clock", word="Looking …", can="", why=""
+        name=name, title=title_of(name), icon=icon, tone="neutral", sign="clock", word="Looking…", can="", why=""
     )
 
 

@@ -179,7 +179,7 @@ class Work(Question):
             for part in (*self.editors.values(), self.go_on):
                 part.hide()
             set_ink(self.said, "text2")
-            self.show_progress("Beginning …")
+            self.show_progress("Beginning…")
             self.bar.show()
             self._shrink()
             self.begun.emit()
@@ -190,7 +190,7 @@ class Work(Question):
             super().reject()
         elif self.back.isEnabled():
             self.back.setEnabled(False)
-            self.said.setText("Stopping …")
+            self.said.setText("Stopping…")
             self.stop_asked.emit()
 
     def _show_end(self, sentence: str) -> None:

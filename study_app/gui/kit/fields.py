@@ -149,7 +149,7 @@ class Editor(QWidget):
         name_label = label(field.label, "label", "text" if field.unit else "text2")
         name_label.setBuddy(self.control)
         if field.kind in {"file", "folder"}:
-            button = ActionButton("", "Choose …" if field.kind == "file" else "Change …", height=40)
+            button = ActionButton("", "Choose…" if field.kind == "file" else "Change…", height=40)
             button.setAutoDefault(False)
             button.clicked.connect(self._choose_path)
         if field.unit:

@@ -438,7 +438,7 @@ class LimiterCard(_ReadingCard):
 
 def _aside_text(view: LabView) -> str:
     if view.measuring:
-        return f"{view.felt}, measuring …"
+        return f"{view.felt}, measuring…"
     return f"{view.felt}, measured" if view.cost else ""
 
 

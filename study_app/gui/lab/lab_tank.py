@@ -461,7 +461,7 @@ class TankNote(Card):
         self.cancel = ActionButton("", "Cancel", height=36)
         self.fade_in = ActionButton("", "Fade in again", role="primary", height=36)
         self.dismiss = ActionButton("", "Close", height=36)
-        self.diagnose = ActionButton("", "Diagnose …", height=36)
+        self.diagnose = ActionButton("", "Diagnose…", height=36)
         self._dismissed = ""
         self.bar = QProgressBar(textVisible=False)
         self.bar.setRange(0, 0)
@@ -537,5 +537,5 @@ def _note_parts(view: LabView) -> tuple[str, Ink, str]:
     if view.trouble:
         return "warning", "bad", view.trouble
     if view.busy:
-        return "clock", "text2", f"{view.busy}\u00a0…"
+        return "clock", "text2", f"{view.busy}…"
     return "stop", "warn", "Force is off"

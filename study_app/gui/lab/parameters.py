@@ -179,7 +179,7 @@ class LabHeader(QWidget):
         self.undo = IconButton("undo", "Undo", "Undo (Ctrl+Z)")
         self.redo = IconButton("redo", "Redo", "Redo (Ctrl+Shift+Z)")
         self.stop = CompactStop()
-        self.save = ActionButton("save", "Save preset …", role="primary", height=_BUTTON)
+        self.save = ActionButton("save", "Save preset…", role="primary", height=_BUTTON)
         self.save.setFixedHeight(_BUTTON)
         self._narrow: bool | None = None
         self._lay_out()
@@ -524,7 +524,7 @@ class FormPanel(Card):
         self.liquid.activated.connect(self._choose_liquid)
         self.copy = ActionButton("copy", "Copy to B", height=32)
         self.copy.setProperty("dense", "true")
-        self.open = ActionButton("file", "Open preset …", height=32)
+        self.open = ActionButton("file", "Open preset…", height=32)
         self.back = ActionButton("designer", "Put back into the study", height=32)
         self.back.hide()
         self.said = Clamped("", 2, "small", "text2")
@@ -555,7 +555,7 @@ class FormPanel(Card):
         self.said.show_text(view.said)
         self.said.setVisible(bool(view.said))
         self.back.setVisible(bool(view.study))
-        self.back.setToolTip(plain_tip(f"{view.study} is open in the study designer"))
+        self.back.setToolTip(plain_tip(f"Copy these parameters to {view.study}, which is open in the study designer"))
         setting = bench.in_hand
         if setting != self._setting or bench.presented != self._side:
             has_switched = self._side != bench.presented

@@ -31,9 +31,9 @@ class Actions(Card):
     def __init__(self) -> None:
         super().__init__(padding=14)
         self.pause = ActionButton("pause", "Pause", key="P")
-        self.repeat = ActionButton("repeat", "Repeat trial …", key="R")
+        self.repeat = ActionButton("repeat", "Repeat trial…", key="R")
         self.hint = label("", "label", "text2", wraps=True, weight=400)
-        self.end = ActionButton("cross", "End session …", role="danger")
+        self.end = ActionButton("cross", "End session…", role="danger")
         self.close_session = ActionButton("check", "Close session", role="primary")
         self._resumes = False
         self._shows_icons = True
@@ -95,7 +95,7 @@ class _NoteField(QPlainTextEdit):
 
     def __init__(self) -> None:
         super().__init__()
-        self.setPlaceholderText("Write a note …")
+        self.setPlaceholderText("Write a note…")
         self.setAccessibleName("Note")
         self.setFont(font("label", weight=400))
         self.setTabChangesFocus(True)
@@ -275,7 +275,7 @@ class DeviceCard(Card):
         self.icon = Icon("device", "text2", 22)
         self.name = label("", "card")
         self.chip = Chip("neutral", "ring", "Waiting", small=True)
-        self.diagnose = ActionButton("pulse", "Diagnose …", key="D", height=36)
+        self.diagnose = ActionButton("pulse", "Diagnose…", key="D", height=36)
         self.diagnose.setToolTip("Turns off the force and pauses the session first")
         self._row_limit = ALL_ROWS
         self._view: OperatorView | None = None

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study_app.haptics.model.layout import LIMITERS as ALL_LIMITERS
-from study_app.number_text import THIN_SPACE, duration_words, grouped
+from study_app.number_text import THIN_SPACE, duration_text, grouped
 from study_app.protocol.model import Protocol
 
 Floats = NDArray[np.float64]
@@ -164,7 +164,7 @@ def health_tiles(vitals: Vitals, rate_hz: float, limit_s: float) -> tuple[Tile, 
     """Return the tiles of the operator's window; ``rate_hz`` is the requested rate, ``limit_s`` the lateness limit."""
     rate = vitals.rate_hz
     p99 = vitals.lateness_p99_s
-    p99_value, _, p99_unit = duration_words(p99).partition(" ") if p99 is not None else ("–", "", "")
+    p99_value, _, p99_unit = duration_text(p99).partition(" ") if p99 is not None else ("–", "", "")
     screen = f", {vitals.frame_rate_hz:.1f} Hz" if vitals.frame_rate_hz else ""
     return (
         Tile(
@@ -179,7 +179,7 @@ def health_tiles(vitals: Vitals, rate_hz: float, limit_s: float) -> tuple[Tile, 
             value=p99_value,
             unit=p99_unit,
             verdict="open" if p99 is None else _verdict(p99 <= limit_s),
-            line=f"limit {duration_words(limit_s)}",
+            line=f"limit {duration_text(limit_s)}",
         ),
         Tile(
             title="Overruns",
@@ -213,7 +213,7 @@ FORCE, SIZE = slice(0, 3), 3
 class ForceFigures:
     """The force of the current or last trial relative to its limit (now, maximum), and ticks by limiter.
 
-    ``withheld`` is the share of the force that limits, passivity controller and device have withheld so far.
+    ``withheld`` is the fraction of the force that limits, passivity controller and device have withheld so far.
     """
 
     share: float

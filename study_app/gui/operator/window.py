@@ -78,7 +78,7 @@ class _Arrangement(QWidget):
     def _arrange(self, size: QSize) -> None:
         width: _Width = "wide" if size.width() >= NARROW_BELOW else "narrow" if size.width() >= SLIM_BELOW else "slim"
         steps: tuple[tuple[int, _Height], ...] = ((LOW_BELOW, "high"), (LOWER_BELOW, "low"), (LEAST_BELOW, "lower"))
-        height: _Height = next((name for least, name in steps if size.height() >= least), "least")
+        height: _Height = next((name for minimum, name in steps if size.height() >= minimum), "least")
         row = size.width() - 2 * _MARGINS[width] - _GAPS[width] - _SIDE
         middle = row - _RAILS[width] - _GAPS[width]
         has_icons = (row if width == "slim" else middle) >= _ICONS_FROM
@@ -115,8 +115,8 @@ class _Arrangement(QWidget):
 
     def _fill_middle(self, *, side_by_side: bool) -> None:
         p, span = self._parts, 1 if side_by_side else 2
-        for card, least in ((p.lateness, 210), (p.force, 210), (p.position, 170)):
-            card.setMinimumHeight(least)
+        for card, minimum in ((p.lateness, 210), (p.force, 210), (p.position, 170)):
+            card.setMinimumHeight(minimum)
         p.tiles.set_narrow(not side_by_side)
         self._middle.addWidget(p.banner, 0, 0, 1, 2)
         self._middle.addWidget(self.now, 1, 0, 1, 2)

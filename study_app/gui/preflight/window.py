@@ -40,7 +40,7 @@ from study_app.session.resume import resume_at
 from study_app.store.journals.journal_events import Event
 from study_app.store.session_progress import progress_of
 
-_WAITING = "measuring …"
+_WAITING = "measuring…"
 
 
 @dataclass(frozen=True, slots=True)
@@ -416,7 +416,7 @@ _ABOUT = (
     "These values are measured over two seconds with the simulated hand. Each session measures them again with its own "
     "device and limits. This page is also available under This machine."
 )
-_MEASURING = "Measuring … On first use the force model is compiled, which may take a minute."
+_MEASURING = "Measuring… On first use the force model is compiled, which may take a minute."
 
 
 class ComputerWindow(Question):

@@ -101,7 +101,7 @@ class ExclusionsCard(Card):
     exclude_asked = Signal(object)
 
     def __init__(self) -> None:
-        self.leave_out = ActionButton("minus", "Exclude …", height=36)
+        self.leave_out = ActionButton("minus", "Exclude…", height=36)
         super().__init__("Excluded", self.leave_out, padding=14, gap=6)
         self.summary = label("", "label", "text2", wraps=True, weight=400)
         self.open = ActionButton("file", "Open the list", role="plain", height=30)
@@ -143,12 +143,12 @@ class ExclusionsCard(Card):
     def _exclusion_row(self, exclusion: Exclusion) -> QWidget:
         """Return the row of an exclusion: its subject, reason, author and time, or the rule that proposes it."""
         proposed = not exclusion.excluded_at
-        back = ActionButton("undo", "Keep …" if proposed else "Include again …", role="plain", height=30)
+        back = ActionButton("undo", "Keep…" if proposed else "Include again…", role="plain", height=30)
         back.setAccessibleName(f"{'Keep' if proposed else 'Include again'}: {exclusion_text(exclusion)}")
         back.clicked.connect(lambda: self.take_back_asked.emit(exclusion))
         buttons = [back]
         if proposed:
-            out = ActionButton("minus", "Exclude …", role="plain", height=30)
+            out = ActionButton("minus", "Exclude…", role="plain", height=30)
             out.setAccessibleName(f"Exclude: {exclusion_text(exclusion)}")
             out.clicked.connect(lambda: self.exclude_asked.emit(exclusion))
             buttons.insert(0, out)

@@ -141,7 +141,7 @@ class ResultsView:
     def without_sessions(self) -> str:
         if self.listed:
             return "No sessions."
-        return "" if self.trouble is not None else "Reading the sessions …"
+        return "" if self.trouble is not None else "Reading the sessions…"
 
     @property
     def can_be_written(self) -> bool:
@@ -425,7 +425,7 @@ class FigureCard(Card):
         self.copy_figure.clicked.connect(self._copy_figure)
         self.copy_numbers = ActionButton("", "Copy numbers", role="plain", height=30)
         self.copy_numbers.clicked.connect(lambda: QGuiApplication.clipboard().setText(self.figure.numbers))
-        self.save = ActionButton("download", "Save as …", role="plain", height=30)
+        self.save = ActionButton("download", "Save as…", role="plain", height=30)
         self.save.clicked.connect(self._ask_for_path)
         self.buttons = (self.more, self.copy_figure, self.copy_numbers, self.save)
         for button in self.buttons:
@@ -450,7 +450,7 @@ class FigureCard(Card):
         self._show_verdict(figure.verdict)
         for button in self.buttons:
             button.setVisible(has_figure)
-            button.setAccessibleName(f"{button.text().removesuffix(' …')}: {figure.title}")
+            button.setAccessibleName(f"{button.text().removesuffix('…')}: {figure.title}")
         self.copy_numbers.setVisible(bool(figure.numbers))
         self.caption.setVisible(not has_figure or self.more.isChecked())
         if self.drawing is not None and has_figure:
@@ -522,7 +522,7 @@ class _WorkLine(Card):
         self.stop.setVisible(progress is not None and progress.stops)
         self.again.setVisible(progress is None)
         if progress is not None:
-            self.words.show_text(f"{progress.what[:1].upper()}{progress.what[1:]} …")
+            self.words.show_text(f"{progress.what[:1].upper()}{progress.what[1:]}…")
             self.bar.show_share(progress.share)
         elif untested:
             self.words.show_text("The computation was stopped, so test results and some figures are missing.")
@@ -558,9 +558,7 @@ class _TroubleCard(Card):
 
     def show_progress(self, progress: Progress) -> None:
         self.show_trouble(
-            Trouble(
-                title=f"{progress.what[:1].upper()}{progress.what[1:]} …", sentence="", button="Stop", remedy="stop"
-            )
+            Trouble(title=f"{progress.what[:1].upper()}{progress.what[1:]}…", sentence="", button="Stop", remedy="stop")
         )
         self.button.setVisible(progress.stops)
         self.bar.setVisible(True)

@@ -142,9 +142,9 @@ class ResultsPlace(Place):
         self.study.setMinimumWidth(200)
         self.study.setSizeAdjustPolicy(Choice.SizeAdjustPolicy.AdjustToContents)
         self.chips: list[Chip] = []
-        self.unblind = ActionButton("eye", "Unblind …", height=44)
-        self.export = ActionButton("download", "Export …", height=44)
-        self.report = ActionButton("file", "Report …", role="primary", height=44)
+        self.unblind = ActionButton("eye", "Unblind…", height=44)
+        self.export = ActionButton("download", "Export…", height=44)
+        self.report = ActionButton("file", "Report…", role="primary", height=44)
         self.sessions = SessionsCard()
         self.exclusions = ExclusionsCard()
         self.split = Choice()
@@ -230,7 +230,7 @@ class ResultsPlace(Place):
             button.setEnabled(view.can_be_written)
         if unblinding := any(isinstance(order, OpenKey) for order in self._orders.values()):
             self.unblind.setEnabled(False)
-        self.unblind.show_action("eye", "Unblinding …" if unblinding else "Unblind …")
+        self.unblind.show_action("eye", "Unblinding…" if unblinding else "Unblind…")
         self.exclusions.leave_out.setEnabled(any(session.excluded is None for session in view.sessions))
         self._panel.setVisible(view.chosen is not None)
         self.figures.show_view(view)
@@ -583,7 +583,7 @@ class ResultsPlace(Place):
         last: Done | Refused | None = None
         for _, answer in self._writer.answers():
             if isinstance(answer, Progress) and dialog is not None:
-                dialog.show_progress(f"{answer.what[:1].upper()}{answer.what[1:]} …", answer.share)
+                dialog.show_progress(f"{answer.what[:1].upper()}{answer.what[1:]}…", answer.share)
             elif isinstance(answer, (Done, Refused)):
                 last = answer
             elif isinstance(answer, Crashed):
@@ -608,9 +608,9 @@ class ResultsPlace(Place):
         self._row.setDirection(down if stacked else right)
         self._left.setDirection(right if stacked else down)
         width = PANEL_WIDE_PX if self.width() >= WIDE_FROM else PANEL_PX
-        least, most = QSize(0, STACKED_HEIGHT), QSize(QWIDGETSIZE_MAX, STACKED_HEIGHT)
-        self._panel.setMinimumSize(least if stacked else QSize(width, 0))
-        self._panel.setMaximumSize(most if stacked else QSize(width, QWIDGETSIZE_MAX))
+        minimum, maximum = QSize(0, STACKED_HEIGHT), QSize(QWIDGETSIZE_MAX, STACKED_HEIGHT)
+        self._panel.setMinimumSize(minimum if stacked else QSize(width, 0))
+        self._panel.setMaximumSize(maximum if stacked else QSize(width, QWIDGETSIZE_MAX))
         self.exclusions.setMaximumWidth(EXCLUSIONS if stacked else QWIDGETSIZE_MAX)
         self._left.setAlignment(self.exclusions, Qt.AlignmentFlag.AlignTop if stacked else Qt.AlignmentFlag(0))
         self.figures.set_whole(stacked)

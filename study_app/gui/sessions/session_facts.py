@@ -223,7 +223,7 @@ def broken_limit_text(measure: str, value: float, limit: float) -> str:
 
 
 class Column(NamedTuple):
-    """A column: its content, its heading, its share of the width, and its minimum width ``least`` [px]."""
+    """A column: its content, its heading, its fraction of the width, and its minimum width ``least`` [px]."""
 
     name: _Name
     heading: str

@@ -352,7 +352,7 @@ class _ScreensCard(Card):
         self.radios: list[Radio] = []
         self.note = label("", "label", "warn", wraps=True)
         self.note.setMinimumWidth(MIN_TEXT_WIDTH)
-        self.test = ActionButton("screen", "Display test …", height=38)
+        self.test = ActionButton("screen", "Display test…", height=38)
         self._rows = QWidget()
         self._shown: tuple[ScreenShown, ...] = ()
         self._host = vbox(self._rows)
@@ -408,7 +408,7 @@ class MachinePlace(Place):
         self._screens: tuple[ScreenShown, ...] = ()
         self.test: DisplayTest | None = None
         self.devices = ActionButton("", "Devices", height=40)
-        self.change = ActionButton("", "Change …", height=40)
+        self.change = ActionButton("", "Change…", height=40)
         self.editors = {
             field.name: Editor(field, self.devices if field.name == "device" else None)
             for field in (*FIELDS, *_PROGRAM_FIELDS)
@@ -429,7 +429,7 @@ class MachinePlace(Place):
         self.folder, self.kept_in = Elided("label", "text"), Elided("label", "text2")
         self.kept_in.setFont(font("label", weight=400))
         self.undo = ActionButton("undo", "Undo")
-        self.check = ActionButton("check", "Check this computer …")
+        self.check = ActionButton("check", "Check this computer…")
         self._lay_out()
         self.screens.chosen.connect(
             lambda screen: self.changed.emit({"screen": screen.name, "screen_number": screen.number})

@@ -164,8 +164,8 @@ class Stage(QWidget):
         line_row = hbox((self.line, 1), margins=(_AXIS_PX - int(MARGIN), 0, 0, 0))
         vbox((self.tank, 3), caption_row, (plot_row, 1), line_row, spacing=4, margins=0, parent=self)
         self._peaks = {
-            name: max(least, float(np.linalg.norm(np.nan_to_num(shown.samples[name]), axis=1).max()))
-            for name, least in (("device_force_n", LEAST_N), ("velocity_mps", LEAST_MPS))
+            name: max(minimum, float(np.linalg.norm(np.nan_to_num(shown.samples[name]), axis=1).max()))
+            for name, minimum in (("device_force_n", LEAST_N), ("velocity_mps", LEAST_MPS))
         }
 
     def show_moment(self, at_s: float) -> None:
@@ -239,7 +239,7 @@ class WatchWindow(Themed, QDialog):
         self._timer.timeout.connect(self._show_next_moment)
         self._clock_start = (0.0, 0.0)
         self._writing = QTimer(self, interval=0)
-        self.sentence = label("Reading …", "body", "text2", wraps=True)
+        self.sentence = label("Reading…", "body", "text2", wraps=True)
         self.sentence.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self.lacking = label("", "label", "warn", wraps=True)
         self.room = QStackedWidget()
@@ -251,7 +251,7 @@ class WatchWindow(Themed, QDialog):
         self.seen.setToolTip(
             "Shows the ball with the delay that the participant saw; the arrows and curves are not delayed"
         )
-        self.export = ActionButton("download", "Export as video …", height=40)
+        self.export = ActionButton("download", "Export as video…", height=40)
         self.play = ActionButton("play", "Play", cap="Space", height=40)
         self.speed = Choice()
         self.speed.setAccessibleName("Speed")
@@ -441,7 +441,7 @@ class WatchWindow(Themed, QDialog):
             self._writing.stop()
             dialog.show_done(f"The video was saved as {progress}.", "Open the folder")
         else:
-            dialog.show_progress("Painting …", progress)
+            dialog.show_progress("Painting…", progress)
 
     def _write_pictures(self, to: Path) -> Iterator[float | Path]:
         """Write a video; yield the fraction done after each picture, and finally the file."""

@@ -118,7 +118,7 @@ class Table(Themed, QTableView):
 
     Parameters
     ----------
-    widths : share of the width and minimum width [px] of each column
+    widths : fraction of the width and minimum width [px] of each column
     """
 
     opened = Signal(QModelIndex)
@@ -141,14 +141,14 @@ class Table(Themed, QTableView):
         self.verticalHeader().hide()
         self.verticalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
         self.verticalHeader().setDefaultSectionSize(_ROW_HEIGHT)
-        head = self.horizontalHeader()
-        head.setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
-        head.setDefaultAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
-        head.setMinimumSectionSize(10)
-        head.setFont(font("small"))
-        head.setFixedHeight(26)
-        head.setHighlightSections(False)
-        head.setSectionsClickable(False)
+        header = self.horizontalHeader()
+        header.setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
+        header.setDefaultAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
+        header.setMinimumSectionSize(10)
+        header.setFont(font("small"))
+        header.setFixedHeight(26)
+        header.setHighlightSections(False)
+        header.setSectionsClickable(False)
         self.doubleClicked.connect(self.opened)
 
     @property
@@ -157,7 +157,7 @@ class Table(Themed, QTableView):
         return chosen[0].row() if chosen else None
 
     def minimumSizeHint(self) -> QSize:
-        return QSize(sum(least for _, least in self._widths), 26 + _ROW_HEIGHT)
+        return QSize(sum(minimum for _, minimum in self._widths), 26 + _ROW_HEIGHT)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter) and self.currentIndex().isValid():
@@ -167,9 +167,9 @@ class Table(Themed, QTableView):
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
-        least = sum(least for _, least in self._widths)
+        minimum = sum(minimum for _, minimum in self._widths)
         shares = sum(share for share, _ in self._widths)
-        spare = max(0, self.viewport().width() - least)
+        spare = max(0, self.viewport().width() - minimum)
         for column, (share, needs) in enumerate(self._widths):
             self.setColumnWidth(column, needs + spare * share // shares)
 

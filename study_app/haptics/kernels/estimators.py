@@ -17,7 +17,7 @@ again. Their difference then is added and fades out, so that the estimate does n
 Vibrations at 10 to 60 Hz, such as those of gears, change the acceleration faster than the filter assumes, and its
 velocity overshoots. Its lead (its velocity less the mean of EWMA's last two) is therefore checked at every fourth
 sample. The mean velocity over eight samples shows the error of the filter's velocity in their middle. The regression of
-this error on the lead is the false share of the lead. A multiple of what exceeds the tolerated share is subtracted.
+this error on the lead is the false fraction of the lead. A multiple of the excess over the tolerated one is subtracted.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ TROUBLE_S: Final = 20e-3
 """Time over which that mean is taken [s]."""
 _QUIET_S: Final = 1.0
 CHECKED_S: Final = 0.4
-"""Time over which the false share of the lead is averaged [s]."""
+"""Time over which the false fraction of the lead is averaged [s]."""
 LEAST_LEAD_S: Final = 0.04
 """A lead of about one count in this time, or less, is too small to be checked [s]."""
 _CARRIED_S: Final = 10e-3
@@ -311,7 +311,7 @@ def _lead_mps(parameters: Record, filtered: Record, axis: int) -> float:
 
 @part
 def _check_lead(parameters: Record, state: Record, filtered: Record) -> None:
-    """Update the false share of the lead from the position eight samples ago, velocity and lead four samples ago."""
+    """Update the false fraction of the lead from the position eight samples ago, velocity and lead four samples ago."""
     number = filtered.samples >> 2
     first, middle = filtered.checked[number & 1], filtered.checked[(number + 1) & 1]
     if number > 2:

@@ -10,7 +10,7 @@ The energy E is 0 at the start of a scene and is limited to what the liquid can 
 
 The first terms are what the effects can return, summed by them (``state.returnable_j``): a wake of speed u gives a
 body of speed v the power c (u - v)² v, at most that at v = u/3, and it lasts for N ticks of T; m is the mass of
-inertial effects in the share that is sent (`pack`). τ is the lag of the velocity estimator and P = max(-f·v̂, 0) the
+inertial effects in the fraction that is sent (`pack`). τ is the lag of the velocity estimator and P = max(-f·v̂, 0) the
 power that it absorbs: a filtered damper stores up to K τ P (`filter_storage`). Without these the lag of each quick
 reversal would count as a debt.
 
@@ -138,8 +138,8 @@ def filter_storage(model: Any, passivity: layout.Record) -> float:
 
     With v̂' = (v − v̂)/τ a damper F(v̂) takes ∫F v dt = ∫F v̂ dt + τ∫F dv̂ from the hand: the second term is a storage,
     K τ F v̂ with K = 1/3 for a force that grows as v̂², 1/2 for one that grows as v̂. If the force limit leaves only
-    the share s of F, K = 1 - 2/3 √s and 1 - s/2; for a force that grows less than v̂, K is at most 1. After a debt the
-    storage is multiplied by the controller's gain: otherwise it would sustain an oscillating loop.
+    the fraction s of F, K = 1 - 2/3 √s and 1 - s/2; for a force that grows less than v̂, K is at most 1. After a debt
+    the storage is multiplied by the controller's gain: otherwise it would sustain an oscillating loop.
     """
     parameters, state = model.parameters[0], model.state[0]
     lag_s = parameters.fallback_lag_s if state.kalman.on_ewma else parameters.filter_lag_s
@@ -326,7 +326,7 @@ def _watch_motion(parameters: layout.Record, passivity: layout.Record, interval_
 def _count_reversals(parameters: layout.Record, passivity: layout.Record, weight: float, interval_s: float) -> None:
     """Count successive reversals of a swing, each sooner than a hand can reverse.
 
-    The swing is the velocity between 10 and 40 Hz. It must exceed the speed in the rules, and a share of the slow
+    The swing is the velocity between 10 and 40 Hz. It must exceed the speed in the rules, and a fraction of the slow
     speed: smaller ones are ripples of a stroke.
     """
     swing_mps, peak_mps = passivity.swing_mps, passivity.peak_mps

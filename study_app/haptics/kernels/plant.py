@@ -33,7 +33,7 @@ _PACE = np.dtype(
     [
         ("period_s", np.float64),
         ("jitter_s", np.float64),  # greatest lateness of a tick
-        ("missed", np.float64),  # share of missed ticks
+        ("missed", np.float64),  # fraction of missed ticks
         ("late_s", np.float64),  # lateness of the last tick
         ("random", np.uint64),
     ],

@@ -1,4 +1,4 @@
-"""The regions of the liquids: which one the body is in, and the share of the body in each."""
+"""The regions of the liquids: which one the body is in, and the fraction of the body in each."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _FADE_S = 20e-3
 
 @part
 def update_volume_fractions(model: Any, interval_s: float) -> None:
-    """Set the share φ of the body's volume in every liquid, which is also the first value for the frontal area.
+    """Set the fraction φ of the body's volume in every liquid, which is also the first value for the frontal area.
 
     If liquids overlap, the last listed counts, for the part of the body under its surface. At a border φ changes from 0
     to 1 in 20 ms, but starts at its final value in a new scene; at a surface φ is the submerged part, without delay.

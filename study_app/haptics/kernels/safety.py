@@ -92,7 +92,7 @@ def _mixed(value: int) -> int:
 START_FADE_S = 0.5
 _LATE_S = 0.045
 _LEAST_SLEW = 1.0 / 3.0
-"""Share of the slew limit during a fade in, and least share after a great energy debt."""
+"""Fraction of the slew limit during a fade in, and least fraction after a great energy debt."""
 
 
 def new_safety(device_limit_n: float = math.inf, delay_ticks: int = ASSUMED_TICKS) -> Any:
@@ -210,7 +210,7 @@ def limit_slope(model: Any, safety: layout.Record, sample: layout.Record, force_
 
 @part
 def limit_inertia(model: Any, sample: layout.Record, force_n: Vector) -> Vector:
-    """Return the force with inertial forces reduced to their stable share (`pack`): they also damp fast motion."""
+    """Return the force with inertial forces reduced to their stable fraction (`pack`): they also damp fast motion."""
     for i in range(model.parameters[0].liquids):
         local = model.liquid_states[i]
         excess = 1.0 - local.inertia_share
@@ -223,7 +223,7 @@ def limit_inertia(model: Any, sample: layout.Record, force_n: Vector) -> Vector:
 
 @part
 def _norm_share(force_n: Vector, limit_n: float, sample: layout.Record) -> float:
-    """Return the share of the force that the limit permits."""
+    """Return the fraction of the force that the limit permits."""
     if square(force_n) > limit_n * limit_n:
         sample.limiters |= layout.LIMITER_NORM
         return limit_n / norm(force_n)
@@ -232,7 +232,7 @@ def _norm_share(force_n: Vector, limit_n: float, sample: layout.Record) -> float
 
 @part
 def _update_fade(parameters: layout.Record, safety: layout.Record, sample: layout.Record) -> None:
-    """Update the share of the force that is sent while it fades in or out (no usable sample, or a late tick).
+    """Update the fraction of the force that is sent while it fades in or out (no usable sample, or a late tick).
 
     The scene sets the fade-in time; after a start it is at least 500 ms.
     """
@@ -254,7 +254,7 @@ def _update_fade(parameters: layout.Record, safety: layout.Record, sample: layou
 def _requested_force(
     parameters: layout.Record, safety: layout.Record, asked_n: Vector, permitted_n: Vector, limit_n: float
 ) -> Vector:
-    """Return the force of the effects within norm and fade, from which the share withheld counts.
+    """Return the force of the effects within norm and fade, from which the fraction withheld counts.
 
     A force link sends the force of earlier ticks: there the force after its limits counts.
     """

@@ -18,7 +18,7 @@ _REFUSALS_IN_A_ROW = 5
 _COUNTS = 2.0
 """Encoder counts by which two steps may differ at rest."""
 _CERTAIN_SHARE = 0.999
-"""Share of the square of a limit up to which no rounding error can exceed the limit."""
+"""Fraction of the square of a limit up to which no rounding error can exceed the limit."""
 _STALE_NS = 5_000_000
 FAULT_NS = 50_000_000
 

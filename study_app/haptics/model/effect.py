@@ -141,7 +141,7 @@ class Effect:
         Its rows in the arrays of the model.
     damping_nspm : callable, optional
         Its damping [N·s/m, scene] of fast motion, from its parameters and a factor of its smoothing rates; the loop is
-        stable with only a share of such a force, and the kernel writes it to the next row of ``local.inertia_n``.
+        stable with only a fraction of such a force, and the kernel writes it to the next row of ``local.inertia_n``.
     adjustable : bool
         Whether its parameters may change while it acts.
     controls : tuple of Parameter

@@ -135,7 +135,7 @@ _KALMAN_STATE: Fields = (
     ("ahead", FLOAT, (2, 3)),  # the same of the force last sent
     ("compliance_per_kg", FLOAT),  # θ of `known_force`
     ("compliance_variance", FLOAT),
-    ("trust", FLOAT),  # share of the known force in inertial forces; at most 0 after a surprise (`known_force`)
+    ("trust", FLOAT),  # fraction of the known force in inertial forces; at most 0 after a surprise (`known_force`)
     ("sent_n", FLOAT, (3,)),  # the force last sent
     ("asked_n", FLOAT, (3,)),  # the force of the effects in the tick before
 )

@@ -24,7 +24,7 @@ class ForceRules(NamedTuple):
     exceeded the permitted force above 40 Hz.
     ``smoothing_lead`` is 1 if the smoothing does not lag with "kalman" (`kernels.effects.added_mass`), else 0, and
     ``jerk_of_speed_ps3`` the growth of its model's jerk with speed.
-    ``fade_out_s`` is how long the force takes to fade out without usable samples, ``fade_out_slew`` the share of the
+    ``fade_out_s`` is how long the force takes to fade out without usable samples, ``fade_out_slew`` the fraction of the
     slew limit meanwhile: with a third, a handle of 50 g released in a gap gained 6.5 mJ. ``hand_mps2`` is the greatest
     acceleration by a hand, ``gap_ticks`` the time between two samples, in nominal periods, above which it is a gap
     (`sample_validation`), ``quiet_s`` how long a hand must be quiet for its energy debt to be forgiven (`passivity`).
@@ -41,13 +41,13 @@ class ForceRules(NamedTuple):
     handle of 50 g oscillated at 10 Hz.
     ``trusts_gaps`` is 1 if the energy balance counts a step over a gap in full, 0 if only the energy that it cost: the
     position may have jumped.
-    ``acting_share`` is the share of the time in which the passivity controller may change a force that a study delays,
-    before the gain falls: with 0.3, a handle stirred at 9 Hz with 50 ms of delay oscillated above 40 Hz.
+    ``acting_share`` is the fraction of the time in which the passivity controller may change a force that a study
+    delays, before the gain falls: with 0.3, a handle stirred at 9 Hz with 50 ms of delay oscillated above 40 Hz.
     ``late_swing_mps`` is ``swing_mps`` for a force that a study delays: a released handle of 50 g oscillated at 13 Hz
     with the 1 mJ that are tolerated. With 0.06, the controller withheld 23 % of thesis water delayed by 20 ms from a
     light hand.
-    ``false_lead_gain`` times the false share of its lead over "ewma" is taken from the velocity of "kalman"
-    (`kernels.estimators`): with 1, the velocity on real encoders was noisier than that of "ewma". A share of
+    ``false_lead_gain`` times the false fraction of its lead over "ewma" is taken from the velocity of "kalman"
+    (`kernels.estimators`): with 1, the velocity on real encoders was noisier than that of "ewma". A fraction of
     ``tolerated_false_lead`` counts as 0: in a stroke of 8 Hz the mean over eight samples alone makes it 0.024, and the
     controller withheld twice as much of such strokes in light oil.
     ``fast_radps`` and ``fast_damping`` are the corner frequency and the damping ratio of the high-pass filter of the

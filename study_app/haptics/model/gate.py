@@ -140,7 +140,7 @@ class Extremes:
         return sum(effect.bound_n(self) or 0.0 for effect in EFFECTS if effect.extent == extent)
 
     def submerged(self, depth_m: float) -> float:
-        """Return the share of the body's volume below the surface, its centre ``depth_m`` under it."""
+        """Return the fraction of the body's volume below the surface, its centre ``depth_m`` under it."""
         return submerged(depth_m, self.radius_m)
 
     def doubtful_shares(self) -> tuple[float, float]:
@@ -167,7 +167,7 @@ def _flows(liquid: Liquid, *, called_for: bool = False) -> list[Flow]:
 
 
 def submerged(depth_m: float, radius_m: float) -> float:
-    """Return the share of a ball's volume below the surface, its centre ``depth_m`` under it: V = πh²(3R − h)/3."""
+    """Return the fraction of a ball's volume below the surface, its centre ``depth_m`` under it: V = πh²(3R − h)/3."""
     h = min(max(depth_m + radius_m, 0.0), 2 * radius_m)
     return h * h * (3 * radius_m - h) / (4 * radius_m**3)
 

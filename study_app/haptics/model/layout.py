@@ -346,7 +346,7 @@ _LINK = np.dtype(
         ("acts", np.int64),  # 0: the force of a tick is sent in that tick
         ("delay_ticks", np.int64),
         ("jitter_ticks", np.int64),  # greatest additional delay in ticks
-        ("loss", np.float64),  # share of ticks whose force is lost
+        ("loss", np.float64),  # fraction of ticks whose force is lost
         ("seed", np.int64),  # of jitter and loss
     ],
     align=True,
@@ -373,7 +373,7 @@ PARAMETERS = np.dtype(
         ("radius_m", np.float64),  # of the body
         ("weight_n", np.float64),  # of the body
         ("estimator", np.int64),  # code of `estimators`
-        ("log_keep_per_s", np.float64),  # ln(1 - α) per second: after t the share of the old velocity is exp of it · t
+        ("log_keep_per_s", np.float64),  # ln(1 - α) per second: after t the part of the old velocity is exp of it · t
         ("compression_law", np.int64),  # COMPRESSION_*
         ("compression_threshold_mps", np.float64),
         ("slope_limit_nspm", np.float64, (MOST_DELAY + 1,)),  # greatest |drag| / |w| [N·s/m, scene], by the delay
@@ -384,7 +384,7 @@ PARAMETERS = np.dtype(
         ("fallback_lag_s", np.float64),  # the same of EWMA, which replaces a Kalman filter after a fault
         ("count_m", np.float64),  # one encoder count of the device, hand frame
         ("mass_kg", np.float64),  # the device's least effective mass
-        ("smoothing_lead", np.float64),  # share of the lag of smoothed dw/dt that is compensated
+        ("smoothing_lead", np.float64),  # fraction of the lag of smoothed dw/dt that is compensated
         ("known_force_ticks", np.int64),  # shortest delay at which inertial forces use the known force (`known_force`)
         ("link", _LINK),
         ("rules", _RULES),
@@ -404,7 +404,7 @@ _REGION = np.dtype(
 LIQUID = np.dtype(
     [
         ("effects", np.int64),  # bits of the effects it selects
-        ("inertia_share", np.float64, (MOST_DELAY + 1,)),  # stable share of inertial forces, by the delay
+        ("inertia_share", np.float64, (MOST_DELAY + 1,)),  # stable fraction of inertial forces, by the delay
         ("smoothing_rate", np.float64, (MOST_DELAY + 1,)),  # factor of the rates at which dw/dt is smoothed, likewise
         # factor of the slope limit while inertial forces are those of the known force, likewise; 0: they never are
         ("known_force", np.float64, (MOST_DELAY + 1,)),
@@ -451,7 +451,7 @@ LIQUID_STATE = np.dtype(
     [
         ("inside", np.int64),  # 1 while the body is within the borders (with hysteresis)
         ("border", np.float64),  # 0 outside, 1 inside, faded between
-        ("share", np.float64),  # φ of the volume: border share times submerged share
+        ("share", np.float64),  # φ of the volume: border fraction times submerged fraction
         ("frontal", np.float64),  # φ of the frontal area, likewise; of the motion w
         ("motion_mps", np.float64, (3,)),  # v - v_current
         ("wake_mps", np.float64, (3,)),  # v_wake; zero without a wake
@@ -462,7 +462,7 @@ LIQUID_STATE = np.dtype(
         ("late_n", np.float64, (3,)),  # delayed drag, bounded by the rest of the slope limit
         ("late_mps", np.float64),  # the speed for its limit; 0: no delayed drag
         ("prompt_nspm", np.float64),  # the slope of the drag that acts at once
-        ("inertia_share", np.float64),  # stable share of inertial forces in this tick
+        ("inertia_share", np.float64),  # stable fraction of inertial forces in this tick
         ("slope_factor", np.float64),  # factor of the slope limit in this tick
         ("inertial", np.int64),  # number of reduced inertial forces
         ("inertia_n", np.float64, (_MOST_INERTIAL, 3)),  # these forces, in the order of their effects
@@ -521,8 +521,8 @@ PASSIVITY = np.dtype(
         ("debt", np.int64),  # DEBT_*: why force is or was withheld
         ("longest_m", np.float64),  # the longest step so far
         ("strongest_n", np.float64),  # the strongest force so far
-        ("gain", np.float64),  # share of the force that is sent
-        ("norm_share", np.float64),  # share of it that the force limit leaves
+        ("gain", np.float64),  # fraction of the force that is sent
+        ("norm_share", np.float64),  # fraction of it that the force limit leaves
         ("settling", np.int64),  # 1 if the force of the last tick was changed to repay a debt
         ("lift_n", np.float64, (3,)),  # buoyancy and weight in the force that is sent
     ],
@@ -545,7 +545,7 @@ SAFETY = np.dtype(
         ("usable_ns", np.int64),  # time of the last sample that was accepted
         ("tick_s", np.float64),  # time since the tick before
         ("late_s", np.float64),  # lateness of this tick beyond the tolerance
-        ("fade", np.float64),  # share of the force that is sent, 0 … 1
+        ("fade", np.float64),  # fraction of the force that is sent, 0 … 1
         ("fade_s", np.float64),  # least duration of a fade from 0 to 1 after a start; else 0
         ("device_limit_n", np.float64),  # the device's own force limit
         ("delay_ticks", np.int64),  # assumed delay of a force in writes, 0 … MOST_DELAY

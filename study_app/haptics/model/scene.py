@@ -191,7 +191,7 @@ class ForceLink(Frozen):
     jitter_s : float
         A force is later by up to this, drawn again at every tick from a uniform distribution [s].
     loss : float
-        Share of ticks whose force is lost: the last one is held.
+        Fraction of ticks whose force is lost: the last one is held.
     seed : int
         Of jitter and loss, below 2³².
     """
@@ -268,7 +268,7 @@ class Knee(Frozen):
 
 
 class Accuracy(Frozen):
-    """The force that ``effects = "auto"`` may omit: a share of the total or an absolute force, whichever is greater."""
+    """The force that ``effects = "auto"`` may omit: a fraction of the total or an absolute force (the greater)."""
 
     relative: Annotated[
         float,

@@ -353,7 +353,7 @@ def _known_force(
 
 
 def _inertia_fit(record: layout.Record, limits: DampingLimits, scene: Scene, rules: ForceRules) -> tuple[float, float]:
-    """Return the factor of smoothing rates, and the share that keeps inertial forces within their limit.
+    """Return the factor of smoothing rates, and the fraction that keeps inertial forces within their limit.
 
     The limit applies to their damping of fast motion; see `ForceRules`. [choice]
     """

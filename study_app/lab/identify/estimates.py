@@ -130,8 +130,8 @@ def _interval_spread(
 
 def _limited_interval(parameter: Parameter, u: float, half_width: float) -> tuple[float, float]:
     """Return the interval of a parameter's value, limited to its permitted range."""
-    least, most = u_range(parameter)
-    ends = [coordinate(parameter).to_value(end) for end in (max(u - half_width, least), min(u + half_width, most))]
+    minimum, maximum = u_range(parameter)
+    ends = [coordinate(parameter).to_value(end) for end in (max(u - half_width, minimum), min(u + half_width, maximum))]
     lower, upper = sorted(min(max(end, parameter.least), parameter.most) for end in ends)
     return float(lower), float(upper)
 

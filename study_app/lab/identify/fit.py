@@ -66,7 +66,7 @@ class Fit(Estimates):
 
     @property
     def explained(self) -> float:
-        """The share of the measured force's mean square that the fitted law explains, at least 0."""
+        """The proportion of the measured force's mean square that the fitted law explains, at least 0."""
         return max(1 - self.share**2, 0.0)
 
     def summary(self) -> str:
@@ -160,9 +160,9 @@ def _sign_warnings(problem: ForceProblem, rms_n: float) -> Iterator[str]:
 def _residual_warnings(residual_n: Floats, rho: float, force_n: Floats) -> Iterator[str]:
     """Yield a warning if residuals are correlated, which indicates a model error, since noise is uncorrelated."""
     if rho > max(_MAX_AUTOCORRELATION, _CHANCE_DEVIATIONS / math.sqrt(residual_n.size)):
-        share = _rms(residual_n) / _rms(force_n)
+        proportion = _rms(residual_n) / _rms(force_n)
         yield (
-            f"the residuals ({100 * share:.1f} % of the force) are autocorrelated (lag-1 correlation {rho:.3f}): "
+            f"the residuals ({100 * proportion:.1f} % of the force) are autocorrelated (lag-1 correlation {rho:.3f}): "
             "the model is incomplete, the sensor filters the force, or velocities computed from positions blur sharp "
             "turns; the intervals have been widened to allow for this, but they are valid only if the model is valid"
         )

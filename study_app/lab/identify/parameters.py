@@ -123,7 +123,7 @@ def _find_parameter(tables: Mapping[str, BaseModel], name: str) -> Parameter:
     numbers = {name: dict(_numeric_fields(table)) for name, table in tables.items()}
     for table, fields in numbers.items():
         if field in fields and prefix in {"", table}:
-            least, most, above, whole = fields[field]
+            minimum, maximum, above, whole = fields[field]
             value = getattr(tables[table], field)
             if value is None:
                 raise StudyError(
@@ -134,8 +134,8 @@ def _find_parameter(tables: Mapping[str, BaseModel], name: str) -> Parameter:
                 table=table,
                 field=field,
                 value=float(value),
-                least=least,
-                most=most,
+                least=minimum,
+                most=maximum,
                 above=above,
                 whole=whole,
             )
@@ -157,5 +157,5 @@ def _numeric_fields(table: BaseModel) -> Iterator[tuple[str, tuple[float, float,
 
 def _range(kind: Mapping[str, Any]) -> tuple[float, float, bool]:
     above = "exclusiveMinimum" in kind
-    least = float(kind.get("exclusiveMinimum", kind.get("minimum", -math.inf)))
-    return least, float(kind.get("exclusiveMaximum", kind.get("maximum", math.inf))), above
+    minimum = float(kind.get("exclusiveMinimum", kind.get("minimum", -math.inf)))
+    return minimum, float(kind.get("exclusiveMaximum", kind.get("maximum", math.inf))), above

@@ -180,8 +180,8 @@ class Problem:
         return math.floor(min(self.parameters[k].most, scaling) * (1 + 1e-12))
 
     def _range(self, parameter: Parameter) -> tuple[float, float]:
-        least, most = u_range(parameter)
-        return (0.0 if self.parameters.index(parameter) in self.lesser else least), most
+        minimum, maximum = u_range(parameter)
+        return (0.0 if self.parameters.index(parameter) in self.lesser else minimum), maximum
 
     def _to_z(self, values: Sequence[float]) -> Floats:
         z = np.array([kind.to_u(value) for kind, value in zip(self._coordinates, values, strict=True)])
@@ -228,9 +228,9 @@ class ForceProblem(Problem):
         values = self.values(z)
         if self.length is None:
             return self._simulate_force(values)
-        below, above, share = self._neighbours(values, self.length)
+        below, above, proportion = self._neighbours(values, self.length)
         force_n = self._simulate_force(below)
-        return force_n if share == 0 else (1 - share) * force_n + share * self._simulate_force(above)
+        return force_n if proportion == 0 else (1 - proportion) * force_n + proportion * self._simulate_force(above)
 
     def misfit(self, z: Floats) -> Floats:
         misfit: Floats = (self.force_n(z) - self.measured.force_n)[:, self.axes].ravel()
@@ -248,9 +248,9 @@ class ForceProblem(Problem):
         longest = self._longest(values, k)
         below = min(max(1.0, math.floor(values[k] / self._spacing + 1e-9) * self._spacing), longest)
         above = min(below + self._spacing, longest)
-        share = (values[k] - below) / (above - below) if above > below else 0.0
-        share = min(share, 1.0) if share > 1e-9 else 0.0
-        return [*values[:k], below, *values[k + 1 :]], [*values[:k], above, *values[k + 1 :]], share
+        proportion = (values[k] - below) / (above - below) if above > below else 0.0
+        proportion = min(proportion, 1.0) if proportion > 1e-9 else 0.0
+        return [*values[:k], below, *values[k + 1 :]], [*values[:k], above, *values[k + 1 :]], proportion
 
     def _range(self, parameter: Parameter) -> tuple[float, float]:
         """Return the minimum and the maximum of z; a length is limited by the measured duration."""

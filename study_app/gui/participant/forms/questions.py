@@ -241,15 +241,15 @@ class _NumberField(TypedField):
     def _expected_sentence(self) -> str:
         wording, view = self._words, self._number
         kind = wording.whole_number if view.whole else wording.any_number
-        least, most = (
+        minimum, maximum = (
             None if bound is None else write_number(bound, 9, wording.decimal_sign) for bound in (view.least, view.most)
         )
-        if least is not None and most is not None:
-            return wording.number_between.format(kind=kind, least=least, most=most)
-        if least is not None:
-            return wording.number_from.format(kind=kind, least=least)
-        if most is not None:
-            return wording.number_to.format(kind=kind, most=most)
+        if minimum is not None and maximum is not None:
+            return wording.number_between.format(kind=kind, least=minimum, most=maximum)
+        if minimum is not None:
+            return wording.number_from.format(kind=kind, least=minimum)
+        if maximum is not None:
+            return wording.number_to.format(kind=kind, most=maximum)
         return wording.number_needed.format(kind=kind)
 
     def _show_problem(self, problem: str) -> None:

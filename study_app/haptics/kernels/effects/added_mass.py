@@ -22,7 +22,7 @@ def added_mass_force(
 
     dw/dt is the difference of w over Δt, smoothed (`accelerate`). Unsmoothed, one encoder count would cause a spike of
     0.3 N. In the first tick in a liquid the acceleration is 0; in uniform motion it decays to 0, not to a denormal
-    number. Only the share that keeps the loop stable is sent.
+    number. Only the fraction that keeps the loop stable is sent.
     """
     mass, tracks, w = liquid.added_mass, local.added_mass, local.relative_mps
     if local.ticks == 0:

@@ -17,8 +17,8 @@ _brown_lawler = part(laws.brown_lawler)
 def drag_force(liquid: Record, local: Record, state: Record) -> None:
     """Add F = −½ ρ C_d A |w| w φ to the force, (3,) [N], with w = v − v_wake − v_current (Rek 2024, §4.1).
 
-    A is the frontal area of the ball, φ the share of it in the liquid. C_d is that of the body, or that of a sphere at
-    Re = ρ|w|D/µ (``laws``): computed as a multiple of Stokes' −3πµD w, which is finite at rest, unlike C_d. Only the
+    A is the frontal area of the ball, φ the fraction of it in the liquid. C_d is that of the body, or that of a sphere
+    at Re = ρ|w|D/µ (``laws``): computed as a multiple of Stokes' −3πµD w, which is finite at rest, unlike C_d. Only the
     constant law grows as the square of a speed. The linear law is a damper, F = −(b/s) w with the damping b at the hand
     and the scene's scale s: F = −b v at the hand.
     """

@@ -43,9 +43,9 @@ _ROUNDING_S = 1e-9  # a window of n ticks contains n of them, regardless of roun
 def basset_force(
     parameters: Record, liquid: Record, local: Record, state: Record, rows: Any, delay_ticks: int, interval_s: float
 ) -> None:
-    """Add the history force, (3,) [N], to the force; φ is the share of the volume in the liquid.
+    """Add the history force, (3,) [N], to the force; φ is the fraction of the volume in the liquid.
 
-    w is first smoothed, as for the added mass. Only the share that keeps the loop stable is sent. It stores the
+    w is first smoothed, as for the added mass. Only the fraction that keeps the loop stable is sent. It stores the
     energy of its inertia, 3πR² √(2µρ/ω) (Landau & Lifshitz, §24), in an oscillation of the period in the rules.
     """
     history, tracks = liquid.history, local.history

@@ -1,4 +1,4 @@
-"""The local wake: a position tail whose elements keep the places where they arose.
+"""The local wake: a position tail whose elements stay where they arose.
 
 The tail (``wake``) acts at any place of the body: after a stop and a fast departure the body still meets the wake it
 left elsewhere (Rek 2024, §6.3). Here the newest N elements e_j, one per tick, are stored in at most 64 cells of one

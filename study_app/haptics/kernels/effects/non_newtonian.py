@@ -43,7 +43,7 @@ _over_stokes = part(finite_reynolds)
 def non_newtonian_force(
     parameters: Record, liquid: Record, local: Record, state: Record, delay_ticks: int, interval_s: float
 ) -> None:
-    """Add F to the force, (3,) [N], by the share φ of the frontal area.
+    """Add F to the force, (3,) [N], by the fraction φ of the frontal area.
 
     The slope limit B bounds the viscous part. The excess over B in an elastic or thickening liquid is passed on as
     ``local.excess_n``, which the safety layer removes.

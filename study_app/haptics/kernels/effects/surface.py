@@ -1,4 +1,4 @@
-"""Surface: the submerged share of the ball, for the effects that depend on it.
+"""Surface: the submerged fraction of the ball, for the effects that depend on it.
 
 With the depth h of the ball's lowest point, 0 … 2R, and u = 1 − h/R: the spherical cap has the volume πh²(3R − h)/3;
 the frontal area of vertical motion is the waterplane π(2Rh − h²) until half the ball is submerged, then πR²; that of
@@ -16,7 +16,7 @@ from study_app.haptics.model.layout import Record
 
 @part
 def submerge(liquid: Record, local: Record, place_m: Record, radius_m: float) -> None:
-    """Set the shares of volume and frontal areas, 0 … 1, that are below the top face of the region."""
+    """Set the fractions of volume and frontal areas, 0 … 1, that are below the top face of the region."""
     surface, region = local.surface, liquid.region
     depth = (region.centre_m[1] + region.half_m[1] - place_m[1]) / radius_m + 1.0  # h/R
     if depth <= 0.0:
@@ -32,7 +32,7 @@ def submerge(liquid: Record, local: Record, place_m: Record, radius_m: float) ->
 
 @part
 def wetted_fraction(local: Record) -> None:
-    """Set the share φ of the frontal area for the motion w: vertical and horizontal shares weighted by w's squares.
+    """Set the fraction φ of the frontal area for the motion w: vertical and horizontal parts weighted by w's squares.
 
     Exact for vertical and horizontal motion; a weighted mean for other directions. [choice]
     """

@@ -57,12 +57,12 @@ def unsteady_drag_force(
 ) -> None:
     """Add F to the force, (3,) [N]; dw/dt is smoothed, as for the effects "added_mass" and "history".
 
-    The share φ of the frontal area counts for drag, that of the volume for added mass and history. A body that enters
-    the liquid in motion begins as if it had always moved so. The slope limit B bounds 3πµDw, and the rest of B bounds
-    3πµDy at 0.6 of the speed u: at w it would remove the push of a wake on a body at rest. y grows with the speed to
-    the power of 1.7, so its slope is 1.7 times its secant: at the full speed, released handles of 100 g and less
-    oscillated on a steady drift at scales of 10 and 20. Only the shares of added mass and history that keep the loop
-    stable are sent.
+    The fraction φ of the frontal area counts for drag, that of the volume for added mass and history. A body that
+    enters the liquid in motion begins as if it had always moved so. The slope limit B bounds 3πµDw, and the rest of B
+    bounds 3πµDy at 0.6 of the speed u: at w it would remove the push of a wake on a body at rest. y grows with the
+    speed to the power of 1.7, so its slope is 1.7 times its secant: at the full speed, released handles of 100 g and
+    less oscillated on a steady drift at scales of 10 and 20. Only the fractions of added mass and history that keep the
+    loop stable are sent.
     """
     law, tracks, w = liquid.unsteady_drag, local.unsteady_drag, local.relative_mps
     if local.ticks == 0:

@@ -1,4 +1,4 @@
-"""The local wake: a position tail whose elements keep the places where they arose."""
+"""The local wake: a position tail whose elements stay where they arose."""
 
 import math
 from collections.abc import Mapping

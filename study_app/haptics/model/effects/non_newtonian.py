@@ -18,7 +18,7 @@ STIFFNESS_NPM: Final = 400.0
 """Greatest elastic stiffness at the hand below the yield stress, of a loop that is stable with `_FULL_NSPM`."""
 _FULL_NSPM: Final = 53.0
 VISCOUS_SHARE: Final = 0.75
-"""Share of the slope limit for the viscous force of a liquid that is also elastic. [choice]"""
+"""Fraction of the slope limit for the viscous force of a liquid that is also elastic. [choice]"""
 
 _REPLACES: Final = ("drag", "unsteady_drag", "history")
 _START: Final[dict[str, dict[str, float]]] = {

@@ -1,4 +1,4 @@
-"""Surface: the submerged share of the ball, for the effects that depend on it."""
+"""Surface: the submerged fraction of the ball, for the effects that depend on it."""
 
 from study_app.haptics.model.effect import FLOAT, Effect, Extremes, Fields, Liquid
 
@@ -20,9 +20,9 @@ def _problem(liquid: Liquid) -> str | None:
 
 
 _STATE: Fields = (
-    ("volume", FLOAT),  # share of the body's volume under the surface
-    ("upright", FLOAT),  # share of the frontal area of vertical motion
-    ("level", FLOAT),  # share of the frontal area of horizontal motion
+    ("volume", FLOAT),  # fraction of the body's volume under the surface
+    ("upright", FLOAT),  # fraction of the frontal area of vertical motion
+    ("level", FLOAT),  # fraction of the frontal area of horizontal motion
 )
 
 EFFECT = Effect(name="surface", label="Surface", bit=BIT, bound_n=_bound_n, problem=_problem, state=_STATE)

@@ -12,7 +12,7 @@ BIT = 1 << 8
 
 EXPONENTIALS = 7
 LATE_SHARE: Final = 0.6
-"""Share of the remaining slope limit that delayed drag may use."""
+"""Fraction of the remaining slope limit that delayed drag may use."""
 _HIGHEST_REYNOLDS: Final = 1000.0
 """Above Re 200 no flow solution exists for comparison; up to this value it is closer to experiments."""
 

@@ -98,12 +98,12 @@ LOOP = np.dtype(
         ("until_s", np.float64),  # when a run ends
         ("tremor_m", np.float64),
         ("noise_m", np.float64),  # from peak to peak, on top of the encoder
-        ("lost", np.float64),  # share of ticks without a new sample
-        ("duplicated", np.float64),  # share of samples that repeat the position of the sample before
+        ("lost", np.float64),  # fraction of ticks without a new sample
+        ("duplicated", np.float64),  # fraction of samples that repeat the position of the sample before
         ("burst_s", np.float64),  # duration without any new sample at the end of each `BURST_PERIOD_S`
         ("jump_m", np.float64),  # greatest offset of all positions along an axis, redrawn after each such gap
         ("offset_m", np.float64, (3,)),  # that offset
-        ("outliers", np.float64),  # share of ticks whose position is wrong
+        ("outliers", np.float64),  # fraction of ticks whose position is wrong
         ("outlier_m", np.float64),  # greatest error along each axis
         ("error_m", np.float64, (3,)),  # of the newest position: offset and outlier
         ("in_burst", np.int64),  # 1 during such a gap

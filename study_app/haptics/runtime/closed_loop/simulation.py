@@ -52,7 +52,7 @@ class ClosedLoop:
     arm : Arm, optional
         An arm that moves the handle instead of the hand: the second plant.
     jitter, missed : float
-        Greatest lateness of a tick in periods, and the share of missed ticks.
+        Greatest lateness of a tick in periods, and the fraction of missed ticks.
     limits : DampingLimits, optional
         Replace those of the table.
     rules : ForceRules
